@@ -8,6 +8,7 @@ use jtc_sim::{FaultKind, Plant, SimConfig};
 use crate::clock::{MICROSECOND, MILLISECOND, Time};
 use crate::elf::Elf;
 use crate::fdcan::{CanPeers, WireFault};
+use crate::flash::Bank2;
 use crate::gpio::Pin;
 use crate::machine::Machine;
 use crate::usart::WireByte;
@@ -37,11 +38,20 @@ pub struct BoardConfig {
     pub safety_pins: (Pin, Pin),
     /// Seed of what RAM holds at first.
     pub seed: u64,
+    /// What bank 2 of the flash holds from before; the program's own part is put over it.
+    pub bank2: Bank2,
 }
 
 impl Default for BoardConfig {
     fn default() -> Self {
-        Self { sim: SimConfig::default(), no_bus: false, baud: 115_200, safety_pins: SAFETY, seed: 1 }
+        Self {
+            sim: SimConfig::default(),
+            no_bus: false,
+            baud: 115_200,
+            safety_pins: SAFETY,
+            seed: 1,
+            bank2: Bank2::default(),
+        }
     }
 }
 
@@ -84,7 +94,7 @@ impl Board {
     /// Power is switched on everywhere.
     pub fn new(elf: Elf, config: &BoardConfig) -> Self {
         let plant = Rc::new(RefCell::new(Plant::new(&config.sim)));
-        let mut machine = Machine::new(elf, config.seed);
+        let mut machine = Machine::with_bank2(elf, config.seed, config.bank2.clone());
         let chip = machine.chip();
         if !config.no_bus {
             let nodes = Nodes { plant: Rc::clone(&plant), answers: Vec::new() };

@@ -10,6 +10,7 @@ use crate::code::Code;
 use crate::dma::{self, Dma, Memory};
 use crate::exti::Exti;
 use crate::fdcan::Fdcan;
+use crate::flash::Flash;
 use crate::gpio::{Gpio, Pin};
 use crate::iwdg::Iwdg;
 use crate::nvic::Nvic;
@@ -70,6 +71,8 @@ pub struct Core {
     pub raised: Option<u32>,
     /// Address of an access that failed.
     pub fault_address: u32,
+    /// Address of an access that the bus or the protection unit refused.
+    pub refused: Option<u32>,
     /// Exceptions that run, innermost last.
     pub contexts: Vec<usize>,
 }
@@ -98,6 +101,8 @@ pub struct Chip {
     pub usarts: [Usart; 2],
     /// FDCAN1 and the bus.
     pub fdcan: Fdcan,
+    /// Bank 2 of the flash.
+    pub flash: Flash,
     /// Watchdog.
     pub iwdg: Iwdg,
     /// Observers.
@@ -129,6 +134,7 @@ impl Default for Chip {
             timers: core::array::from_fn(|i| Timer::new(2 + i as u32)),
             usarts: [Usart::new(2), Usart::new(3)],
             fdcan: Fdcan::default(),
+            flash: Flash::default(),
             iwdg: Iwdg::default(),
             observers: Observers::default(),
             plain: Plain::default(),
@@ -210,6 +216,7 @@ impl Chip {
             usart.reset();
         }
         self.fdcan.reset();
+        self.flash.reset(now);
         self.iwdg.reset();
         self.plain = Plain::default();
         self.code.forget_itcm();
@@ -246,6 +253,7 @@ impl Chip {
             usart.advance(now, &mut self.dma, memory);
         }
         self.fdcan.advance(now);
+        self.flash.advance(now);
         let cycles = self.cycles();
         self.scs.advance(cycles, now, &mut self.nvic);
         self.update_lines();

@@ -11,6 +11,7 @@ use crate::clock::Time;
 use crate::code::{self, IT, LOWERS_SP, MEMBER, PLAIN, SEV, UNKNOWN, WATCHED};
 use crate::elf::Elf;
 use crate::exception;
+use crate::flash::Bank2;
 use crate::machine::{Machine, Sleep};
 use crate::memory;
 use crate::nvic::{self, Masks};
@@ -35,16 +36,25 @@ impl Machine {
     /// # Panics
     /// When Unicorn refuses its set-up, which no input can cause.
     pub fn new(elf: Elf, seed: u64) -> Self {
+        Self::with_bank2(elf, seed, Bank2::default())
+    }
+
+    /// The same with what bank 2 of the flash held before the power was switched on.
+    ///
+    /// # Panics
+    /// As [`Machine::new`].
+    pub fn with_bank2(elf: Elf, seed: u64, bank: Bank2) -> Self {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, Chip::default()).expect("Unicorn");
         uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M7 as i32).expect("the model of the core");
         uc.ctl_exits_enable().expect("no exit addresses");
         memory::map(&mut uc, seed);
-        for (address, bytes) in &elf.segments {
-            // Segments for places that this board does not have are the linker's business.
-            let _ = uc.mem_write(u64::from(*address), bytes);
-        }
         hook(&mut uc);
+        uc.get_data_mut().flash.bank = bank;
         let mut machine = Self { uc, elf, sleep: Sleep::Awake };
+        for (address, bytes) in machine.elf.segments.clone() {
+            // Segments for places that this board does not have are the linker's business.
+            machine.poke(address, &bytes);
+        }
         let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
         machine.chip().observers.note_reset(reset);
         machine.boot();
@@ -107,6 +117,12 @@ impl Machine {
         }
         if chip.remap {
             self.remap();
+        }
+        if let Some(address) = self.uc.get_data_mut().core.refused.take() {
+            let core = &mut self.uc.get_data_mut().core;
+            core.fault_address = address;
+            let pc = core.pc;
+            return self.fault(FaultKind::BadAccess, pc);
         }
         let waiting = self.uc.get_data().nvic.any_waiting() && self.sleep != Sleep::Lockup;
         let mut masked = false;

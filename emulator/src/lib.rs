@@ -11,6 +11,7 @@ mod elf;
 mod exception;
 mod exti;
 pub mod fdcan;
+pub mod flash;
 mod gpio;
 mod iwdg;
 mod machine;

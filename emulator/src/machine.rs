@@ -4,6 +4,7 @@ use unicorn_engine::{RegisterARM, Unicorn};
 use crate::chip::Chip;
 use crate::clock::Time;
 use crate::elf::Elf;
+use crate::flash::{BANK2, BANK2_SIZE, Bank2};
 use crate::memory::{self, Ram};
 use crate::nvic::{self, Masks};
 use crate::observe::{Fault, FaultKind};
@@ -24,6 +25,10 @@ pub(crate) enum Sleep {
     Event,
     /// Locked up: only a reset helps.
     Lockup,
+}
+
+fn in_bank2(address: u32) -> bool {
+    (BANK2..BANK2 + BANK2_SIZE).contains(&address)
 }
 
 impl Machine {
@@ -75,6 +80,10 @@ impl Machine {
 
     /// A word of memory; `None` where nothing is.
     pub fn word(&self, address: u32) -> Option<u32> {
+        if in_bank2(address) {
+            let bytes = self.memory(address, 4)?;
+            return Some(u32::from_le_bytes(bytes.try_into().ok()?));
+        }
         let mut bytes = [0; 4];
         self.uc.mem_read(u64::from(address), &mut bytes).ok()?;
         Some(u32::from_le_bytes(bytes))
@@ -82,11 +91,22 @@ impl Machine {
 
     /// Bytes of memory; `None` where nothing is.
     pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
+        if in_bank2(address) {
+            let fits = address as usize + length <= (BANK2 + BANK2_SIZE) as usize;
+            return fits.then(|| self.uc.get_data().flash.bank.bytes(address, length));
+        }
         self.uc.mem_read_as_vec(u64::from(address), length).ok()
     }
 
     /// Change memory from outside, as a debugger does, code too; false where nothing is.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
+        if in_bank2(address) {
+            let fits = address as usize + bytes.len() <= (BANK2 + BANK2_SIZE) as usize;
+            if fits {
+                self.chip().flash.bank.put(address, bytes);
+            }
+            return fits;
+        }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
             // What was translated from the old code would go on running.
@@ -109,6 +129,11 @@ impl Machine {
         if self.uc.get_data().remap {
             self.remap();
         }
+    }
+
+    /// What bank 2 of the flash would hold if the power went now: chance, from `seed`, where an operation runs.
+    pub fn cut_power(&self, seed: u64) -> Bank2 {
+        self.uc.get_data().flash.cut(self.now(), seed)
     }
 
     pub(crate) fn masks(&self) -> Masks {

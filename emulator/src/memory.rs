@@ -1,9 +1,11 @@
 //! The memory map of the STM32H745 and H743 as the Cortex-M7 sees it (RM0399 chapter 2).
-use unicorn_engine::Unicorn;
 use unicorn_engine::unicorn_const::Prot;
+use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::chip::Chip;
 use crate::dma::Memory;
+use crate::flash::{BANK2, BANK2_SIZE};
+use crate::nvic::exception;
 use crate::rcc::Gate;
 
 /// Memory as the peripherals reach it.
@@ -21,7 +23,8 @@ impl Memory for Ram<'_> {
 /// Start of flash bank 1; bank 2 follows 1 MiB behind.
 pub const FLASH: u32 = 0x0800_0000;
 
-const FLASH_SIZE: u64 = 0x20_0000;
+/// Bank 1.
+const FLASH_SIZE: u64 = 0x10_0000;
 const SYSTEM: u64 = 0x1FF0_0000;
 const SYSTEM_SIZE: u64 = 0x2_0000;
 /// Peripherals of all domains.
@@ -85,6 +88,7 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     uc.mem_map(u64::from(FLASH), FLASH_SIZE, Prot::READ | Prot::EXEC).expect("flash");
     uc.mem_write(u64::from(FLASH), &vec![0xFF; FLASH_SIZE as usize]).expect("flash");
     uc.mem_map(SYSTEM, SYSTEM_SIZE, Prot::READ).expect("system memory");
+    map_bank2(uc);
     for (start, size) in [(PERIPHERALS, PERIPHERALS_SIZE), (PRIVATE, PRIVATE_SIZE)] {
         uc.mmio_map(
             start,
@@ -100,6 +104,28 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
         )
         .expect("registers");
     }
+}
+
+/// Bank 2 of the flash: the core reaches it through the flash interface.
+fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
+    let faults_masked = |uc: &Unicorn<'_, Chip>| {
+        let mask = uc.reg_read(RegisterARM::FAULTMASK).unwrap_or(0) & 1 == 1;
+        let nvic = &uc.get_data().nvic;
+        mask || nvic.is_active(exception::HARD_FAULT) || nvic.is_active(exception::NMI)
+    };
+    uc.mmio_map(
+        u64::from(BANK2),
+        u64::from(BANK2_SIZE),
+        Some(move |uc: &mut Unicorn<'_, Chip>, offset: u64, size: usize| {
+            let masked = faults_masked(uc);
+            u64::from(uc.get_data_mut().load_bank2(BANK2 + offset as u32, size, masked))
+        }),
+        Some(move |uc: &mut Unicorn<'_, Chip>, offset: u64, size: usize, value: u64| {
+            let masked = faults_masked(uc);
+            uc.get_data_mut().store_bank2(BANK2 + offset as u32, size, value as u32, masked);
+        }),
+    )
+    .expect("bank 2");
 }
 
 /// Let SRAM of D2 be used as far as its clocks are enabled.

@@ -14,6 +14,7 @@ const CCSIDR_INSTRUCTION: u32 = 0xF01F_E009;
 /// ICSR.PENDSTSET, PENDSVSET.
 const PEND_ST: u32 = 1 << 26;
 const PEND_SV: u32 = 1 << 28;
+const MPU_CTRL: u32 = 0xE000_ED94;
 
 /// SysTick, counting core clock cycles.
 #[derive(Default)]
@@ -52,6 +53,15 @@ pub struct Scs {
     /// SYSRESETREQ was written.
     pub reset_request: bool,
     plain: Plain,
+}
+
+/// What the protection unit makes of an access.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Protection {
+    /// It may be.
+    pub allowed: bool,
+    /// The core may cache the memory, and read it ahead of the program.
+    pub ahead: bool,
 }
 
 /// Moment of an access in both measures.
@@ -176,6 +186,35 @@ impl Scs {
     /// MPU regions as (RBAR, RASR); those with RASR bit 0 are enabled.
     pub fn mpu_regions(&self) -> &[(u32, u32); 16] {
         &self.mpu
+    }
+
+    /// What the protection unit makes of a load or store by the program (ARMv7-M B3.5). `faults_masked`: FAULTMASK is set, or
+    /// HardFault or NMI runs.
+    pub fn protection(&self, address: u32, faults_masked: bool) -> Protection {
+        const DEFAULT: Protection = Protection { allowed: true, ahead: true };
+        let ctrl = self.plain.read(MPU_CTRL);
+        let (on, with_faults_masked, default_elsewhere) = (ctrl & 1, ctrl >> 1 & 1, ctrl >> 2 & 1);
+        if on == 0 || faults_masked && with_faults_masked == 0 {
+            return DEFAULT;
+        }
+        let holds = |(rbar, rasr): &&(u32, u32)| {
+            let (size, start) = (1u64 << ((rasr >> 1 & 31) + 1), u64::from(rbar & !31));
+            let offset = u64::from(address).checked_sub(start).filter(|offset| *offset < size);
+            let left_out = |offset: u64| size >= 256 && rasr >> (8 + offset * 8 / size) & 1 == 1;
+            rasr & 1 == 1 && offset.is_some_and(|offset| !left_out(offset))
+        };
+        let Some((_, rasr)) = self.mpu.iter().rev().find(holds) else {
+            return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
+        };
+        let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
+        // Strongly ordered and device memory; what the program only reads is not told apart here.
+        let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
+        Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
+    }
+
+    /// Bus faults of loads and stores are ignored where faults are masked (CCR.BFHFNMIGN).
+    pub fn ignores_bus_faults(&self) -> bool {
+        self.ccr >> 8 & 1 == 1
     }
 
     /// Cycle count at which SysTick wraps next.

@@ -12,6 +12,7 @@ use embassy_time::{Duration, Instant};
 use jtc_wire::{EventBatch, FRAME_MAX, ReceivedEvent, Receiver};
 use openjtc_firmware::{BAUD, lines};
 
+use crate::arm_store::Store;
 use crate::summary::{self, Summary};
 use crate::uart;
 
@@ -172,8 +173,8 @@ fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
-/// Serves both lines for ever.
-pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
+/// Serves both lines for ever, and stores arms.
+pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
     // Line whose turn it is: one that floods the slot does not keep the other from it.
     let mut turn = 0;
     let mut report = Report::new();
@@ -197,6 +198,7 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
             }
         }
         slot.send();
+        store.step();
         report.log(&mut links);
     }
 }

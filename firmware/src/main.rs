@@ -4,7 +4,8 @@
 //! second: it owns the controller, the joint bus, the safety wires and the LEDs, and nothing delays it by more than a
 //! few instructions. The *links* ([`link`]) run in what time is left: they take bytes from both serial lines and cut
 //! them into frames. Frames go from the links to the tick in batches, through one slot; statuses go straight from the tick
-//! to the lines' DMA. A Stop or a Pause needs neither links nor slot: the tick looks for them in what DMA has received.
+//! to the lines' DMA. A Stop or a Pause needs neither links nor slot: the tick looks for them in what DMA has received. The
+//! links' rounds also write the stored arm ([`arm_store`]), a step in each.
 //!
 //! What is above the hardware stands in the library beside this program and in `jtc-core`, where it is tested on a PC.
 #![no_std]
@@ -17,6 +18,8 @@ use embassy_executor::Spawner;
 use embassy_stm32::wdg::IndependentWatchdog;
 use openjtc_firmware::{BAUD, lines, version::Version};
 
+mod arm_store;
+mod bank2;
 mod board;
 mod clocks;
 mod fault;
@@ -57,7 +60,8 @@ async fn main(_spawner: Spawner) {
         VERSION.points,
     );
 
-    let memory::Memory { points, rings, statuses, receive, batch } = memory::take();
+    let memory::Memory { points, rings, statuses, receive, batch, arms } = memory::take();
+    let store = arm_store::load(arms);
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;
     let [status_rs422, status_usb] = statuses;
@@ -83,5 +87,5 @@ async fn main(_spawner: Spawner) {
         link::Link::new(lines::RS422, rs422_in, receive_rs422),
         link::Link::new(lines::USB, usb_in, receive_usb),
     ];
-    link::run(links, slot_in).await
+    link::run(links, slot_in, store).await
 }

@@ -8,6 +8,7 @@ use embassy_stm32::pac;
 use jtc_core::POINTS_MAX;
 use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 
+use crate::arm_store;
 use crate::uart::RING;
 
 /// A value outside .data and .bss, which nobody initialises before [`take`].
@@ -42,6 +43,9 @@ static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
 /// The frames that the controller executes.
 #[unsafe(link_section = ".axisram")]
 static BATCH: Place<EventBatch> = Place::new();
+/// The stored arm, and one that is to be stored.
+#[unsafe(link_section = ".axisram")]
+static ARMS: Place<[arm_store::Buffer; 2]> = Place::new();
 /// What the lines' DMA writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
@@ -64,25 +68,28 @@ pub struct Memory {
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.
     pub batch: &'static mut EventBatch,
+    /// For the stored arm and for one that is to be stored.
+    pub arms: [&'static mut arm_store::Buffer; 2],
 }
 
 /// Hands out the buffers, zeroed. Once; after [`init`].
 pub fn take() -> Memory {
     // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `EventBatch`, which consists of
     // integers, too.
-    let (points, rings, statuses, receive, batch) =
-        unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take()) };
+    let (points, rings, statuses, receive, batch, arms) =
+        unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
     Memory {
         points,
         rings: rings.each_mut(),
         statuses: statuses.each_mut(),
         receive: receive.each_mut(),
         batch,
+        arms: arms.each_mut(),
     }
 }
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
-const REGIONS: [(u32, u32, u32); 4] = [
+const REGIONS: [(u32, u32, u32); 5] = [
     // External memory that is not there: without this the core may read it speculatively and hang. The lowest three
     // eighths and the highest of the 4 GB are left out.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
@@ -92,7 +99,13 @@ const REGIONS: [(u32, u32, u32); 4] = [
     (0x1FFC_0000, 18, NO_ACCESS),
     // What DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
+    // The second bank of the flash halts whoever reads it while it is busy: opened by [`bank2`] only.
+    (BANK2, 20, NO_ACCESS),
 ];
+/// Flash bank 2.
+pub const BANK2: u32 = 0x0810_0000;
+/// Number of its region.
+const BANK2_REGION: u32 = 4;
 const NO_ACCESS: u32 = NO_EXECUTE;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const NO_EXECUTE: u32 = 1 << 28;
@@ -127,9 +140,28 @@ fn protect(mpu: &MPU) {
         }
     }
     const ENABLE: u32 = 1 << 0;
+    // HFNMIENA. Otherwise bank 2 would be cached memory to the loads of `bank2`, which mask faults.
+    const WITH_FAULTS_MASKED: u32 = 1 << 1;
     const DEFAULT_MAP_ELSEWHERE: u32 = 1 << 2;
     // SAFETY: as above; everything else keeps the processor's default attributes.
-    unsafe { mpu.ctrl.write(ENABLE | DEFAULT_MAP_ELSEWHERE) };
+    unsafe { mpu.ctrl.write(ENABLE | WITH_FAULTS_MASKED | DEFAULT_MAP_ELSEWHERE) };
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// Lets loads and stores into flash bank 2, or keeps them out. Open, it is strongly ordered memory: not cached, nothing is read
+/// before the program asks for it. By the main program only.
+pub fn bank2(open: bool) {
+    let (_, size, closed) = REGIONS[BANK2_REGION as usize];
+    let attributes = if open { FULL_ACCESS | NO_EXECUTE } else { closed };
+    // What was begun before ends before.
+    cortex_m::asm::dsb();
+    // SAFETY: the region holds nothing of this program but what `bank2` reads and writes while it is open; interrupts use
+    // neither the bank nor these registers.
+    unsafe {
+        (*MPU::PTR).rnr.write(BANK2_REGION);
+        (*MPU::PTR).rasr.write(attributes | (size - 1) << 1 | 1);
+    }
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
 }

@@ -2,10 +2,12 @@
 use std::collections::BTreeMap;
 
 use super::map::{
-    EXTI, EXTI_END, EXTICR, EXTICR_END, IWDG1, IWDG1_END, Place, RCC, RCC_END, is_plain, place, ready_bits,
+    EXTI, EXTI_END, EXTICR, EXTICR_END, FLASH, FLASH_END, IWDG1, IWDG1_END, MPU, Place, RCC, RCC_END,
+    is_plain, place, ready_bits,
 };
 use super::{Access, Chip};
 use crate::dma::Memory;
+use crate::flash::{BANK2, BANK2_SIZE};
 use crate::rcc::Gate;
 use crate::timer::Timer;
 
@@ -57,6 +59,10 @@ impl Chip {
         }
         match address {
             RCC..RCC_END => self.rcc.read(address - RCC),
+            FLASH..FLASH_END => {
+                let register = self.flash.read_register(address - FLASH, now);
+                register.unwrap_or_else(|| self.plain.read(address))
+            }
             IWDG1..IWDG1_END => self.iwdg.read(address - IWDG1),
             EXTI..EXTI_END => self.exti.read(address - EXTI),
             EXTICR..EXTICR_END => self.exti.source((address - EXTICR) as usize / 4),
@@ -84,6 +90,10 @@ impl Chip {
                 value
             };
             self.scs.write(word_address, word, &mut self.nvic, at);
+            if MPU.contains(&word_address) {
+                let closed = self.bank2_closed();
+                self.flash.guard(now, closed);
+            }
             return self.changed();
         }
         let value = value << shift;
@@ -113,6 +123,12 @@ impl Chip {
         }
         match word_address {
             RCC..RCC_END => self.write_rcc(word_address - RCC, value, memory),
+            FLASH..FLASH_END => {
+                let closed = self.bank2_closed();
+                if !self.flash.write_register(word_address - FLASH, value, now, closed) {
+                    self.plain.write(word_address, value);
+                }
+            }
             IWDG1..IWDG1_END => self.iwdg.write(word_address - IWDG1, value, now),
             EXTI..EXTI_END => self.exti.write(word_address - EXTI, value),
             EXTICR..EXTICR_END => self.exti.set_source((word_address - EXTICR) as usize / 4, value),
@@ -150,6 +166,57 @@ impl Chip {
         let now = self.now();
         for usart in &mut self.usarts {
             usart.advance(now, &mut self.dma, memory);
+        }
+    }
+
+    /// The protection unit keeps the program out of bank 2.
+    fn bank2_closed(&self) -> bool {
+        !self.scs.protection(BANK2 + BANK2_SIZE - 1, false).allowed
+    }
+
+    /// The core's way to bank 2; false when it is refused. While the bank is busy the core stands still.
+    fn reach_bank2(&mut self, address: u32, faults_masked: bool) -> bool {
+        let protection = self.scs.protection(address, faults_masked);
+        if !protection.allowed {
+            self.refuse(address);
+            return false;
+        }
+        self.flash.ahead += u32::from(protection.ahead);
+        let now = self.now();
+        if let Some(ready) = self.flash.busy_until(now) {
+            let until = ready.min(self.iwdg.bites()).max(now);
+            self.flash.stalls.push((now, until - now));
+            self.sleep_until(until);
+            self.changed();
+        }
+        let now = self.now();
+        self.flash.advance(now);
+        true
+    }
+
+    fn refuse(&mut self, address: u32) {
+        self.core.refused = Some(address);
+        self.changed();
+    }
+
+    /// A load from bank 2 by the core.
+    pub fn load_bank2(&mut self, address: u32, size: usize, faults_masked: bool) -> u32 {
+        if !self.reach_bank2(address, faults_masked) {
+            return 0;
+        }
+        let (value, unreadable) = self.flash.load(address, size);
+        if unreadable && !(faults_masked && self.scs.ignores_bus_faults()) {
+            self.refuse(address);
+        }
+        value
+    }
+
+    /// A store to bank 2 by the core.
+    pub fn store_bank2(&mut self, address: u32, size: usize, value: u32, faults_masked: bool) {
+        if self.reach_bank2(address, faults_masked) {
+            let (now, closed) = (self.now(), self.bank2_closed());
+            self.flash.store(address, size, value, now, closed);
+            self.changed();
         }
     }
 

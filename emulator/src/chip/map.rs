@@ -2,6 +2,8 @@
 use crate::plain::Plain;
 use crate::rcc::Gate;
 
+pub const FLASH: u32 = 0x5200_2000;
+pub const FLASH_END: u32 = 0x5200_2400;
 pub const RCC: u32 = 0x5802_4400;
 pub const RCC_END: u32 = 0x5802_4800;
 pub const PWR: u32 = 0x5802_4800;
@@ -12,6 +14,8 @@ pub const EXTI_END: u32 = 0x5800_0400;
 /// SYSCFG_EXTICR1..4.
 pub const EXTICR: u32 = 0x5800_0408;
 pub const EXTICR_END: u32 = 0x5800_0418;
+/// Registers of the protection unit.
+pub const MPU: core::ops::Range<u32> = 0xE000_ED90..0xE000_EDC0;
 const HSEM: u32 = 0x5802_6400;
 
 /// A register of a peripheral that is modelled and can be switched off.
@@ -52,11 +56,11 @@ pub fn place(address: u32) -> Option<(Gate, Place)> {
     })
 }
 
-/// Blocks that are nothing but memory for the firmware's purposes: CRS, FLASH, the rest of SYSCFG, RTC, PWR, HSEM, DBGMCU.
+/// Blocks that are nothing but memory for the firmware's purposes: CRS, the rest of SYSCFG, RTC, PWR, HSEM, DBGMCU.
 pub fn is_plain(address: u32) -> bool {
     matches!(
         address & !0x3FF,
-        0x4000_8400 | 0x5200_2000 | 0x5800_0400 | 0x5800_4000 | PWR | HSEM | 0x5C00_1000 | 0x4000_A800
+        0x4000_8400 | 0x5800_0400 | 0x5800_4000 | PWR | HSEM | 0x5C00_1000 | 0x4000_A800
     )
 }
 

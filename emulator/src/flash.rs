@@ -1,0 +1,308 @@
+//! Bank 2 of the embedded flash (RM0399 chapter 4): erasing and programming take their time, a read in that time halts the core, a
+//! loss of power in it leaves anything. Bank 1 holds the program and stays locked.
+mod bank;
+
+use crate::clock::{MICROSECOND, SECOND, Time};
+use bank::Cell;
+
+pub use bank::{BANK2, BANK2_SIZE, Bank2, WORD};
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+/// Register offsets of bank 1; those of bank 2 are [`SECOND_BANK`] higher.
+mod reg {
+    pub const KEYR: u32 = 0x04;
+    pub const CR: u32 = 0x0C;
+    pub const SR: u32 = 0x10;
+    pub const CCR: u32 = 0x14;
+}
+const SECOND_BANK: u32 = 0x100;
+
+/// Bits of CR.
+mod cr {
+    pub const LOCK: u32 = 1 << 0;
+    pub const PG: u32 = 1 << 1;
+    pub const SER: u32 = 1 << 2;
+    pub const START: u32 = 1 << 7;
+    pub const EOPIE: u32 = 1 << 16;
+    /// After a reset: locked, 64 bits at once.
+    pub const RESET: u32 = 0x31;
+}
+
+/// Bits of SR.
+pub mod sr {
+    /// An operation runs.
+    pub const BSY: u32 = 1 << 0;
+    /// Some bytes of a word are here, and not all.
+    pub const WBNE: u32 = 1 << 1;
+    /// An operation runs or waits.
+    pub const QW: u32 = 1 << 2;
+    /// An operation has ended well, if its interrupt is enabled.
+    pub const EOP: u32 = 1 << 16;
+    /// Write protection.
+    pub const WRPERR: u32 = 1 << 17;
+    /// Programming without being told so before.
+    pub const PGSERR: u32 = 1 << 18;
+    /// A byte was written twice.
+    pub const STRBERR: u32 = 1 << 19;
+    /// Bytes of another word before the first was complete.
+    pub const INCERR: u32 = 1 << 21;
+    /// The operation failed.
+    pub const OPERR: u32 = 1 << 22;
+    /// More bits of a word are wrong than can be corrected.
+    pub const DBECCERR: u32 = 1 << 26;
+}
+
+/// What the bank does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OperationKind {
+    /// A sector becomes all ones.
+    Erase {
+        /// Its number.
+        sector: usize,
+    },
+    /// A word is programmed.
+    Program {
+        /// Its address.
+        address: u32,
+    },
+}
+
+/// An operation of the bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Operation {
+    /// What.
+    pub kind: OperationKind,
+    /// Beginning.
+    pub start: Time,
+    /// End.
+    pub end: Time,
+}
+
+/// The flash interface.
+pub struct Flash {
+    /// What it holds.
+    pub bank: Bank2,
+    /// Time to erase a sector.
+    pub erase_time: Time,
+    /// Time to program a word.
+    pub program_time: Time,
+    /// All operations, oldest first.
+    pub operations: Vec<Operation>,
+    /// Reads and writes that had to wait for an operation, with the time that the core stood still.
+    pub stalls: Vec<(Time, Time)>,
+    /// Accesses to the bank as memory that the core may cache or read ahead of the program.
+    pub ahead: u32,
+    /// Words that were programmed again without being erased.
+    pub overwrites: u32,
+    /// Longest time within an operation in which the protection unit would have let the core read the bank.
+    pub longest_open: Time,
+    /// Bits of SR in which the next operation ends.
+    pub fail_next: u32,
+    /// Somebody has unlocked bank 1.
+    pub bank1_unlocked: bool,
+    /// What was left unfinished by resets.
+    torn: u64,
+    cr: u32,
+    sr: u32,
+    /// Keys that were written; more than two: refused until a reset.
+    keys: usize,
+    running: Option<Operation>,
+    /// The word that is being written: its number, its bytes, which of them are there.
+    buffer: Option<(usize, [u8; WORD], u32)>,
+    open_since: Option<Time>,
+}
+
+impl Default for Flash {
+    fn default() -> Self {
+        Self {
+            bank: Bank2::default(),
+            // Typical values of the data sheet, 32 bits at once.
+            erase_time: 2 * SECOND,
+            program_time: 130 * MICROSECOND,
+            operations: Vec::new(),
+            stalls: Vec::new(),
+            ahead: 0,
+            overwrites: 0,
+            longest_open: 0,
+            fail_next: 0,
+            bank1_unlocked: false,
+            torn: 0,
+            cr: cr::RESET,
+            sr: 0,
+            keys: 0,
+            running: None,
+            buffer: None,
+            open_since: None,
+        }
+    }
+}
+
+impl Flash {
+    /// Registers as after a reset; an operation is broken off.
+    pub fn reset(&mut self, now: Time) {
+        self.torn += 1;
+        self.bank = self.cut(now, self.torn);
+        (self.cr, self.sr, self.keys, self.buffer, self.running) = (cr::RESET, 0, 0, None, None);
+        self.open_since = None;
+    }
+
+    /// What the bank holds when the power goes now.
+    pub fn cut(&self, now: Time, seed: u64) -> Bank2 {
+        let mut bank = self.bank.clone();
+        if let Some(operation) = self.running.filter(|o| o.start < now) {
+            let word = self.buffer.map_or([0xFF; WORD], |(_, bytes, _)| bytes);
+            bank.tear(operation.kind, &word, &mut fastrand::Rng::with_seed(seed));
+        }
+        bank
+    }
+
+    /// When the operation that runs now ends.
+    pub fn busy_until(&self, now: Time) -> Option<Time> {
+        self.running.map(|operation| operation.end).filter(|end| *end > now)
+    }
+
+    /// Lets what has ended by now take effect.
+    pub fn advance(&mut self, now: Time) {
+        let Some(operation) = self.running.take_if(|operation| operation.end <= now) else { return };
+        self.guard(operation.end, true);
+        let buffer = self.buffer.take();
+        let fail = core::mem::take(&mut self.fail_next);
+        self.sr |= fail;
+        if fail == 0 && self.cr & cr::EOPIE != 0 {
+            self.sr |= sr::EOP;
+        }
+        match (operation.kind, buffer) {
+            _ if fail != 0 => self.bank.tear(
+                operation.kind,
+                &buffer.map_or([0xFF; WORD], |(_, bytes, _)| bytes),
+                &mut fastrand::Rng::with_seed(now),
+            ),
+            (OperationKind::Erase { sector }, _) => self.bank.erase_sector(sector),
+            (OperationKind::Program { .. }, Some((n, bytes, _))) => {
+                self.overwrites += u32::from(!self.bank.program(n, &bytes));
+            }
+            (OperationKind::Program { .. }, None) => {}
+        }
+    }
+
+    /// The protection unit keeps the core out from now on, or does not.
+    pub fn guard(&mut self, now: Time, closed: bool) {
+        if closed {
+            let open = self.open_since.take().map_or(0, |since| now.saturating_sub(since));
+            self.longest_open = self.longest_open.max(open);
+        } else if self.running.is_some() {
+            self.open_since.get_or_insert(now);
+        }
+    }
+
+    fn begin(&mut self, kind: OperationKind, now: Time, closed: bool) {
+        let time = match kind {
+            OperationKind::Erase { .. } => self.erase_time,
+            OperationKind::Program { .. } => self.program_time,
+        };
+        let operation = Operation { kind, start: now, end: now + time };
+        self.operations.push(operation);
+        self.running = Some(operation);
+        self.guard(now, closed);
+    }
+
+    /// A register; `None` for those that are memory to every program.
+    pub fn read_register(&mut self, offset: u32, now: Time) -> Option<u32> {
+        self.advance(now);
+        Some(match offset {
+            reg::KEYR | reg::CCR => 0,
+            reg::CR => cr::RESET & !u32::from(self.bank1_unlocked),
+            reg::SR => 0,
+            _ => match offset.checked_sub(SECOND_BANK)? {
+                reg::KEYR | reg::CCR => 0,
+                reg::CR => self.cr,
+                reg::SR => {
+                    let busy = if self.running.is_some() { sr::BSY | sr::QW } else { 0 };
+                    let waits = self.buffer.is_some() && self.running.is_none();
+                    self.sr | busy | if waits { sr::WBNE } else { 0 }
+                }
+                _ => return None,
+            },
+        })
+    }
+
+    /// Write a register; false for those that are memory. `closed`: the protection unit keeps the core out of the bank.
+    pub fn write_register(&mut self, offset: u32, value: u32, now: Time, closed: bool) -> bool {
+        self.advance(now);
+        match offset {
+            reg::KEYR => self.bank1_unlocked = true,
+            reg::CR | reg::SR | reg::CCR => {}
+            _ => match offset.wrapping_sub(SECOND_BANK) {
+                reg::KEYR => self.key(value),
+                reg::CR => self.control(value, now, closed),
+                reg::CCR => self.sr &= !value,
+                reg::SR => {}
+                _ => return false,
+            },
+        }
+        true
+    }
+
+    fn key(&mut self, value: u32) {
+        let right = KEYS.get(self.keys) == Some(&value);
+        self.keys = if right { self.keys + 1 } else { usize::MAX };
+        if self.keys == KEYS.len() {
+            self.cr &= !cr::LOCK;
+        }
+    }
+
+    fn control(&mut self, value: u32, now: Time, closed: bool) {
+        if self.cr & cr::LOCK != 0 || self.running.is_some() {
+            return;
+        }
+        self.cr = value & !cr::START;
+        if value & cr::LOCK != 0 {
+            self.keys = 0;
+        }
+        match (value & cr::START != 0, value & cr::SER != 0, value & cr::PG != 0) {
+            (true, true, false) if self.buffer.is_none() => {
+                let sector = (value >> 8 & 7) as usize;
+                self.begin(OperationKind::Erase { sector }, now, closed);
+            }
+            (true, ..) => self.sr |= sr::PGSERR,
+            _ => {}
+        }
+    }
+
+    /// The core reads; the flag says that the word cannot be read.
+    pub fn load(&mut self, address: u32, size: usize) -> (u32, bool) {
+        let at = (address - BANK2) as usize;
+        let bad = self.bank.cells[at / WORD] == Cell::Unreadable;
+        if bad {
+            self.sr |= sr::DBECCERR;
+        }
+        let bytes = self.bank.bytes.as_flattened().iter().skip(at).take(size);
+        (bytes.rev().fold(0, |value, byte| value << 8 | u32::from(*byte)), bad)
+    }
+
+    /// The core writes; nothing runs.
+    pub fn store(&mut self, address: u32, size: usize, value: u32, now: Time, closed: bool) {
+        let at = (address - BANK2) as usize;
+        let (n, first) = (at / WORD, at % WORD);
+        if self.cr & cr::LOCK != 0 || self.cr & cr::PG == 0 {
+            self.sr |= sr::PGSERR;
+            return;
+        }
+        let buffer = self.buffer.get_or_insert((n, [0xFF; WORD], 0));
+        if buffer.0 != n {
+            self.sr |= sr::INCERR;
+            return;
+        }
+        for (i, byte) in value.to_le_bytes().into_iter().enumerate().take(size) {
+            if buffer.2 >> (first + i) & 1 == 1 {
+                self.sr |= sr::STRBERR;
+            }
+            buffer.1[first + i] = byte;
+            buffer.2 |= 1 << (first + i);
+        }
+        if buffer.2 == u32::MAX {
+            self.begin(OperationKind::Program { address: BANK2 + (n * WORD) as u32 }, now, closed);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What the bank holds, and what is left of it when the power goes at a bad moment.
+use std::fmt;
+
+use super::OperationKind;
+
+/// First address.
+pub const BANK2: u32 = 0x0810_0000;
+/// Bytes.
+pub const BANK2_SIZE: u32 = 0x10_0000;
+/// Bytes that are programmed at once.
+pub const WORD: usize = 32;
+const WORDS: usize = BANK2_SIZE as usize / WORD;
+/// Words of a sector.
+const SECTOR_WORDS: usize = 128 * 1024 / WORD;
+/// State of a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cell {
+    /// All ones: it can be programmed.
+    Erased,
+    /// It cannot.
+    Programmed,
+    /// Reading it is an error.
+    Unreadable,
+}
+
+/// What the bank holds, with or without power.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Bank2 {
+    pub(super) bytes: Vec<[u8; WORD]>,
+    pub(super) cells: Vec<Cell>,
+}
+
+impl Default for Bank2 {
+    fn default() -> Self {
+        Self { bytes: vec![[0xFF; WORD]; WORDS], cells: vec![Cell::Erased; WORDS] }
+    }
+}
+
+impl fmt::Debug for Bank2 {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = |cell| self.cells.iter().filter(|c| **c == cell).count();
+        write!(f, "{} words programmed, {} unreadable", count(Cell::Programmed), count(Cell::Unreadable))
+    }
+}
+
+impl Bank2 {
+    /// Bytes at an address, as they are read without regard to errors.
+    pub fn bytes(&self, address: u32, length: usize) -> Vec<u8> {
+        let at = (address - BANK2) as usize;
+        self.bytes.as_flattened()[at..at + length].to_vec()
+    }
+
+    /// Puts bytes there, whatever there was; the words are programmed then.
+    pub fn put(&mut self, address: u32, bytes: &[u8]) {
+        let at = (address - BANK2) as usize;
+        self.bytes.as_flattened_mut()[at..at + bytes.len()].copy_from_slice(bytes);
+        self.cells[at / WORD..(at + bytes.len()).div_ceil(WORD)].fill(Cell::Programmed);
+    }
+
+    /// Makes the word at an address one that cannot be read.
+    pub fn damage(&mut self, address: u32) {
+        self.cells[(address - BANK2) as usize / WORD] = Cell::Unreadable;
+    }
+
+    /// Where the power goes in the middle of an operation, anything may be left of the words that it is at.
+    pub fn tear(&mut self, kind: OperationKind, word: &[u8; WORD], rng: &mut fastrand::Rng) {
+        match kind {
+            OperationKind::Erase { sector } => {
+                for n in sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS {
+                    match rng.u8(..4) {
+                        0 => self.erase(n),
+                        1 => {}
+                        2 => self.cells[n] = Cell::Unreadable,
+                        _ => self.bytes[n].iter_mut().for_each(|byte| *byte |= rng.u8(..)),
+                    }
+                }
+            }
+            OperationKind::Program { address } => {
+                let n = (address - BANK2) as usize / WORD;
+                self.cells[n] = Cell::Programmed;
+                match rng.u8(..5) {
+                    0 => self.erase(n),
+                    1 => self.cells[n] = Cell::Unreadable,
+                    2 => self.bytes[n] = *word,
+                    3 => self.bytes[n] = word.map(|byte| byte | rng.u8(..)),
+                    _ => rng.fill(&mut self.bytes[n]),
+                }
+            }
+        }
+    }
+
+    /// A whole sector.
+    pub fn erase_sector(&mut self, sector: usize) {
+        (sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS).for_each(|n| self.erase(n));
+    }
+
+    /// Programs a word; false when it was not erased, after which it is damaged.
+    pub fn program(&mut self, n: usize, bytes: &[u8; WORD]) -> bool {
+        let erased = self.cells[n] == Cell::Erased;
+        self.bytes[n].iter_mut().zip(bytes).for_each(|(old, new)| *old &= new);
+        self.cells[n] = if erased { Cell::Programmed } else { Cell::Unreadable };
+        erased
+    }
+
+    fn erase(&mut self, n: usize) {
+        self.bytes[n] = [0xFF; WORD];
+        self.cells[n] = Cell::Erased;
+    }
+}

@@ -1,0 +1,306 @@
+//! The stored arm (J-54): an image of bytes that outlasts power, and what a host does to it.
+//!
+//! At the start [`load`] finds the newest whole image and copies it into memory, before the first tick. Later the tick hands an image over
+//! with [`begin`], and sees in [`progress`] what became of it. The links' rounds carry it out, a small step in each
+//! ([`Store::step`]): nothing waits for the flash, and no interrupt for more than some instructions.
+//!
+//! What is in the slots and what is done in which order is `jtc_core::slots`; the flash itself is [`bank2`].
+use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use critical_section::Mutex;
+use embassy_time::{Duration, Instant};
+use jtc_core::slots::{Action, Header, IMAGE_MAX, Slots, Storing, WORD, Word};
+
+use crate::bank2;
+
+/// Memory of one image.
+pub type Buffer = [u8; IMAGE_MAX];
+
+/// The slowest sector takes 4 s to erase (data sheet), the slowest word 0.5 ms to program.
+const ERASE_MAX: Duration = Duration::from_secs(8);
+const PROGRAM_MAX: Duration = Duration::from_millis(50);
+
+/// What tick and links tell each other. Its form is fixed, so that a debugger can look at it: words in this order.
+#[repr(C)]
+pub struct Mailbox {
+    /// [`Mailbox::IDLE`] and so on.
+    state: AtomicU32,
+    /// Bytes of the image to be stored.
+    length: AtomicU32,
+    /// Sequence number of the image that was stored last.
+    sequence: AtomicU32,
+    /// The last [`Failure`].
+    failure: AtomicU32,
+    /// Address of the memory that an image to be stored is in.
+    staging: AtomicU32,
+    /// The image of the start: address or 0, bytes, sequence number.
+    loaded: [AtomicU32; 3],
+}
+
+impl Mailbox {
+    const IDLE: u32 = 0;
+    const ASKED: u32 = 1;
+    const BUSY: u32 = 2;
+    const DONE: u32 = 3;
+    const FAILED: u32 = 4;
+}
+
+/// The one mailbox.
+#[unsafe(no_mangle)]
+#[used]
+pub static ARM_STORE: Mailbox = Mailbox {
+    state: AtomicU32::new(Mailbox::IDLE),
+    length: AtomicU32::new(0),
+    sequence: AtomicU32::new(0),
+    failure: AtomicU32::new(0),
+    staging: AtomicU32::new(0),
+    loaded: [const { AtomicU32::new(0) }; 3],
+};
+
+/// Memory for an image to be stored; whoever has it out may use it.
+static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
+/// The image of the start.
+static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
+
+/// The image that was found at the start.
+#[derive(Clone, Copy)]
+#[expect(dead_code, reason = "no frame of a host asks for it yet")]
+pub struct Loaded {
+    /// Its bytes.
+    pub image: &'static [u8],
+    /// Its sequence number.
+    pub sequence: u32,
+}
+
+/// Why an image is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// The last one is not stored yet.
+    Busy,
+    /// It has more than [`IMAGE_MAX`] bytes.
+    TooLong,
+}
+
+/// What became of the last image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// There was none since the start.
+    Idle,
+    /// It is being stored.
+    Busy,
+    /// It is stored, and will be found from now on.
+    Done {
+        /// Its sequence number.
+        sequence: u32,
+    },
+    /// It is not; the image that was stored before it is still there.
+    Failed(Failure),
+}
+
+/// Why an image could not be stored. The log has the flags of the flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[repr(u8)]
+pub enum Failure {
+    /// The flash cannot be unlocked until the next reset.
+    Locked = 1,
+    /// The flash reported an error while it erased.
+    Erase = 2,
+    /// The flash reported an error while it programmed.
+    Program = 3,
+    /// What was programmed reads differently: the sector is worn out.
+    Verify = 4,
+    /// The flash did not become ready in time.
+    Timeout = 5,
+}
+
+/// Gives an image to be stored. By the tick; it copies the bytes and comes back at once.
+#[expect(dead_code, reason = "no frame of a host asks for it yet")]
+pub fn begin(image: &[u8]) -> Result<(), Refused> {
+    if matches!(ARM_STORE.state.load(Ordering::Acquire), Mailbox::ASKED | Mailbox::BUSY) {
+        return Err(Refused::Busy);
+    }
+    let buffer = critical_section::with(|cs| STAGING.borrow(cs).take()).ok_or(Refused::Busy)?;
+    let place = buffer.get_mut(..image.len());
+    let fits = place.map(|place| place.copy_from_slice(image));
+    critical_section::with(|cs| STAGING.borrow(cs).set(Some(buffer)));
+    fits.ok_or(Refused::TooLong)?;
+    ARM_STORE.length.store(image.len() as u32, Ordering::Relaxed);
+    ARM_STORE.state.store(Mailbox::ASKED, Ordering::Release);
+    Ok(())
+}
+
+/// What became of the last image.
+#[expect(dead_code, reason = "no frame of a host asks for it yet")]
+pub fn progress() -> Progress {
+    match ARM_STORE.state.load(Ordering::Acquire) {
+        Mailbox::ASKED | Mailbox::BUSY => Progress::Busy,
+        Mailbox::DONE => Progress::Done { sequence: ARM_STORE.sequence.load(Ordering::Relaxed) },
+        Mailbox::FAILED => Progress::Failed(match ARM_STORE.failure.load(Ordering::Relaxed) {
+            1 => Failure::Locked,
+            2 => Failure::Erase,
+            3 => Failure::Program,
+            4 => Failure::Verify,
+            _ => Failure::Timeout,
+        }),
+        _ => Progress::Idle,
+    }
+}
+
+/// The image that was found at the start; it stays the same until the next one.
+#[expect(dead_code, reason = "no frame of a host asks for it yet")]
+pub fn loaded() -> Option<Loaded> {
+    critical_section::with(|cs| LOADED.borrow(cs).get())
+}
+
+/// Reads a slot; its header when it is whole.
+fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
+    let first = bank2::read(slot, 0);
+    if first == Some([0xFF; WORD]) {
+        return None;
+    }
+    let header = first.and_then(|word| Header::parse(&word)).filter(|header| {
+        let (words, _) = buffer.as_chunks_mut::<WORD>();
+        let rest = words.iter_mut().take(header.words() - 1).enumerate();
+        let mut readable = rest.map(|(n, word)| bank2::read(slot, n + 1).map(|bytes| *word = bytes));
+        readable.all(|word| word.is_some()) && header.accepts(buffer).is_some()
+    });
+    if header.is_none() {
+        defmt::warn!("arm slot {=usize} is not whole", slot);
+    }
+    header
+}
+
+/// Looks for the stored image. Once, before the first tick; the watchdog does not run yet.
+pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
+    let [first, second] = buffers;
+    let headers = [read(0, first), read(1, second)];
+    let slots = Slots::new(headers.map(|header| header.map(|header| header.sequence())));
+    let current = slots.current();
+    let (used, staging) =
+        if current.is_some_and(|(slot, _)| slot == 1) { (second, first) } else { (first, second) };
+    ARM_STORE.staging.store(staging.as_ptr() as u32, Ordering::Relaxed);
+    critical_section::with(|cs| STAGING.borrow(cs).set(Some(staging)));
+    let used: &'static Buffer = used;
+    let header = current.and_then(|(slot, _)| headers.get(slot).copied().flatten());
+    if let Some((header, image)) = header.and_then(|header| Some((header, used.get(..header.length())?))) {
+        let sequence = header.sequence();
+        defmt::info!("stored arm: {=usize} bytes, sequence number {=u32}", image.len(), sequence);
+        let facts = [image.as_ptr() as u32, image.len() as u32, sequence];
+        ARM_STORE.loaded.iter().zip(facts).for_each(|(to, from)| to.store(from, Ordering::Relaxed));
+        critical_section::with(|cs| LOADED.borrow(cs).set(Some(Loaded { image, sequence })));
+    }
+    Store { slots, job: None }
+}
+
+/// The links' side.
+pub struct Store {
+    slots: Slots,
+    job: Option<Job>,
+}
+
+/// An image on its way.
+struct Job {
+    image: &'static mut Buffer,
+    length: usize,
+    storing: Storing,
+    /// When what the flash does now was begun.
+    begun: Option<Instant>,
+}
+
+impl Store {
+    /// One step of what is to be done, if anything is; a few microseconds.
+    pub fn step(&mut self) {
+        let Some(job) = &mut self.job else {
+            if ARM_STORE.state.load(Ordering::Acquire) == Mailbox::ASKED {
+                self.start();
+            }
+            return;
+        };
+        match job.step() {
+            Ok(false) => {}
+            Ok(true) => self.end(Ok(())),
+            Err(failure) => self.end(Err(failure)),
+        }
+    }
+
+    /// Takes an image over.
+    fn start(&mut self) {
+        let Some(image) = critical_section::with(|cs| STAGING.borrow(cs).take()) else { return };
+        ARM_STORE.state.store(Mailbox::BUSY, Ordering::Relaxed);
+        let length = (ARM_STORE.length.load(Ordering::Relaxed) as usize).min(IMAGE_MAX);
+        // Not longer than allowed: a slot is always found.
+        let Some(storing) = Storing::begin(&mut self.slots, &image[..length]) else { return };
+        self.job = Some(Job { image, length, storing, begun: None });
+        if bank2::busy() {
+            self.end(Err(Failure::Timeout));
+        } else if !bank2::unlock() {
+            self.end(Err(Failure::Locked));
+        }
+    }
+
+    fn end(&mut self, result: Result<(), Failure>) {
+        let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
+        let flags = bank2::errors();
+        bank2::lock();
+        let (slot, sequence) = storing.target();
+        storing.finish(&mut self.slots);
+        critical_section::with(|cs| STAGING.borrow(cs).set(Some(image)));
+        let state = match result {
+            Ok(()) => {
+                defmt::info!("arm stored: {=usize} bytes, sequence number {=u32}", length, sequence);
+                ARM_STORE.sequence.store(sequence, Ordering::Relaxed);
+                Mailbox::DONE
+            }
+            Err(failure) => {
+                defmt::error!("arm not stored in slot {=usize}: {}, flags {=u32:#x}", slot, failure, flags);
+                ARM_STORE.failure.store(failure as u32, Ordering::Relaxed);
+                Mailbox::FAILED
+            }
+        };
+        ARM_STORE.state.store(state, Ordering::Release);
+    }
+}
+
+impl Job {
+    /// What is to be done with the flash now.
+    fn action(&self) -> Action {
+        self.storing.action(self.image.get(..self.length).unwrap_or(&[]))
+    }
+
+    /// Sees whether the flash is done, and begins what comes next; true at the end.
+    fn step(&mut self) -> Result<bool, Failure> {
+        if let Some(begun) = self.begun {
+            let limit = if matches!(self.action(), Action::Erase { .. }) { ERASE_MAX } else { PROGRAM_MAX };
+            if bank2::busy() {
+                return if begun.elapsed() > limit { Err(Failure::Timeout) } else { Ok(false) };
+            }
+            bank2::end();
+            self.check()?;
+            self.storing.done();
+            self.begun = None;
+        }
+        match self.action() {
+            Action::Erase { slot } => bank2::erase(slot),
+            Action::Program { slot, word, bytes } => bank2::program(slot, word, &bytes),
+            Action::Stored => return Ok(true),
+        }
+        self.begun = Some(Instant::now());
+        Ok(false)
+    }
+
+    /// Whether the flash did what it was to do.
+    fn check(&self) -> Result<(), Failure> {
+        let failed = bank2::errors() != 0;
+        match self.action() {
+            Action::Erase { .. } if failed => Err(Failure::Erase),
+            Action::Program { .. } if failed => Err(Failure::Program),
+            Action::Program { slot, word, bytes } => same(bank2::read(slot, word), &bytes),
+            Action::Erase { .. } | Action::Stored => Ok(()),
+        }
+    }
+}
+
+fn same(read: Option<Word>, expected: &Word) -> Result<(), Failure> {
+    if read.as_ref() == Some(expected) { Ok(()) } else { Err(Failure::Verify) }
+}

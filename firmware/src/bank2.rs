@@ -1,0 +1,151 @@
+//! Flash bank 2, of which the last two sectors keep the stored arm (J-54): erasing and programming that never waits, and reading
+//! that no damaged word can turn into a fault.
+//!
+//! While the bank is erased or programmed, a read of it would halt the processor until that is done: two seconds, where the watchdog
+//! allows 4.5 ms. So nobody can read it: the protection unit keeps everything out, speculative reads and the fetching of cache
+//! lines too ([`memory::bank2`]), and opens it, as memory that is neither cached nor read ahead of the program, only for the few
+//! instructions here. Code and constants are in bank 1, which goes on being read.
+use core::arch::asm;
+
+use cortex_m::peripheral::SCB;
+use embassy_stm32::pac;
+use embassy_stm32::pac::flash::{Bank, regs};
+use jtc_core::slots::{SLOTS, WORD, Word};
+
+use crate::memory;
+
+/// Sectors of the slots. The first sector of the bank is where the Cortex-M4 starts, and is never touched.
+const SECTORS: [u8; SLOTS] = [6, 7];
+const SECTOR_BYTES: u32 = 128 * 1024;
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// 32 bits at once: allowed at any supply of the boards.
+const PSIZE: u8 = 0b10;
+/// BFHFNMIGN in the register CCR of the core.
+const IGNORE_BUS_FAULTS: u32 = 1 << 8;
+
+/// What the bank reports as wrong, bits of FLASH_SR2: write protection, sequence, strobe, inconsistency, operation, read
+/// protection, read security, two wrong bits in a word.
+const ERRORS: u32 = 1 << 17 | 1 << 18 | 1 << 19 | 1 << 21 | 1 << 22 | READ_ERRORS;
+const READ_ERRORS: u32 = 1 << 23 | 1 << 24 | 1 << 26;
+/// What is cleared beside them: end of operation, one wrong bit that was corrected.
+const REMARKS: u32 = 1 << 16 | 1 << 25;
+
+/// Registers of the bank.
+fn bank() -> Bank {
+    pac::FLASH.bank(1)
+}
+
+/// Lets the registers be written; false when they refuse until the next reset.
+pub fn unlock() -> bool {
+    if bank().cr().read().lock() {
+        KEYS.into_iter().for_each(|key| bank().keyr().write_value(key));
+    }
+    !bank().cr().read().lock()
+}
+
+/// Ends an operation, and keeps anything but [`unlock`] from beginning one.
+pub fn lock() {
+    end();
+    bank().cr().modify(|w| w.set_lock(true));
+}
+
+/// An operation is not done yet.
+pub fn busy() -> bool {
+    let sr = bank().sr().read();
+    sr.bsy() || sr.qw()
+}
+
+/// An operation is done: nothing that is written from here on belongs to it.
+pub fn end() {
+    bank().cr().write(|w| w.set_psize(PSIZE));
+}
+
+/// What went wrong since an operation began, bits of FLASH_SR2.
+pub fn errors() -> u32 {
+    bank().sr().read().0 & ERRORS
+}
+
+fn clear() {
+    bank().ccr().write_value(regs::Ccr(ERRORS | REMARKS));
+}
+
+fn address(slot: usize, word: usize) -> u32 {
+    memory::BANK2 + u32::from(SECTORS[slot]) * SECTOR_BYTES + (word * WORD) as u32
+}
+
+/// Begins to erase a slot, which takes seconds.
+pub fn erase(slot: usize) {
+    clear();
+    let sector = SECTORS[slot];
+    bank().cr().write(|w| {
+        w.set_psize(PSIZE);
+        w.set_ser(true);
+        w.set_snb(sector);
+    });
+    bank().cr().modify(|w| w.set_start(true));
+}
+
+/// Begins to program a word, which takes a fraction of a millisecond.
+pub fn program(slot: usize, word: usize, bytes: &Word) {
+    clear();
+    bank().cr().write(|w| {
+        w.set_psize(PSIZE);
+        w.set_pg(true);
+    });
+    let (words, _) = bytes.as_chunks::<4>();
+    let at = address(slot, word) as *mut u32;
+    let write = |n: usize| {
+        // SAFETY: within a sector that nothing but this module uses; stores there go to the flash's buffer.
+        unsafe { at.add(n).write_volatile(u32::from_le_bytes(words[n])) }
+    };
+    let last = words.len() - 1;
+    memory::bank2(true);
+    (0..last).for_each(write);
+    // With the last one the bank is busy: no interrupt comes before it is closed.
+    critical_section::with(|_| {
+        write(last);
+        memory::bank2(false);
+    });
+}
+
+/// A word; `None` when it cannot be read. Not while the bank is busy.
+///
+/// A word whose programming or erasing was cut off may have more wrong bits than the flash corrects. Reading it is a bus fault,
+/// which the core ignores here; the flag that the flash sets instead says it.
+pub fn read(slot: usize, word: usize) -> Option<Word> {
+    clear();
+    // SAFETY: a register of the core. Nothing else changes it, and the bit acts only where faults are masked.
+    let ignore = |on: bool| unsafe {
+        (*SCB::PTR).ccr.modify(|ccr| if on { ccr | IGNORE_BUS_FAULTS } else { ccr & !IGNORE_BUS_FAULTS });
+    };
+    ignore(true);
+    memory::bank2(true);
+    let mut bytes = [0; WORD];
+    let (words, _) = bytes.as_chunks_mut::<4>();
+    for (n, to) in words.iter_mut().enumerate() {
+        *to = load(address(slot, word) + 4 * n as u32).to_le_bytes();
+    }
+    memory::bank2(false);
+    ignore(false);
+    (bank().sr().read().0 & READ_ERRORS == 0).then_some(bytes)
+}
+
+/// One load with faults masked. Each is on its own, so that the tick waits for one at most.
+fn load(address: u32) -> u32 {
+    let value: u32;
+    // SAFETY: an aligned load from flash. With FAULTMASK set and BFHFNMIGN a bus fault of it is ignored; the barrier waits for
+    // it. The protection unit goes on working with faults masked (HFNMIENA, `memory`), so it is neither cached nor read ahead.
+    unsafe {
+        asm!(
+            "cpsid f",
+            "dsb",
+            "ldr {value}, [{address}]",
+            "dsb",
+            "cpsie f",
+            address = in(reg) address,
+            value = out(reg) value,
+            options(nostack, preserves_flags),
+        );
+    }
+    value
+}

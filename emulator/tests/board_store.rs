@@ -289,6 +289,45 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
+/// Failures that the flash does not report: keys that it no longer takes, a word that reads differently, an erasure that never
+/// ends.
+#[test]
+fn j54_a_store_that_cannot_work_ends() {
+    let fails = |mut rig: Rig, failure: u32| {
+        let end = rig.board.machine.now() + 12 * SECOND;
+        while working(&rig) && rig.board.machine.now() < end {
+            let next = rig.board.machine.now() + 10 * MILLISECOND;
+            rig.board.machine.run_until(next);
+        }
+        let answer = mailbox(&rig.board.machine);
+        assert_eq!((answer.state, answer.failure), (FAILED, failure));
+        clean(&mut rig);
+    };
+    let new = image(100, 1);
+
+    let mut rig = board(Bank2::default());
+    rig.board.machine.write_register(0x5200_2104, 0);
+    ask(&mut rig.board.machine, &new);
+    fails(rig, 1);
+
+    let mut rig = board(Bank2::default());
+    ask(&mut rig.board.machine, &new);
+    let worn = |rig: &mut Rig| {
+        let now = rig.board.machine.now() + 20 * MICROSECOND;
+        rig.board.machine.run_until(now);
+        let flash = &rig.board.machine.chip().flash;
+        flash.operations.len() == 3 && flash.busy_until(now).is_none()
+    };
+    while !worn(&mut rig) {}
+    assert!(rig.board.machine.poke(SLOTS[0] + 64, &[!new[32]]));
+    fails(rig, 4);
+
+    let mut rig = board(Bank2::default());
+    rig.board.machine.chip().flash.erase_time = 60 * SECOND;
+    ask(&mut rig.board.machine, &new);
+    fails(rig, 5);
+}
+
 /// Every board's program finds an image that another one stored.
 #[test]
 fn j54_every_board_loads_it() {

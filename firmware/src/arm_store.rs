@@ -242,7 +242,10 @@ impl Store {
     fn end(&mut self, result: Result<(), Failure>) {
         let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
         let flags = bank2::errors();
-        bank2::lock();
+        // Where it did not become ready, it is left alone: nobody is let in, and the next attempt looks again.
+        if !bank2::busy() {
+            bank2::lock();
+        }
         let (slot, sequence) = storing.target();
         storing.finish(&mut self.slots);
         critical_section::with(|cs| STAGING.borrow(cs).set(Some(image)));

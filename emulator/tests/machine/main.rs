@@ -1,6 +1,7 @@
 //! The machine against the architecture and the reference manual, with programs of a few instructions.
 mod bus;
 mod core;
+mod flash;
 mod programs;
 mod serial;
 

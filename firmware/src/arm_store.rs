@@ -65,7 +65,6 @@ static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
 
 /// The image that was found at the start.
 #[derive(Clone, Copy)]
-#[expect(dead_code, reason = "no frame of a host asks for it yet")]
 pub struct Loaded {
     /// Its bytes.
     pub image: &'static [u8],
@@ -115,7 +114,6 @@ pub enum Failure {
 }
 
 /// Gives an image to be stored. By the tick; it copies the bytes and comes back at once.
-#[expect(dead_code, reason = "no frame of a host asks for it yet")]
 pub fn begin(image: &[u8]) -> Result<(), Refused> {
     if matches!(ARM_STORE.state.load(Ordering::Acquire), Mailbox::ASKED | Mailbox::BUSY) {
         return Err(Refused::Busy);
@@ -131,7 +129,6 @@ pub fn begin(image: &[u8]) -> Result<(), Refused> {
 }
 
 /// What became of the last image.
-#[expect(dead_code, reason = "no frame of a host asks for it yet")]
 pub fn progress() -> Progress {
     match ARM_STORE.state.load(Ordering::Acquire) {
         Mailbox::ASKED | Mailbox::BUSY => Progress::Busy,
@@ -148,7 +145,6 @@ pub fn progress() -> Progress {
 }
 
 /// The image that was found at the start; it stays the same until the next one.
-#[expect(dead_code, reason = "no frame of a host asks for it yet")]
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }

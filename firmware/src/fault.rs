@@ -31,6 +31,12 @@ pub static FLIGHT: Kept<Flight> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 #[used]
 pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
+/// Starts since power came on.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".uninit.BOOTS")]
+#[used]
+pub static BOOTS: Kept<u32> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+
 /// Place in the source code or in the program where it ended.
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -73,6 +79,8 @@ impl LastWords {
 pub struct Boot {
     /// Why.
     pub cause: Cause,
+    /// The how-manieth it is since power came on.
+    pub boots: u32,
     /// The last words of the last program, and its last tick if that was kept.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
@@ -84,21 +92,24 @@ pub struct Boot {
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
-    // SAFETY: nothing else refers to the two yet, and this is called once. After power-on they are random, with wrong check
+    // SAFETY: nothing else refers to the three yet, and this is called once. After power-on they are random, with wrong check
     // bits: written before they are read. Otherwise they hold integers and floats, for which any bits are a value.
-    let (words, flight) = unsafe {
+    let (words, flight, boots) = unsafe {
         let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
+        let boots = &mut *BOOTS.0.get();
         if reset::lost_power(rsr) {
             words.write(LastWords::NONE);
             flight.write(Flight::new(0));
+            boots.write(0);
         }
-        (words.assume_init_mut(), flight.assume_init_mut())
+        (words.assume_init_mut(), flight.assume_init_mut(), boots.assume_init_mut())
     };
+    *boots = boots.saturating_add(1);
     let last_words = core::mem::replace(words, LastWords::NONE);
     let cause = reset::cause(rsr, last_words.failure());
     let last_flight = flight.valid().then_some((flight.tick, flight.phase, flight.state));
     *flight = Flight::new(cause as u32);
-    Boot { cause, last_words, last_flight, flight }
+    Boot { cause, boots: *boots, last_words, last_flight, flight }
 }
 
 /// Writes it to the log.

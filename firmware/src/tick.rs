@@ -9,13 +9,14 @@ use embassy_stm32::peripherals::{IWDG1, TIM7};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, pac, rcc};
 use embassy_time::Instant;
-use jtc_core::{Config, Controller, HostEvent, Inputs, Outputs};
-use jtc_wire::{EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, UrgentWatch};
+use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, Outputs};
+use jtc_wire::{BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, StoreState, UrgentWatch};
 use openjtc_firmware::clock;
 use openjtc_firmware::flight::Flight;
 use openjtc_firmware::lines;
 use static_cell::StaticCell;
 
+use crate::arm_store;
 use crate::board::Pins;
 use crate::fault::Boot;
 use crate::fdcan::{Fdcan, ReceivedFrames};
@@ -67,6 +68,9 @@ struct Tick {
     flight: &'static mut Flight,
     links: Links,
     left_out: u32,
+    /// What became of the last arm that was stored, and its number.
+    stored: arm_store::Progress,
+    stored_number: u32,
     /// When the last tick began.
     began: Option<Instant>,
 }
@@ -109,8 +113,18 @@ pub fn start(parts: Parts) {
         flight: boot.flight,
         links: Links::default(),
         left_out: 0,
+        stored: arm_store::Progress::Idle,
+        stored_number: arm_store::loaded().map_or(0, |loaded| loaded.sequence),
         began: None,
     });
+    tick.controller.set_identity(Identity {
+        board: openjtc_firmware::BOARD,
+        firmware: env!("CARGO_PKG_VERSION"),
+        revision: env!("OPENJTC_BUILD"),
+        boots: boot.boots,
+        boot_cause: BootCause::from_byte(boot.cause as u8).unwrap_or_default(),
+    });
+    load_arm(&mut tick.controller);
     if boot.cause.failed() {
         tick.controller.raise_internal();
     }
@@ -129,6 +143,20 @@ pub fn start(parts: Parts) {
     // SAFETY: everything that its handler uses is in place.
     unsafe { interrupt::TIM7.enable() };
     pac::TIM7.cr1().write(|w| w.set_cen(true));
+}
+
+/// The arm that was stored is in use from the start (J-54).
+fn load_arm(controller: &mut Jtc) {
+    match arm_store::loaded() {
+        None => controller.set_store_state(StoreState::Empty, 0),
+        Some(arm_store::Loaded { image, sequence }) if controller.load_arm(image) => {
+            controller.set_store_state(StoreState::Stored, sequence);
+        }
+        Some(arm_store::Loaded { sequence, .. }) => {
+            defmt::error!("the stored arm, number {=u32}, is none that this firmware takes", sequence);
+            controller.set_store_state(StoreState::Failed, sequence);
+        }
+    }
 }
 
 #[interrupt]
@@ -178,6 +206,7 @@ impl Tick {
         if let Some(line) = outputs.answer_line.and_then(|line| self.lines.get_mut(line)) {
             line.send(self.controller.answer_frame());
         }
+        self.store_arm(outputs.store);
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);
         self.flight.complete(&outputs, telemetry);
@@ -192,6 +221,27 @@ impl Tick {
         }
         self.leave_out_late_tick();
         Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
+    }
+
+    /// Hands an arm over to be stored, and tells the controller what becomes of it (J-54).
+    fn store_arm(&mut self, requested: bool) {
+        let state = if requested && arm_store::begin(self.controller.stored_arm()).is_err() {
+            Some(StoreState::Failed)
+        } else {
+            let progress = arm_store::progress();
+            let changed = core::mem::replace(&mut self.stored, progress) != progress;
+            match progress {
+                arm_store::Progress::Done { sequence } if changed => {
+                    self.stored_number = sequence;
+                    Some(StoreState::Stored)
+                }
+                arm_store::Progress::Failed(_) if changed => Some(StoreState::Failed),
+                _ => None,
+            }
+        };
+        if let Some(state) = state {
+            self.controller.set_store_state(state, self.stored_number);
+        }
     }
 
     /// Looks for Stop and Pause in what has arrived since the last tick (J-04).

@@ -3,8 +3,8 @@ pub(crate) mod overtaking;
 pub(crate) mod slices;
 
 use jtc_wire::{
-    Command, DataStatus, EVENTS_MAX, ExecCommand, FrictionImage, LinkEvent, RawPoint, Response, Segment,
-    UrgentCommand,
+    Command, DataStatus, EVENTS_MAX, ExecCommand, FrameType, FrictionImage, LinkEvent, RawPoint, Response,
+    Segment, UrgentCommand,
 };
 
 use crate::check::{self, TrajectoryCheck, Violation};
@@ -133,12 +133,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // Parameters would change the torque under a moving arm.
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
-        let mut stored = None;
-        if command.frame_type().is_parameter() {
-            self.extensions.hash = None;
-            stored = self.extensions.stored.arm();
-        }
-        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
                 if jtc {
@@ -183,52 +177,61 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
             command if command.frame_type().is_extension() => self.carry_out_extension(line, command),
-            _ if !settable => SliceOutcome::Refused(DataStatus::NotAllowed),
+            command if settable => self.take_parameters(&command),
+            _ => SliceOutcome::Refused(DataStatus::NotAllowed),
+        }
+    }
+
+    /// Friction, gains or model.
+    fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
+        self.extensions.hash = None;
+        if self.extensions.stored.is_there() && command.frame_type().is_default() {
+            return self.use_stored(command.frame_type());
+        }
+        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
+        match *command {
             Command::PidParam(floats) => {
                 parameters.take_pid(&floats, config).map(|()| motion.law.change_mode()).into()
             }
             Command::PidParamUseDefault => {
-                let taken = match stored {
-                    Some(arm) => parameters.take_pid(&arm.pid, config),
-                    None => parameters.set_pid(defaults::PID, config),
-                };
-                taken.map(|()| motion.law.change_mode()).into()
+                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_mode()).into()
             }
             Command::ArmModel(floats) => parameters
                 .take_model(&floats, self.nodes.known_positions(), config)
                 .map(|()| motion.law.change_model())
                 .into(),
-            Command::ArmModelUseDefault => {
-                let at = self.nodes.known_positions();
-                let taken = match stored {
-                    Some(arm) => parameters.take_model(&arm.model, at, config),
-                    None => parameters.set_model(&defaults::MODEL, at, config),
-                };
-                taken.map(|()| motion.law.change_model()).into()
-            }
+            Command::ArmModelUseDefault => parameters
+                .set_model(&defaults::MODEL, self.nodes.known_positions(), config)
+                .map(|()| motion.law.change_model())
+                .into(),
             Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
             Command::FrictionTable(floats) => parameters.take_table(&floats, self.slice_progress, config),
-            // A stored arm has one friction, whichever default a host asks for.
-            Command::FrictionPolynomialUseDefault | Command::FrictionTableUseDefault
-                if let Some(arm) = stored =>
-            {
-                match arm.friction {
-                    FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
-                    FrictionImage::Table(floats) => {
-                        parameters.take_table(&floats, self.slice_progress, config)
-                    }
-                }
-            }
             Command::FrictionPolynomialUseDefault => parameters.take_default_polynomial(config).into(),
             Command::FrictionTableUseDefault => parameters.take_default_tables(self.slice_progress, config),
-            Command::GetInfo
-            | Command::GetSettings { .. }
-            | Command::SetSettings(_)
-            | Command::SetName(_)
-            | Command::GetArm { .. }
-            | Command::StoreArm
-            | Command::Disable
-            | Command::Jog(_) => SliceOutcome::Refused(DataStatus::NotAllowed),
+            _ => SliceOutcome::Refused(DataStatus::NotAllowed),
+        }
+    }
+
+    /// What a default means where an arm is stored (J-54).
+    #[inline(never)]
+    fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
+        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
+        let Some(arm) = self.extensions.stored.arm() else {
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
+        };
+        match frame_type {
+            FrameType::PidParamUseDefault => {
+                parameters.take_pid(&arm.pid, config).map(|()| motion.law.change_mode()).into()
+            }
+            FrameType::ArmModelUseDefault => parameters
+                .take_model(&arm.model, self.nodes.known_positions(), config)
+                .map(|()| motion.law.change_model())
+                .into(),
+            // It has one friction, whichever a host asks for.
+            _ => match arm.friction {
+                FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
+                FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
+            },
         }
     }
 

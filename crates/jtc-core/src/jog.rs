@@ -58,8 +58,9 @@ impl Jog {
         if self.silent_ms > LASTS_MS {
             self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
         }
-        for (j, (joint, position)) in self.joints.iter_mut().zip(position.iter_mut()).enumerate() {
-            joint.step(position, config.position_range(j), &config.joints[j]);
+        let joints = self.joints.iter_mut().zip(position.iter_mut()).zip(&config.joints);
+        for (j, ((joint, position), limits)) in joints.enumerate() {
+            joint.step(position, config.position_range(j), limits);
         }
         (self.joints.map(|joint| joint.velocity), self.joints.map(|joint| joint.acceleration))
     }

@@ -24,8 +24,8 @@ use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
-/// Bytes of an image at most.
-pub const IMAGE_MAX: usize = 12 * 1024;
+pub use jtc_wire::IMAGE_MAX;
+
 /// Bytes that the flash of the STM32H7 programs at once.
 pub const WORD: usize = 32;
 /// Slots.

@@ -162,9 +162,6 @@ impl<'a> Command<'a> {
                 nodes: byte(field::CLEAR_NODES)? & ALL_NODES,
             },
             FrameType::ClearOccurredErrors => Self::ClearOccurredErrors,
-            FrameType::JtcStatus | FrameType::Info | FrameType::Settings | FrameType::Arm => {
-                return Err(DataStatus::NotAllowed);
-            }
             FrameType::Trajectory => {
                 Self::Trajectory(Segment::parse(body).ok_or(DataStatus::IncorrectValue)?)
             }
@@ -200,6 +197,9 @@ impl<'a> Command<'a> {
             FrameType::StoreArm => Self::StoreArm,
             FrameType::Disable => Self::Disable,
             FrameType::Jog => Self::Jog(floats()?),
+            // Those of the device: JtcStatus, Info, Settings, Arm. Without this arm the numbers between the types, which none has,
+            // would lead into a trap.
+            _ => return Err(DataStatus::NotAllowed),
         })
     }
 

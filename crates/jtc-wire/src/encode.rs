@@ -194,7 +194,7 @@ impl fmt::Display for FloatName {
 }
 
 /// Writes header and length for `n` bytes, leaves the body to `body`, ends with the CRC.
-pub(crate) fn frame(
+fn frame(
     out: &mut [u8],
     frame_type: FrameType,
     n: usize,

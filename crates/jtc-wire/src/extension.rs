@@ -2,8 +2,9 @@
 //! returns beside its record comes in a frame of type 0x50 to 0x5F, on the line of the request and only after one.
 use core::fmt;
 
-use crate::encode::{EncodeError, frame};
-use crate::frame::{FRAME_MIN, FrameRef, FrameType};
+use crate::crc16;
+use crate::encode::EncodeError;
+use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER};
 
 mod image;
 mod info;
@@ -207,28 +208,33 @@ impl<'a> Answer<'a> {
     /// # Errors
     /// [`EncodeError::BufferTooShort`], also for more than a frame of [`ANSWER_MAX`] bytes carries.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
-        let page = |out: &mut [u8], from: u16, total: u16, bytes: &[u8]| {
-            let n = FRAME_MIN + PAGE_HEAD_LEN + bytes.len();
-            if n > ANSWER_MAX {
-                return Err(EncodeError::BufferTooShort { needed: n, given: ANSWER_MAX });
-            }
-            frame(out, self.frame_type(), n, |body| {
-                let (head, rest) = body.split_at_mut(PAGE_HEAD_LEN);
-                head[..2].copy_from_slice(&from.to_be_bytes());
-                head[2..].copy_from_slice(&total.to_be_bytes());
-                rest.copy_from_slice(bytes);
-                Ok(())
-            })
+        let page = |from: u16, total: u16| {
+            let ([a, b], [c, d]) = (from.to_be_bytes(), total.to_be_bytes());
+            [a, b, c, d]
         };
         match *self {
-            Self::Info(info) => frame(out, FrameType::Info, FRAME_MIN + INFO_LEN, |body| {
-                body.copy_from_slice(&info.emit());
-                Ok(())
-            }),
-            Self::Settings { first, total, values } => page(out, first, total, values.0),
-            Self::Arm { offset, total, bytes } => page(out, offset, total, bytes),
+            Self::Info(info) => sealed(out, FrameType::Info, &info.emit(), &[]),
+            Self::Settings { first, total, values } => {
+                sealed(out, FrameType::Settings, &page(first, total), values.0)
+            }
+            Self::Arm { offset, total, bytes } => sealed(out, FrameType::Arm, &page(offset, total), bytes),
         }
     }
+}
+
+/// Writes a frame whose body has two parts; returns its length. It is written on the board: without a slice that could panic.
+fn sealed(out: &mut [u8], frame_type: FrameType, first: &[u8], second: &[u8]) -> Result<usize, EncodeError> {
+    let (n, given) = (FRAME_MIN + first.len() + second.len(), out.len().min(ANSWER_MAX));
+    let short = EncodeError::BufferTooShort { needed: n, given };
+    let out = out.get_mut(..n).filter(|_| n <= ANSWER_MAX).ok_or(short)?;
+    let (covered, crc) = out.split_last_chunk_mut().ok_or(short)?;
+    let [high, low] = (n as u16).to_be_bytes();
+    let head = [HEADER, frame_type as u8, high, low];
+    for (to, byte) in covered.iter_mut().zip(head.iter().chain(first).chain(second)) {
+        *to = *byte;
+    }
+    *crc = crc16(covered).to_be_bytes();
+    Ok(n)
 }
 
 impl fmt::Display for Answer<'_> {

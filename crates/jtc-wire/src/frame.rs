@@ -166,19 +166,12 @@ impl FrameType {
         !matches!(self, FrameType::JtcStatus) && !self.is_answer()
     }
 
-    /// It gives the controller parameters: friction, gains or model.
-    pub const fn is_parameter(self) -> bool {
+    /// It has the controller use parameters that it holds.
+    pub const fn is_default(self) -> bool {
         use FrameType::*;
         matches!(
             self,
-            FrictionTable
-                | FrictionTableUseDefault
-                | PidParam
-                | PidParamUseDefault
-                | ArmModel
-                | ArmModelUseDefault
-                | FrictionPolynomial
-                | FrictionPolynomialUseDefault
+            FrictionTableUseDefault | PidParamUseDefault | ArmModelUseDefault | FrictionPolynomialUseDefault
         )
     }
 

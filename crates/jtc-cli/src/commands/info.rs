@@ -67,7 +67,7 @@ fn as_text(info: &Info) -> String {
          missing:   {}; nodes: {}\n\
          defaults:  {defaults}; memory: {memory}\n\
          firmware:  {}{revision} on {}, extensions {}\n\
-         started:   {} times, the last by {}, {} ago\n\
+         started:   {}, the last by {}, {} ago\n\
          records:   {} lost",
         info.arm,
         hash(info.hash),

@@ -29,8 +29,8 @@ pub mod field {
     pub const TABLE_LEN: usize = 10_560;
 }
 
-/// Longest image.
-pub const IMAGE_MAX: usize = 13 * 1024;
+/// Longest image: what a slot of the board's flash is given.
+pub const IMAGE_MAX: usize = 12 * 1024;
 
 /// Friction in an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

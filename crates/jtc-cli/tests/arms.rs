@@ -185,7 +185,7 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     let output = jtc(&["arm", "show", path]).ends(0);
     let row = |name: &str| output.out.lines().find(|l| l.starts_with(name)).expect("a row").to_owned();
     let torque = row("torque_max_nm");
-    for word in ["80 ", "180*", "N·m", "0..360", "file, proposed"] {
+    for word in ["80 ", "180*", "N·m", "0.01..360", "file, proposed"] {
         assert!(torque.contains(word), "{word}: {torque}");
     }
     assert!(row("velocity_max_rad_s").contains("1.5d") && row("position_min_rad").contains("±2.9905"));

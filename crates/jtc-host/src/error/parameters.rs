@@ -56,8 +56,8 @@ impl Diagnose for ParametersError {
             Self::IncompleteArm { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "incomplete-arm",
-                "a URDF holds neither friction nor gains: copy arms/avena.toml and put in all numbers of this arm, or name all files \
-                 with `jtc params push`",
+                "a URDF holds neither friction nor gains: `jtc arm import` makes an arm file of it and proposes both; else copy \
+                 arms/avena.toml and put in all numbers of this arm, or name all files with `jtc params push`",
             ),
         }
     }

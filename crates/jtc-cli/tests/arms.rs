@@ -1,8 +1,8 @@
-//! Arm files and robot descriptions without a port: what they give, and what is refused of them.
+//! Arm files and robot descriptions: what they give, and what is refused of them.
 
 mod common;
 
-use common::{jtc, motion};
+use common::{Sim, jtc, motion};
 
 /// An arm file whose first two joints may not turn as fast as the controller lets them.
 fn slower(dir: &std::path::Path) -> String {
@@ -16,20 +16,23 @@ fn slower(dir: &std::path::Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// J-55: what the controller does not use of an arm file is listed and refused before a port is opened.
+/// J-55: what the controller does not use of an arm file is listed and refused before anything is sent.
 #[test]
 fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let dir = tempfile::tempdir().unwrap();
     let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
+    // The controller is asked what it has; where it is silent, that comes first.
     let port = ["--port", "/nowhere/tty"];
+    jtc(&["params", "push", &arm, port[0], port[1]]).ends(3);
+    let sim = Sim::start(&["--no-throttle"]).held();
     for words in [
         vec!["params", "push", &arm],
         vec!["traj", "run", file, "--arm", &arm],
         vec!["recover", "--arm", &arm],
     ] {
-        let output = jtc(&[&["--json"], &words[..], &port].concat()).ends(4);
+        let output = sim.jtc(&[&["--json"], &words[..]].concat()).ends(4);
         let value = output.json();
         let differences = value["differences"].as_array().unwrap();
         assert_eq!(differences.len(), 2, "{words:?}: {value}");
@@ -43,8 +46,7 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
             "{}",
             output.err
         );
-        // Accepted, it fails only at the port that is not there.
-        jtc(&[&words[..], &port, &["--accept-device-limits"]].concat()).ends(3);
+        sim.jtc(&[&words[..], &["--accept-device-limits"]].concat()).ends(0);
     }
 }
 
@@ -70,7 +72,8 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     assert_eq!(left_out(whole), serde_json::json!([]));
     // A run counts the rotors that the controller computes with.
-    let output = jtc(&["traj", "run", file, "--arm", urdf, "--port", "/nowhere/tty"]).ends(3);
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let output = sim.jtc(&["traj", "run", file, "--arm", urdf]).ends(0);
     assert!(output.err.contains("without friction, which"), "{}", output.err);
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
 use jtc_host::port::SerialPort;
 use jtc_host::{Error, LinkError, Session};
-use jtc_wire::{JOINTS, Joint, Status};
+use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, NodeState, Status, TrajectoryState};
 use serde_json::json;
 
 use crate::args::JogArgs;
@@ -16,6 +16,8 @@ const AGAIN: Duration = Duration::from_millis(50);
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+/// Drives take 4 s for their first enable.
+const BRING_UP: Duration = Duration::from_secs(15);
 /// An arm comes to rest within this time.
 const REST: Duration = Duration::from_secs(3);
 
@@ -29,7 +31,14 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     }
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
-    let begin = session.fresh_status()?;
+    let mut begin = session.fresh_status()?;
+    if begin.state == ControllerState::HoldPos
+        && begin.joints.iter().any(|joint| joint.state != NodeState::ENABLED)
+    {
+        out.note("waiting until all drives are enabled");
+        begin = session.wait_ready(BRING_UP)?;
+    }
+    settled(&mut session)?;
     let end = args.duration.map(|s| session.now() + Duration::from_secs_f64(s.clamp(0.0, 86_400.0)));
     let over = |session: &Session<SerialPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
     let jogged = match (args.joint.and_then(|joint| Joint::from_number(joint.into())), rate) {
@@ -46,6 +55,24 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     });
     out.result(&value, || moved(&begin, &now));
     Ok(())
+}
+
+/// Joints whose load has just been caught are not jogged yet; anything else that forbids it is an error at once.
+fn settled(session: &mut Session<SerialPort>) -> Result<(), Failure> {
+    let end = session.now() + REST;
+    loop {
+        match session.jog(&[0.0; JOINTS]) {
+            Err(Error::Link(LinkError::Refused {
+                code: DataStatus::NotAllowed, state, trajectory, ..
+            })) if state == ControllerState::HoldPos
+                && trajectory != TrajectoryState::Pause
+                && session.now() < end =>
+            {
+                wait(session, AGAIN)?;
+            }
+            done => return done.map_err(refused),
+        }
+    }
 }
 
 fn moved(from: &Status, to: &Status) -> String {
@@ -165,15 +192,9 @@ fn refused(error: Error) -> Failure {
     match &error {
         Error::Link(LinkError::Refused { state, trajectory, code, .. }) => {
             let next = match code {
-                jtc_wire::DataStatus::IncorrectValue => {
-                    "the rate is above the joint's velocity limit: `jtc arm show`"
-                }
-                _ if *state != jtc_wire::ControllerState::HoldPos => {
-                    "joints are jogged in HoldPos: `jtc recover`"
-                }
-                _ if *trajectory == jtc_wire::TrajectoryState::Pause => {
-                    "a trajectory is paused: `jtc traj stop` first"
-                }
+                DataStatus::IncorrectValue => "the rate is above the joint's velocity limit: `jtc arm show`",
+                _ if *state != ControllerState::HoldPos => "joints are jogged in HoldPos: `jtc recover`",
+                _ if *trajectory == TrajectoryState::Pause => "a trajectory is paused: `jtc traj stop` first",
                 _ => "the arm is not held at rest yet, or a trajectory is being uploaded: `jtc status`",
             };
             failure.hint(next)

@@ -37,7 +37,6 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         Format::of(path)?; // a wrong ending is reported before anything moves
     }
     let mut job = Job::load(&args.file, &args.check, out)?;
-    job.note_what_is_left_out(out);
     perform(args, &mut job, &progress, out).map_err(|failure| job.named(failure))
 }
 
@@ -67,6 +66,7 @@ fn match_device(
     }
     // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device(&job.device);
+    job.note_what_is_left_out(out);
     Ok(())
 }
 

@@ -1,0 +1,153 @@
+//! What a controller with extensions tells and takes: identity, arm, speed, jogging (J-52 to J-58).
+
+mod common;
+
+use common::{Sim, jtc, motion};
+use serde_json::Value;
+
+/// An arm file that is not the built-in arm: a gain, a limit of a joint, and a setting of the controller differ.
+fn another(sim: &Sim) -> String {
+    let text = include_str!("../../../arms/avena.toml")
+        .replacen("name = \"avena\"", "name = \"another\"", 1)
+        .replacen("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 1.2", 1)
+        .replacen("kd = 80.0", "kd = 75.0", 1);
+    sim.file("another.toml", &(text + "\n[settings]\nramp_ms = 300\n"))
+}
+
+fn names(value: &Value) -> Vec<&str> {
+    value["differences"].as_array().unwrap().iter().map(|d| d["name"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn j52_a_controller_tells_who_it_is() {
+    let sim = Sim::start(&["--no-throttle"]);
+    let info = sim.json(&["info"], 0);
+    assert_eq!((info["extension"].as_u64(), info["arm"].as_str()), (Some(1), Some("avena")));
+    assert_eq!(info["missing"].as_array().unwrap().len(), 3);
+    assert_eq!((info["boots"].as_u64(), info["boot_cause"].as_str()), (Some(1), Some("power-on")));
+    for key in ["firmware", "revision", "board", "hash", "uptime_s", "lost_records"] {
+        assert!(!info[key].is_null(), "{key}: {info}");
+    }
+    let text = sim.jtc(&["info"]).ends(0).out;
+    assert!(text.contains(info["hash"].as_str().unwrap()) && text.contains("started:   once"), "{text}");
+    // The hash is that of the arm, whoever computes it.
+    let sim = sim.with_parameters();
+    assert_eq!(sim.json(&["info"], 0)["hash"], info["hash"]);
+    let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    let diff = sim.json(&["arm", "diff", avena], 0);
+    assert_eq!((&diff["equal"], names(&diff).len()), (&Value::Bool(true), 0));
+}
+
+#[test]
+fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
+    let sim = Sim::start(&["--no-throttle"]);
+    let arm = another(&sim);
+    let file = sim.file("motion.csv", &motion(0.2));
+    // Before it is given, nothing of it is the controller's; gains and friction are those that are built in.
+    let diff = sim.json(&["arm", "diff", &arm], 4);
+    assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
+
+    let pushed = sim.json(&["arm", "push", &arm, "--store"], 0);
+    assert_eq!(pushed["stored_number"], 1);
+    let info = sim.json(&["info"], 0);
+    assert_eq!((info["arm"].as_str(), info["defaults"].as_str()), (Some("another"), Some("stored")));
+    assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
+    assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
+
+    // The defaults mean it now, and a run is checked for it; one for another arm is refused.
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let sim = sim.held();
+    assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
+    sim.jtc(&["traj", "run", &file, "--arm", &arm]).ends(0);
+    let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    let refused = sim.json(&["traj", "run", &file, "--arm", avena], 4);
+    assert_eq!(names(&refused), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
+    assert_eq!(refused["error"]["code"], "other-arm");
+    let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
+    assert!(named.contains("checked for the arm of the controller, another"), "{named}");
+
+    // What is pulled is the same arm.
+    let pulled = sim.path("pulled.toml");
+    assert_eq!(sim.json(&["arm", "pull", "-o", &pulled], 0)["hash"], pushed["hash"]);
+    assert_eq!(sim.json(&["arm", "diff", &pulled], 0)["equal"], true);
+    sim.jtc(&["arm", "pull", "-o", &pulled]).ends(4);
+    let shown = sim.json(&["arm", "show"], 0);
+    assert_eq!(shown["arm"], "another");
+
+    // Its settings change without torque only.
+    let refused = sim.jtc(&["arm", "push", avena]).ends(1);
+    assert!(
+        refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
+    // Nobody can be asked whether the arm may lose its torque.
+    sim.jtc(&["disable"]).ends(4);
+    assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
+    sim.jtc(&["arm", "push", avena]).ends(0);
+    assert_eq!(sim.json(&["arm", "diff", avena], 0)["equal"], true);
+}
+
+/// An arm without gains is nobody's arm.
+#[test]
+fn j55_an_arm_that_is_not_whole_is_not_pushed() {
+    let text: String = include_str!("../../../arms/avena.toml")
+        .lines()
+        .filter(|line| !line.starts_with("pid ="))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("arm.toml");
+    std::fs::write(&path, text).unwrap();
+    let output = jtc(&["arm", "push", path.to_str().unwrap(), "--port", "/nowhere/tty"]).ends(2);
+    assert!(output.err.contains("no PID gains") && output.err.contains("jtc arm check"), "{}", output.err);
+}
+
+#[test]
+fn j57_the_speed_of_a_motion_changes_while_it_runs() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let file = sim.file("motion.csv", &motion(0.2));
+    assert_eq!(sim.json(&["traj", "speed"], 0)["speed_percent"], 100.0);
+    let whole = sim.json(&["traj", "run", &file], 0)["recorded_s"].as_f64().unwrap();
+    assert_eq!(sim.json(&["traj", "speed", "50"], 0)["speed_percent"], 50.0);
+    let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
+    assert!(run.err.contains("speed override is 50 %"), "{}", run.err);
+    let executed = run.json()["recorded_s"].as_f64().unwrap();
+    // The way to the first point takes as long as ever.
+    assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
+    for wrong in ["4", "101", "nan"] {
+        sim.jtc(&["traj", "speed", wrong]).ends(2);
+    }
+    assert_eq!(sim.json(&["traj", "speed"], 0)["speed_percent"], 50.0);
+}
+
+#[test]
+fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let way = sim.json(&["jog", "3", "0.2", "--duration", "1"], 0);
+    let at = |value: &Value, j: usize| value[j].as_f64().unwrap();
+    let moved = at(&way["to_rad"], 2) - at(&way["from_rad"], 2);
+    assert!((0.15..0.25).contains(&moved), "{moved}");
+    assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
+    let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
+    assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
+    // Killed, it cannot send a stop: the arm comes to rest by itself.
+    let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(600));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let rests = |status: Value| {
+        let joints = status["joints"].as_array().unwrap().clone();
+        joints.iter().all(|joint| joint["velocity_rad_s"].as_f64().unwrap().abs() < 0.01)
+    };
+    assert!(rests(sim.json(&["status"], 0)));
+    let too_fast = sim.jtc(&["jog", "1", "5"]).ends(1);
+    assert!(too_fast.err.contains("velocity limit"), "{}", too_fast.err);
+    sim.jtc(&["jog"]).ends(2);
+    sim.jtc(&["jog", "7", "0.1"]).ends(2);
+    sim.jtc(&["disable", "--yes"]).ends(0);
+    let refused = sim.jtc(&["jog", "1", "0.1"]).ends(1);
+    assert!(refused.err.contains("jtc recover"), "{}", refused.err);
+}

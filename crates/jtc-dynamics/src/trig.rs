@@ -1,30 +1,79 @@
 //! Sine, cosine and square root of f64 without the standard library; sine and cosine without branches on the argument.
+//!
+//! Sine and cosine are those of the nearest of 128 directions, from a table, turned by what is left: at most π/128, for which
+//! short polynomials do.
 
-use core::f64::consts::FRAC_2_PI;
-
-/// π/2 in three parts. The first two have 33 significant bits, so that their products with a quotient below
-/// 2^20 are exact.
-const HALF_PI: [f64; 3] = [1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21];
+/// Directions of the table in a turn, a power of two.
+const DIRECTIONS: usize = 128;
+/// One over the angle between two directions, 1/rad.
+const PER_RAD: f64 = 20.371832715762604;
+/// The angle between two directions, π/64, in two parts. The first has 28 significant bits, so that its product with a number of
+/// steps below 2^25 is exact.
+const STEP: [f64; 2] = [0.049087385181337595, 3.100292436501689e-11];
 /// 1.5·2^52: adding it rounds to an integer and leaves that integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
-/// (sin r − r)/r³ as a polynomial in r², minimax on |r| ≤ π/4 (relative error of sin below 3.5e-18).
-const SIN: [f64; 6] = [
-    -0.16666666666666632,
-    0.00833333333332237,
-    -0.00019841269829771086,
-    2.7557313678643845e-06,
-    -2.505075595863526e-08,
-    1.5896666370939634e-10,
+/// (sin r − r)/r³ as a polynomial in r², minimax on |r| ≤ π/128 (error of sin below 3e-17).
+const SIN: [f64; 2] = [-0.1666666666295987, 0.00833315540165295];
+/// (cos r − 1 + r²/2)/r⁴ as a polynomial in r², minimax on |r| ≤ π/128 (error of cos below 7e-20).
+const COS: [f64; 2] = [0.0416666666614692, -0.001388865603520279];
+
+/// Sines of the directions of the first quarter of a turn, rounded to the nearest number.
+const QUARTER: [f64; DIRECTIONS / 4 + 1] = [
+    0.0,
+    0.049067674327418015,
+    0.0980171403295606,
+    0.14673047445536175,
+    0.19509032201612828,
+    0.2429801799032639,
+    0.2902846772544624,
+    0.33688985339222005,
+    0.3826834323650898,
+    0.4275550934302821,
+    0.47139673682599764,
+    0.5141027441932218,
+    0.5555702330196022,
+    0.5956993044924334,
+    0.6343932841636455,
+    0.6715589548470184,
+    0.7071067811865476,
+    0.7409511253549591,
+    0.773010453362737,
+    0.8032075314806449,
+    0.8314696123025452,
+    0.8577286100002721,
+    0.881921264348355,
+    0.9039892931234433,
+    0.9238795325112867,
+    0.9415440651830208,
+    0.9569403357322088,
+    0.970031253194544,
+    0.9807852804032304,
+    0.989176509964781,
+    0.9951847266721969,
+    0.9987954562051724,
+    1.0,
 ];
-/// (cos r − 1 + r²/2)/r⁴ as a polynomial in r², minimax on |r| ≤ π/4 (error of cos below 5e-20).
-const COS: [f64; 6] = [
-    0.0416666666666666,
-    -0.0013888888888874064,
-    2.480158728944353e-05,
-    -2.755731434067416e-07,
-    2.0875721625702183e-09,
-    -1.1359559428690583e-11,
-];
+
+/// Sine and cosine of each direction.
+static TABLE: [[f64; 2]; DIRECTIONS] = table();
+
+const fn table() -> [[f64; 2]; DIRECTIONS] {
+    let mut table = [[0.0; 2]; DIRECTIONS];
+    let mut k = 0;
+    while k < DIRECTIONS {
+        table[k] = [direction_sin(k), direction_sin(k + DIRECTIONS / 4)];
+        k += 1;
+    }
+    table
+}
+
+/// The sine of a direction from that of the first quarter which it mirrors.
+const fn direction_sin(k: usize) -> f64 {
+    let (half, quarter) = (DIRECTIONS / 2, DIRECTIONS / 4);
+    let in_half = k % half;
+    let sin = if in_half <= quarter { QUARTER[in_half] } else { QUARTER[half - in_half] };
+    if k % DIRECTIONS < half { sin } else { -sin }
+}
 
 /// Largest argument that [`sin_cos`] takes, rad; beyond it the result is NaN.
 pub const SIN_COS_MAX: f64 = 1.0e9;
@@ -36,25 +85,16 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 /// the same instructions, whatever `x` is.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
-    let rounded = x * FRAC_2_PI + ROUND;
-    let quadrant = rounded.to_bits();
+    let rounded = x * PER_RAD + ROUND;
+    let [sin, cos] = TABLE[rounded.to_bits() as usize % DIRECTIONS];
     // NaN where the reduction has no digits left, and for infinities.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
-    let r = ((x - k * HALF_PI[0]) - k * HALF_PI[1]) - k * HALF_PI[2];
-    // The polynomials in pairs of terms: shorter to wait for than one term after the other.
+    let r = (x - k * STEP[0]) - k * STEP[1];
     let z = r * r;
-    let zz = z * z;
-    let rz = r * z;
-    let s = ((SIN[0] + z * SIN[1]) + zz * (SIN[2] + z * SIN[3])) + (zz * zz) * (SIN[4] + z * SIN[5]);
-    let c = ((COS[0] + z * COS[1]) + zz * (COS[2] + z * COS[3])) + (zz * zz) * (COS[4] + z * COS[5]);
-    let s = (r + rz * s).to_bits();
-    let c = ((1.0 - 0.5 * z) + zz * c).to_bits();
-    // Odd quadrants swap sine and cosine; bit 1 of the quadrant (of the next one for the cosine) is the sign.
-    let swap = (quadrant & 1).wrapping_neg();
-    let mixed = (s ^ c) & swap;
-    let sign_s = (quadrant & 2) << 62;
-    let sign_c = (quadrant.wrapping_add(1) & 2) << 62;
-    (f64::from_bits((s ^ mixed) ^ sign_s), f64::from_bits((c ^ mixed) ^ sign_c))
+    // sin r, and cos r − 1.
+    let s = r + (r * z) * (SIN[0] + z * SIN[1]);
+    let c = z * (z * (COS[0] + z * COS[1]) - 0.5);
+    (sin + (cos * s + sin * c), cos + (cos * c - sin * s))
 }
 
 /// Square root of a finite `x` ≥ 0 by Newton's method, within 2^-52 of its value; 0 for a NaN and for anything below the

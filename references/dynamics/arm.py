@@ -10,10 +10,17 @@ def read(path):
     with open(path, "rb") as file:
         arm = tomllib.load(file)
     joints = np.array([j["origin_xyz_m"] + j["origin_rpy_rad"] for j in arm["joint"]], dtype=float)
+    joints[:, 3:] = right_angles(joints[:, 3:])
     links = np.array(
         [k["com_xyz_m"] + k["com_rpy_rad"] + k["inertia_kg_m2"] + [k["mass_kg"]] for k in arm["link"]], dtype=float
     )
     return joints, links, np.array(arm["gravity_m_s2"], dtype=float)
+
+
+def right_angles(rpy):
+    """Angles of joint origins; those within 2e-6 rad of a multiple of a right angle are that multiple."""
+    quarters = np.round(np.asarray(rpy) / (np.pi / 2)) * (np.pi / 2)
+    return np.where(np.abs(rpy - quarters) <= 2e-6, quarters, rpy)
 
 
 def line(kind, *parts):

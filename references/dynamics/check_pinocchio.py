@@ -4,8 +4,8 @@
 
 PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example
 reference`). Every model has random joint origins, masses, inertias and gravity; a share of them has parallel, nearly
-parallel, antiparallel or crossing axes. Each result has to agree to 1e-9 relative to the largest entry of its vector
-or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on failure.
+parallel, antiparallel or crossing axes; angles next to a right angle are taken as J-40 takes them. Each result has to
+agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on failure.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import sys
 
 import numpy as np
 import pinocchio as pin
+from arm import right_angles
 
 LIMIT = 1e-9
 SHAPES = [("inverse", 6), ("gravity", 6), ("mass matrix", 36), ("forward, rotors", 6), ("forward", 6), ("kinematics", 84)]
@@ -45,6 +46,7 @@ def random_model(rng):
 
 def pinocchio_model(joints, links, gravity):
     model = pin.Model()
+    joints = np.hstack([joints[:, :3], right_angles(joints[:, 3:])])
     parent = 0
     for k in range(6):
         place = pin.SE3(pin.rpy.rpyToMatrix(*joints[k, 3:]), joints[k, :3])

@@ -12,18 +12,104 @@
 //!   before, from the wrist to the base. Each link keeps seven parameters, and none of them is a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, symmetric};
-use crate::rotation::{Mat3, about_x, about_z, apply, congruent, from_rpy, product, unit};
-use crate::trig::angle;
+use crate::rotation::{
+    Mat3, about_x, about_z, apply, congruent, from_rpy, from_sines_cosines, product, unit,
+};
+use crate::trig::{angle, sin_cos};
+
+/// An angle of a joint origin that is this near to a multiple of a right angle is that multiple, rad: π/2 is written with six
+/// digits, and sent as f32.
+const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
+/// Sine or cosine of the angle between two axes that is taken for 0: what rounding leaves of right angles that were multiplied.
+const ALIGNED: f64 = 1e-12;
+
+/// How the axis of a joint is to that of the joint before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Axes {
+    /// Parallel, in the same or in the opposite direction: sin α = 0.
+    Parallel,
+    /// At a right angle: α = π/2, as α is never negative here.
+    Perpendicular,
+    /// Nothing that would save a multiplication.
+    Any,
+}
+
+/// The axes of the joints of an arm. The recursion is compiled for those that most arms have, without what they multiply by 0
+/// and 1, and for any.
+pub(crate) trait Shape {
+    /// That of the first joint has no meaning: gravity is given behind it.
+    const AXES: [Axes; JOINTS];
+}
+
+/// Any arm.
+pub(crate) struct AnyShape;
+/// Three parallel axes, then two at right angles: what a wrist without a common point has.
+pub(crate) struct ThreeParallel;
+/// Two parallel axes, then three at right angles: what a spherical wrist has.
+pub(crate) struct TwoParallel;
+
+impl Shape for AnyShape {
+    const AXES: [Axes; JOINTS] = [Axes::Any; JOINTS];
+}
+
+impl Shape for ThreeParallel {
+    const AXES: [Axes; JOINTS] = [
+        Axes::Any,
+        Axes::Perpendicular,
+        Axes::Parallel,
+        Axes::Parallel,
+        Axes::Perpendicular,
+        Axes::Perpendicular,
+    ];
+}
+
+impl Shape for TwoParallel {
+    const AXES: [Axes; JOINTS] = [
+        Axes::Any,
+        Axes::Perpendicular,
+        Axes::Parallel,
+        Axes::Perpendicular,
+        Axes::Perpendicular,
+        Axes::Perpendicular,
+    ];
+}
+
+/// Which shape the recursion is compiled for an arm has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum KnownShape {
+    /// [`AnyShape`].
+    Any,
+    /// [`ThreeParallel`].
+    ThreeParallel,
+    /// [`TwoParallel`].
+    TwoParallel,
+}
+
+impl KnownShape {
+    fn of(axes: &[Axes; JOINTS]) -> Self {
+        let is = |shape: &[Axes; JOINTS]| axes[1..] == shape[1..];
+        if is(&ThreeParallel::AXES) {
+            Self::ThreeParallel
+        } else if is(&TwoParallel::AXES) {
+            Self::TwoParallel
+        } else {
+            Self::Any
+        }
+    }
+}
 
 /// The modified Denavit-Hartenberg transform of a joint: frame k in frame k−1 is a shift by `p`, Rx(α), Rz(q + offset).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointTransform {
-    /// sin α and cos α.
+    /// sin α, which is not negative, and cos α.
     pub sin: f64,
     pub cos: f64,
+    /// What is known of them.
+    pub axes: Axes,
     /// Added to the joint's position, rad.
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1.
+    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1. Where the axes are parallel, its y is 0
+    /// too, by choice of the x axis of frame k−1.
     pub p: [f64; 2],
 }
 
@@ -111,12 +197,20 @@ pub(crate) struct Chain {
     pub placements: [Placement; 7],
     /// First moments (`hx`, `hy`) of a massless arm with 1 kg at the flange, kg·m.
     pub flange: [[f64; 2]; JOINTS],
+    pub shape: KnownShape,
 }
 
 impl Chain {
+    /// The transform of a joint, with what is known of its axes when the recursion is compiled.
+    #[inline(always)]
+    pub fn transform<S: Shape>(&self, k: usize) -> JointTransform {
+        JointTransform { axes: S::AXES[k], ..self.transforms[k] }
+    }
+
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
-        let placements = model.joints.map(|o| Placement { rotation: from_rpy(&o.rpy), xyz: o.xyz });
-        let mut transforms = [JointTransform { sin: 0.0, cos: 1.0, offset: 0.0, p: [0.0; 2] }; JOINTS];
+        let placements = model.joints.map(|o| Placement { rotation: joint_rotation(&o.rpy), xyz: o.xyz });
+        let none = JointTransform { sin: 0.0, cos: 1.0, axes: Axes::Any, offset: 0.0, p: [0.0; 2] };
+        let mut transforms = [none; JOINTS];
         // Frame k from the model's frame k: sine and cosine of the rotation about z, and the shift along z.
         let mut z_rotations = [(0.0, 1.0); JOINTS];
         let mut z_shifts = [0.0; JOINTS];
@@ -124,11 +218,19 @@ impl Chain {
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
-            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α).
-            let (cos_a, sin_a) = unit(-c[1][2], c[0][2]);
+            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). Of parallel axes any a is good, and the
+            // best is the one along the vector from one to the other.
+            let parallel = c[0][2].abs().max(c[1][2].abs()) < ALIGNED;
+            let [x, y, _] = placements[k].xyz;
+            let (cos_a, sin_a) = if parallel { unit(x, y) } else { unit(-c[1][2], c[0][2]) };
             let back = about_z(-sin_a, cos_a);
             let rest = product(&back, c);
             let (cos, sin) = unit(rest[2][2], -rest[1][2]);
+            let (axes, sin, cos) = match (parallel, cos.abs() < ALIGNED) {
+                (true, _) => (Axes::Parallel, 0.0, 1f64.copysign(cos)),
+                (false, true) => (Axes::Perpendicular, 1.0, 0.0),
+                (false, false) => (Axes::Any, sin, cos),
+            };
             let (cos_b, sin_b) = unit(rest[0][0], -rest[0][1]);
             origins[k] = apply(&back, &placements[k].xyz);
             if k == 0 {
@@ -137,18 +239,34 @@ impl Chain {
                 z_rotations[k - 1] = (sin_a, cos_a);
                 transforms[k - 1].offset += angle(sin_a, cos_a);
             }
-            (transforms[k].sin, transforms[k].cos) = (sin, cos);
+            (transforms[k].sin, transforms[k].cos, transforms[k].axes) = (sin, cos, axes);
             transforms[k].offset += angle(sin_b, cos_b);
         }
         for k in (1..JOINTS).rev() {
             let [x, y, z] = origins[k];
             z_shifts[k - 1] = z + z_shifts[k] * transforms[k].cos;
-            transforms[k].p = [x, y - z_shifts[k] * transforms[k].sin];
+            let parallel = transforms[k].axes == Axes::Parallel;
+            transforms[k].p = [x, if parallel { 0.0 } else { y - z_shifts[k] * transforms[k].sin }];
         }
         let base_parameters = regroup(&model.links, &transforms, &z_rotations, &z_shifts);
         let flange = regroup(&flange_mass(model), &transforms, &z_rotations, &z_shifts).map(|b| [b.hx, b.hy]);
-        Self { transforms, base_parameters, base_acceleration, placements, flange }
+        let shape = KnownShape::of(&transforms.map(|t| t.axes));
+        Self { transforms, base_parameters, base_acceleration, placements, flange, shape }
     }
+}
+
+/// Rotation of a joint origin, with exact right angles.
+fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
+    from_sines_cosines(&rpy.map(|angle| {
+        let (sin, cos) = sin_cos(angle);
+        if sin.abs() <= RIGHT_ANGLE_TOLERANCE {
+            (0.0, 1f64.copysign(cos))
+        } else if cos.abs() <= RIGHT_ANGLE_TOLERANCE {
+            (1f64.copysign(sin), 0.0)
+        } else {
+            (sin, cos)
+        }
+    }))
 }
 
 /// Links without mass, but with 1 kg at the flange.

@@ -4,8 +4,8 @@
 // Matrix elements are named by their indices, as in the formulas; written-out triangles have empty corners.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
-use crate::chain::{BaseInertialParameters, Chain, JointTransform};
-use crate::inverse::{JointSinesCosines, Wrench, inverse, inwards, rx, rz};
+use crate::chain::{AnyShape, BaseInertialParameters, Chain, JointTransform};
+use crate::inverse::{JointSinesCosines, Wrench, inwards, recursion, rx, rz};
 use crate::model::{JOINTS, JointVec};
 use crate::unroll::unroll;
 
@@ -81,7 +81,7 @@ fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     let mut composite = Composite::of(&chain.base_parameters[5]);
     unroll!(K in [5, 4, 3, 2, 1] {
         columns[K] = composite.column();
-        let t = &chain.transforms[K];
+        let t = &chain.transform::<AnyShape>(K);
         let rotation = (trig.sin[K], trig.cos[K]);
         unroll!(I in [1, 2, 3, 4, 5] {
             if I >= K {
@@ -163,7 +163,7 @@ pub(crate) fn forward(
 ) -> JointVec {
     let trig = JointSinesCosines::new(chain, q);
     let mut m = lower(chain, &trig);
-    let mut rest = inverse(chain, &trig, qd, &[0.0; JOINTS]);
+    let mut rest = recursion::<AnyShape>(chain, &trig, qd, &[0.0; JOINTS]);
     for k in 0..JOINTS {
         m[k][k] += rotor[k];
         rest[k] = tau[k] - rest[k];

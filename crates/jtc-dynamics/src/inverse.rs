@@ -4,7 +4,12 @@
 // The indices are those of the formulas.
 #![allow(clippy::needless_range_loop)]
 
-use crate::chain::{BaseInertialParameters, Chain, JointTransform};
+use core::array::from_fn;
+
+use crate::chain::{
+    AnyShape, Axes, BaseInertialParameters, Chain, JointTransform, KnownShape, Shape, ThreeParallel,
+    TwoParallel,
+};
 use crate::model::{JOINTS, JointVec};
 use crate::trig::sin_cos;
 use crate::unroll::unroll;
@@ -43,7 +48,21 @@ pub(crate) fn rx(t: &JointTransform, v: Vec3) -> Vec3 {
 /// Rx(α)ᵀ·v.
 #[inline(always)]
 fn rx_back(t: &JointTransform, v: Vec3) -> Vec3 {
-    [v[0], t.cos * v[1] + t.sin * v[2], t.cos * v[2] - t.sin * v[1]]
+    match t.axes {
+        Axes::Parallel => [v[0], t.cos * v[1], t.cos * v[2]],
+        Axes::Perpendicular => [v[0], v[2], -v[1]],
+        Axes::Any => [v[0], t.cos * v[1] + t.sin * v[2], t.cos * v[2] - t.sin * v[1]],
+    }
+}
+
+/// y and z of Rx(α)ᵀ·(0, 0, `z`).
+#[inline(always)]
+fn axis_back(t: &JointTransform, z: f64) -> (f64, f64) {
+    match t.axes {
+        Axes::Parallel => (0.0, t.cos * z),
+        Axes::Perpendicular => (z, 0.0),
+        Axes::Any => (t.sin * z, t.cos * z),
+    }
 }
 
 /// Rz·v.
@@ -61,26 +80,32 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
 /// Two vectors side by side: they are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
+/// One component of both vectors.
+type Pair = [f64; 2];
+
+#[inline(always)]
+fn scaled(k: f64, v: Pair) -> Pair {
+    v.map(|x| k * x)
+}
+
 /// Rx(α) of both vectors.
 #[inline(always)]
-fn rx_pair(t: &JointTransform, v: &Pair3) -> Pair3 {
-    let mut out = *v;
-    for i in 0..2 {
-        out[1][i] = t.cos * v[1][i] - t.sin * v[2][i];
-        out[2][i] = t.sin * v[1][i] + t.cos * v[2][i];
+fn rx_pair(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
+    match t.axes {
+        Axes::Parallel => [x, scaled(t.cos, y), scaled(t.cos, z)],
+        Axes::Perpendicular => [x, z.map(|z| -z), y],
+        Axes::Any => [x, from_fn(|i| t.cos * y[i] - t.sin * z[i]), from_fn(|i| t.sin * y[i] + t.cos * z[i])],
     }
-    out
 }
 
 /// Rx(α)ᵀ of both vectors.
 #[inline(always)]
-fn rx_pair_back(t: &JointTransform, v: &Pair3) -> Pair3 {
-    let mut out = *v;
-    for i in 0..2 {
-        out[1][i] = t.cos * v[1][i] + t.sin * v[2][i];
-        out[2][i] = t.cos * v[2][i] - t.sin * v[1][i];
+fn rx_pair_back(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
+    match t.axes {
+        Axes::Parallel => [x, scaled(t.cos, y), scaled(t.cos, z)],
+        Axes::Perpendicular => [x, z, y.map(|y| -y)],
+        Axes::Any => [x, from_fn(|i| t.cos * y[i] + t.sin * z[i]), from_fn(|i| t.cos * z[i] - t.sin * y[i])],
     }
-    out
 }
 
 /// Rz of both vectors.
@@ -140,8 +165,12 @@ impl Motion {
         qd: f64,
         qdd: f64,
     ) -> Self {
-        let p = &t.p;
-        let reach = |k: usize| self.acc[k] + (u[k][0] * p[0] + u[k][1] * p[1]);
+        let [x, y] = t.p;
+        let reach = |k: usize| {
+            // Between parallel axes y is 0.
+            let way = if t.axes == Axes::Parallel { u[k][0] * x } else { u[k][0] * x + u[k][1] * y };
+            self.acc[k] + way
+        };
         let acc = rz_back(s, c, rx_back(t, [reach(0), reach(1), reach(2)]));
         let mut angular = rz_pair_back(s, c, &rx_pair_back(t, &self.angular));
         let (wx, wy) = (angular[0][0], angular[1][0]);
@@ -172,36 +201,45 @@ impl BaseInertialParameters {
 pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
     let mut v = rx_pair(t, &rz_pair(s, c, wrench));
     let [x, y] = t.p;
-    v[0][1] += y * v[2][0];
     v[1][1] -= x * v[2][0];
-    v[2][1] += x * v[1][0] - y * v[0][0];
+    if t.axes == Axes::Parallel {
+        v[2][1] += x * v[1][0];
+    } else {
+        v[0][1] += y * v[2][0];
+        v[2][1] += x * v[1][0] - y * v[0][0];
+    }
     v
 }
 
 /// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis
 /// is computed: the base carries the rest.
 #[inline(always)]
-fn wrenches(chain: &Chain, trig: &JointSinesCosines, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
+fn wrenches<S: Shape>(
+    chain: &Chain,
+    trig: &JointSinesCosines,
+    qd: &JointVec,
+    qdd: &JointVec,
+) -> [Wrench; JOINTS] {
     let mut out = [[[0.0; 2]; 3]; JOINTS];
     let acc = rz_back(trig.sin[0], trig.cos[0], chain.base_acceleration);
     let first = &chain.base_parameters[0];
     out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
     // The first link only rotates about its axis, so that most of U and of the motion of the second is zero.
-    let t = &chain.transforms[1];
+    let t = &chain.transform::<S>(1);
     let (s, c) = (trig.sin[1], trig.cos[1]);
     let square = qd[0] * qd[0];
     let reach =
         [acc[0] - (square * t.p[0] + qdd[0] * t.p[1]), acc[1] + (qdd[0] * t.p[0] - square * t.p[1]), acc[2]];
-    let (y, z) = ([t.sin * qd[0], t.sin * qdd[0]], [t.cos * qd[0], t.cos * qdd[0]]);
-    let (wx, wy) = (s * y[0], c * y[0]);
+    let ((wy, wz), (ay, az)) = (axis_back(t, qd[0]), axis_back(t, qdd[0]));
+    let (wx, wy) = (s * wy, c * wy);
     let mut motion = Motion {
-        angular: [[wx, s * y[1] + wy * qd[1]], [wy, c * y[1] - wx * qd[1]], [z[0] + qd[1], z[1] + qdd[1]]],
+        angular: [[wx, s * ay + wy * qd[1]], [wy, c * ay - wx * qd[1]], [wz + qd[1], az + qdd[1]]],
         acc: rz_back(s, c, rx_back(t, reach)),
     };
     let mut u = motion.acceleration_matrix();
     out[1] = chain.base_parameters[1].wrench(&motion, &u);
     unroll!(K in [2, 3, 4, 5] {
-        motion = motion.next(&u, &chain.transforms[K], (trig.sin[K], trig.cos[K]), qd[K], qdd[K]);
+        motion = motion.next(&u, &chain.transform::<S>(K), (trig.sin[K], trig.cos[K]), qd[K], qdd[K]);
         u = motion.acceleration_matrix();
         out[K] = chain.base_parameters[K].wrench(&motion, &u);
     });
@@ -210,18 +248,39 @@ fn wrenches(chain: &Chain, trig: &JointSinesCosines, qd: &JointVec, qdd: &JointV
 
 #[inline(always)]
 fn sum(a: &Wrench, b: &Wrench) -> Wrench {
-    core::array::from_fn(|i| [a[i][0] + b[i][0], a[i][1] + b[i][1]])
+    from_fn(|i| [a[i][0] + b[i][0], a[i][1] + b[i][1]])
 }
 
-/// Joint torques, N·m.
+/// Joint torques, N·m, by the recursion that was compiled for the shape of the arm.
 #[inline(always)]
-pub(crate) fn inverse(chain: &Chain, trig: &JointSinesCosines, qd: &JointVec, qdd: &JointVec) -> JointVec {
-    let links = wrenches(chain, trig, qd, qdd);
+pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
+    match chain.shape {
+        KnownShape::ThreeParallel => inverse_of::<ThreeParallel>(chain, q, qd, qdd),
+        KnownShape::TwoParallel => inverse_of::<TwoParallel>(chain, q, qd, qdd),
+        KnownShape::Any => inverse_of::<AnyShape>(chain, q, qd, qdd),
+    }
+}
+
+/// The same of an arm that has this shape. Functions of their own, so that the machine code of each can be looked at.
+#[inline(never)]
+fn inverse_of<S: Shape>(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
+    recursion::<S>(chain, &JointSinesCosines::new(chain, q), qd, qdd)
+}
+
+/// Outwards and inwards along the chain.
+#[inline(always)]
+pub(crate) fn recursion<S: Shape>(
+    chain: &Chain,
+    trig: &JointSinesCosines,
+    qd: &JointVec,
+    qdd: &JointVec,
+) -> JointVec {
+    let links = wrenches::<S>(chain, trig, qd, qdd);
     let mut torque = [0.0; JOINTS];
     let mut total = links[5];
     torque[5] = total[2][1];
     unroll!(K in [4, 3, 2, 1, 0] {
-        let v = inwards(&chain.transforms[K + 1], (trig.sin[K + 1], trig.cos[K + 1]), &total);
+        let v = inwards(&chain.transform::<S>(K + 1), (trig.sin[K + 1], trig.cos[K + 1]), &total);
         total = sum(&links[K], &v);
         torque[K] = total[2][1];
     });
@@ -250,7 +309,7 @@ fn static_torque(
     let mut acc = chain.base_acceleration;
     let mut moments = [[0.0; 3]; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
-        let along = if K == 0 { acc } else { rx_back(&chain.transforms[K], acc) };
+        let along = if K == 0 { acc } else { rx_back(&chain.transform::<AnyShape>(K), acc) };
         acc = rz_back(trig.sin[K], trig.cos[K], along);
         let [hx, hy] = first_moment(K);
         moments[K] = [hy * acc[2], -hx * acc[2], hx * acc[1] - hy * acc[0]];
@@ -265,3 +324,6 @@ fn static_torque(
     });
     torque
 }
+
+#[cfg(test)]
+mod tests;

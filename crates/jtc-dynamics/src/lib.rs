@@ -40,7 +40,7 @@ impl Dynamics {
     /// Joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without
     /// friction and rotors; recursive Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
-        inverse::inverse(&self.chain, &JointSinesCosines::new(&self.chain, q), qd, qdd)
+        inverse::inverse(&self.chain, q, qd, qdd)
     }
 
     /// Joint torques (N·m) that hold the arm at rest at the positions `q` (rad).

@@ -16,7 +16,7 @@ pub type JointVec = [f64; JOINTS];
 pub struct Origin {
     /// Translation in the parent frame, m.
     pub xyz: [f64; 3],
-    /// Roll, pitch, yaw, rad.
+    /// Roll, pitch, yaw, rad. Those of a joint within 2 µrad of a multiple of π/2 are taken as that multiple.
     pub rpy: [f64; 3],
 }
 

@@ -7,8 +7,12 @@ use crate::trig::{sin_cos, sqrt};
 pub(crate) type Mat3 = [[f64; 3]; 3];
 
 /// Rz(yaw)·Ry(pitch)·Rx(roll).
-pub(crate) fn from_rpy(&[roll, pitch, yaw]: &[f64; 3]) -> Mat3 {
-    let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
+pub(crate) fn from_rpy(rpy: &[f64; 3]) -> Mat3 {
+    from_sines_cosines(&rpy.map(sin_cos))
+}
+
+/// The same of sines and cosines.
+pub(crate) fn from_sines_cosines(&[(sr, cr), (sp, cp), (sy, cy)]: &[(f64, f64); 3]) -> Mat3 {
     [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],

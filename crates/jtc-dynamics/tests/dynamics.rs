@@ -1,6 +1,8 @@
 //! Properties that hold for every arm (J-40), and known values of the default one.
 mod arms;
 
+use std::f64::consts::FRAC_PI_2;
+
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, Origin};
 use proptest::prelude::*;
 
@@ -50,6 +52,12 @@ fn rotation(o: &Origin) -> Mat3 {
     product(&about(2, o.rpy[2]), &product(&about(1, o.rpy[1]), &about(0, o.rpy[0])))
 }
 
+/// An angle of a joint origin within 2 µrad of a multiple of a right angle is that multiple.
+fn squared(angle: f64) -> f64 {
+    let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
+    if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }
+}
+
 /// Frames of the links by the rule as it stands: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
 fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     let mut at = (about(0, 0.0), [0.0; 3]);
@@ -57,7 +65,8 @@ fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     for (k, joint) in model.joints.iter().enumerate() {
         let step = apply(&at.0, joint.xyz);
         at.1 = core::array::from_fn(|i| at.1[i] + step[i]);
-        at.0 = product(&product(&at.0, &rotation(joint)), &about(2, q.get(k).copied().unwrap_or(0.0)));
+        let origin = Origin { rpy: joint.rpy.map(squared), ..*joint };
+        at.0 = product(&product(&at.0, &rotation(&origin)), &about(2, q.get(k).copied().unwrap_or(0.0)));
         all.push(at);
     }
     all
@@ -232,10 +241,7 @@ fn j40_gravity_torque_of_the_default_arm_hanging() {
     let d = Dynamics::new(&model, [0.0, 0.0, 9.81]);
     let known = [
         (NONE, NONE),
-        (
-            [0.0, core::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0],
-            [0.0, 131.564, -47.093, 2.543, -0.405, 0.0],
-        ),
+        ([0.0, FRAC_PI_2, 0.0, 0.0, 0.0, 0.0], [0.0, 131.564, -47.093, 2.543, -0.405, 0.0]),
         ([1.0, 0.5, -0.5, 0.3, 0.2, 0.1], [0.0, 80.414, -39.916, 2.429, -0.383, 0.0]),
     ];
     for (q, torque) in known {
@@ -277,6 +283,27 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     let pose = Dynamics::new(&model, DOWN).forward_kinematics(&NONE)[6];
     let wanted = product(&about(2, 0.9), &product(&about(1, -0.5), &about(0, 0.3)));
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
+}
+
+/// How π/2 and π are written with six digits, and how they come out of f32, is what is meant; what is further off is not.
+#[test]
+fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
+    let poses = |rpy: [f64; 3]| {
+        let mut model = arms::avena();
+        (model.joints[2].rpy, model.joints[4].rpy) = (rpy, rpy);
+        let d = Dynamics::new(&model, DOWN);
+        let q = [0.3, -0.4, 0.5, -0.6, 0.7, -0.8];
+        (d.forward_kinematics(&q), d.inverse(&q, &[1.0; JOINTS], &[2.0; JOINTS]).map(f64::to_bits))
+    };
+    for quarters in [-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0] {
+        let right = quarters * FRAC_PI_2;
+        for near in [right + 1.9e-6, right - 1.9e-6, f64::from(right as f32)] {
+            assert!(poses([right; 3]) == poses([near; 3]), "{near}");
+        }
+        for far in [right + 2.1e-6, right - 2.1e-6] {
+            assert_ne!(poses([right; 3]), poses([far; 3]), "{far}");
+        }
+    }
 }
 
 #[test]

@@ -5,9 +5,9 @@
 //! channel is the derivative of another, because the int16 grid of the positions (96 µrad) would turn into tens of rad/s².
 use core::array::from_fn;
 
-use jtc_wire::RawPoint;
+use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
-use crate::JOINTS;
+use crate::{DT, JOINTS};
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of every joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,56 +46,114 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Hermite's basis at one place between two points: what each sample contributes to a channel. It is the same for all joints.
-struct Basis {
-    /// Of the way between the positions.
-    way: f64,
-    /// Of both velocities to the position, s.
-    velocity: [f64; 2],
-    /// Of both accelerations to the position, s².
+/// What the samples of both points contribute to the channels at one place between them: Hermite's basis. It is the same for all
+/// joints.
+struct Weights {
+    /// Of the positions, the velocities and the accelerations to the position.
+    position: [[f64; 2]; 3],
+    /// Of the velocities and the accelerations to the velocity.
+    velocity: [[f64; 2]; 2],
+    /// Of the accelerations to the acceleration.
     acceleration: [f64; 2],
-    /// Of the change between the velocities to the velocity.
-    change: f64,
-    /// Of both accelerations to the velocity, s.
-    slope: [f64; 2],
 }
 
-impl Basis {
-    /// At the fraction `u` of a step of `h` seconds.
-    fn at(u: f64, h: f64) -> Self {
-        let (u2, h2) = (u * u, h * h);
-        let u3 = u2 * u;
+/// Units of the samples, and what a step makes of them: what is the same in all of a trajectory.
+#[derive(Clone, Copy, Debug)]
+struct Units {
+    /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one.
+    position: f64,
+    velocity: f64,
+    acceleration: f64,
+    /// Way of the velocity in a step (rad), half of that of the acceleration (rad), and the change of velocity by it (rad/s).
+    way: f64,
+    half_way: f64,
+    change: f64,
+}
+
+impl Units {
+    /// Of points that are `h` seconds apart.
+    fn new(position: f64, velocity: f64, acceleration: f64, h: f64) -> Self {
+        let (way, half_way, change) = (h * velocity, 0.5 * h * h * acceleration, h * acceleration);
+        Self { position, velocity, acceleration, way, half_way, change }
+    }
+}
+
+impl Weights {
+    /// At the fraction `u` of a step.
+    #[inline(always)]
+    fn at(u: f64, units: &Units) -> Self {
+        let w = 1.0 - u;
+        let (uu, uw) = (u * u, u * w);
+        let (uuw, uww) = (uw * u, uw * w);
+        let rise = uu * u * (10.0 + u * (6.0 * u - 15.0)) * units.position;
+        let change = uu * (3.0 - 2.0 * u) * units.velocity;
+        let half_way = uw * uw * units.half_way;
+        let line = u * units.acceleration;
         Self {
-            way: u3 * (10.0 - 15.0 * u + 6.0 * u2),
-            velocity: [h * (u + u3 * (-6.0 + 8.0 * u - 3.0 * u2)), h * (u3 * (-4.0 + 7.0 * u - 3.0 * u2))],
-            acceleration: [
-                h2 * (0.5 * u2 + u3 * (-1.5 + 1.5 * u - 0.5 * u2)),
-                h2 * (u3 * (0.5 - u + 0.5 * u2)),
+            position: [
+                [units.position - rise, rise],
+                [uww * w * (1.0 + 3.0 * u) * units.way, -(uuw * u * (1.0 + 3.0 * w) * units.way)],
+                [half_way * w, half_way * u],
             ],
-            change: u2 * (3.0 - 2.0 * u),
-            slope: [h * (u - 2.0 * u2 + u3), h * (u3 - u2)],
+            velocity: [[units.velocity - change, change], [uww * units.change, -(uuw * units.change)]],
+            acceleration: [units.acceleration - line, line],
         }
+    }
+
+    /// Position, velocity and acceleration from those of both points.
+    #[inline(always)]
+    fn between(&self, a: [f64; 3], b: [f64; 3]) -> (f64, f64, f64) {
+        let of = |weights: &[f64; 2], channel: usize| weights[0] * a[channel] + weights[1] * b[channel];
+        let [positions, velocities, accelerations] = &self.position;
+        (
+            of(positions, 0) + (of(velocities, 1) + of(accelerations, 2)),
+            of(&self.velocity[0], 1) + of(&self.velocity[1], 2),
+            of(&self.acceleration, 2),
+        )
+    }
+}
+
+/// The step between the points of a trajectory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Step {
+    /// ms, and one over it.
+    pub ms: u16,
+    pub per_ms: f64,
+    units: Units,
+}
+
+impl Step {
+    /// Of so many milliseconds, at least one.
+    pub fn new(ms: u16) -> Self {
+        let ms = ms.max(1);
+        let [position, velocity, acceleration] =
+            [POSITION_SCALE, VELOCITY_SCALE, ACCELERATION_SCALE].map(|scale| scale / RAW_FULL_SCALE);
+        let units = Units::new(position, velocity, acceleration, f64::from(ms) * DT);
+        Self { ms, per_ms: 1.0 / f64::from(ms), units }
+    }
+
+    /// Set values at the fraction `u` (0..1) of the way from one point to the next.
+    #[inline(always)]
+    pub fn between(&self, a: &RawPoint, b: &RawPoint, u: f64) -> SetPoint {
+        let weights = Weights::at(u, &self.units);
+        let mut out = SetPoint::default();
+        for j in 0..JOINTS {
+            let samples = |p: &RawPoint| [p.position[j], p.velocity[j], p.acceleration[j]].map(f64::from);
+            (out.position[j], out.velocity[j], out.acceleration[j]) = weights.between(samples(a), samples(b));
+        }
+        out
     }
 }
 
 /// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
-#[inline]
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
-    let basis = Basis::at(u, h);
-    let position = |j: usize| {
-        let way = basis.way * (b.position[j] - a.position[j]);
-        let velocities = basis.velocity[0] * a.velocity[j] + basis.velocity[1] * b.velocity[j];
-        let accelerations =
-            basis.acceleration[0] * a.acceleration[j] + basis.acceleration[1] * b.acceleration[j];
-        a.position[j] + (way + velocities + accelerations)
-    };
-    let velocity = |j: usize| {
-        let change = basis.change * (b.velocity[j] - a.velocity[j]);
-        let slopes = basis.slope[0] * a.acceleration[j] + basis.slope[1] * b.acceleration[j];
-        a.velocity[j] + (change + slopes)
-    };
-    let acceleration = |j: usize| a.acceleration[j] + u * (b.acceleration[j] - a.acceleration[j]);
-    SetPoint { position: from_fn(position), velocity: from_fn(velocity), acceleration: from_fn(acceleration) }
+    let weights = Weights::at(u, &Units::new(1.0, 1.0, 1.0, h));
+    let mut out = SetPoint::default();
+    for j in 0..JOINTS {
+        let samples = |p: &SetPoint| [p.position[j], p.velocity[j], p.acceleration[j]];
+        (out.position[j], out.velocity[j], out.acceleration[j]) = weights.between(samples(a), samples(b));
+    }
+    out
 }
 
 /// Speed of the position itself (rad/s) where [`interpolate`] takes it: that of the cubic, and what is due to the way that the
@@ -128,6 +186,15 @@ mod tests {
             })
     }
 
+    fn raw() -> impl Strategy<Value = RawPoint> {
+        let any = || prop::array::uniform6(any::<i16>());
+        (any(), any(), any()).prop_map(|(position, velocity, acceleration)| RawPoint {
+            position,
+            velocity,
+            acceleration,
+        })
+    }
+
     proptest! {
         #[test]
         fn j32_both_ends_are_met_in_every_channel(a in point(), b in point(), h in 0.001..0.1f64) {
@@ -158,6 +225,30 @@ mod tests {
             let got = interpolate(&knot(0.0), &knot(h), h, u);
             prop_assert!((got.velocity[0] - cubic(u * h).0).abs() < 1e-12);
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
+        }
+
+        /// From points as they are on the wire the same comes out, up to rounding: far less than the limits allow for it.
+        #[test]
+        fn j32_points_of_the_wire_are_interpolated_alike(
+            (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
+        ) {
+            let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
+            let got = Step::new(ms).between(&a, &b, u);
+            // A step of a minute leads far away between its ends.
+            let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
+            for j in 0..JOINTS {
+                prop_assert!((got.position[j] - wanted.position[j]).abs() < rounding);
+                prop_assert!((got.velocity[j] - wanted.velocity[j]).abs() < rounding);
+                prop_assert!((got.acceleration[j] - wanted.acceleration[j]).abs() < rounding);
+            }
+        }
+
+        /// Where a trajectory has a point, it is met to the last bit, and at rest it is at rest.
+        #[test]
+        fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
+            let step = Step::new(ms);
+            prop_assert_eq!(step.between(&a, &b, 0.0), SetPoint::from(&a));
+            prop_assert_eq!(step.between(&a, &b, 1.0), SetPoint::from(&b));
         }
 
         /// The speed of the position is its derivative.

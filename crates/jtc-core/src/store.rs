@@ -2,8 +2,11 @@
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::check::SpeedRange;
-use crate::interpolation::{SetPoint, interpolate};
+use crate::interpolation::{SetPoint, Step};
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+
+/// This share of a step before a point is at the point.
+const AT_POINT: f64 = 1e-9;
 
 /// What was received of the current trajectory. `M` is the memory of its points.
 #[derive(Clone, Debug)]
@@ -15,7 +18,7 @@ pub(crate) struct Store<M> {
     next_segment: u16,
     segments: u16,
     number: u16,
-    step_ms: u16,
+    step: Step,
     /// Velocities of the accepted segments.
     speeds: [SpeedRange; JOINTS],
 }
@@ -23,7 +26,7 @@ pub(crate) struct Store<M> {
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub fn new(points: M) -> Self {
         let speeds = [SpeedRange::default(); JOINTS];
-        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step_ms: 1, speeds }
+        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step: Step::new(1), speeds }
     }
 
     /// Points that fit: never more than the protocol allows, never more than the memory holds.
@@ -50,7 +53,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     /// Time of the last point, ms.
     pub fn duration_ms(&self) -> u32 {
         // At most 11 999 · 65 535, which fits.
-        (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step_ms))
+        (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
     /// Whether the segment may follow what was received. Changes nothing.
@@ -75,7 +78,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         if !first && !in_order {
             return Err(DataStatus::IncorrectSegmentOrder);
         }
-        if segment.step_time == 0 || (!first && segment.step_time != self.step_ms) {
+        if segment.step_time == 0 || (!first && segment.step_time != self.step.ms) {
             return Err(DataStatus::IncorrectStepTime);
         }
         Ok(())
@@ -87,7 +90,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             self.clear();
             self.segments = segment.segments;
             self.number = segment.trajectory;
-            self.step_ms = segment.step_time;
+            self.step = Step::new(segment.step_time);
         }
     }
 
@@ -123,18 +126,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let points = self.points.as_ref().get(..self.received)?;
-        let step = f64::from(self.step_ms);
-        // `as` saturates: a negative or NaN time is point 0.
-        let index = (time_ms / step) as usize;
+        let step_ms = f64::from(self.step.ms);
+        // The product may be rounded to below a point that the time has reached. `as` saturates: a negative or NaN time is point 0.
+        let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let start = points.get(index).or(points.last())?;
         // Also at a point itself and at the last one, where it changes nothing: the same work in every tick.
-        let (end, offset) = match points.get(index + 1) {
-            Some(end) => (end, (time_ms - index as f64 * step).max(0.0)),
+        let (end, u) = match points.get(index + 1) {
+            Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),
         };
-        Some(interpolate(&SetPoint::from(start), &SetPoint::from(end), step / 1000.0, offset / step))
+        Some(self.step.between(start, end, u))
     }
 }

@@ -309,7 +309,7 @@ mod tests {
             };
             flight.begin(&inputs, 0);
             let outputs = board.tick(&inputs);
-            flight.complete(&outputs, board.telemetry());
+            flight.complete(&outputs, &board.telemetry());
             assert!(flight.valid() && flight.phase == Flight::PHASE_COMPLETE && flight.tick == tick as u64);
 
             let bus: Vec<Frame> = flight.received().collect();

@@ -209,7 +209,7 @@ impl Tick {
         self.store_arm(outputs.store);
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);
-        self.flight.complete(&outputs, telemetry);
+        self.flight.complete(&outputs, &telemetry);
         self.pins.show(state);
         let silent = self.links.silent();
         if silent == LINKS_SILENT_ERROR {

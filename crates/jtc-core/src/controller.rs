@@ -16,7 +16,7 @@ use crate::received::ReceivedParameters;
 use crate::response_queue::{HOST_LINES, ResponseQueues};
 use crate::states::{Conditions, next_state};
 use crate::store::Store;
-use crate::telemetry::Telemetry;
+use crate::telemetry::Observed;
 use crate::{ControllerState, TrajectoryState};
 
 /// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
@@ -52,7 +52,7 @@ pub struct Controller<M> {
     pub(crate) since_status_ms: u16,
     pub(crate) late_ticks: LateTicks,
     pub(crate) status_frame: [u8; STATUS_LEN],
-    pub(crate) telemetry: Telemetry,
+    pub(crate) observed: Observed,
     pub(crate) extensions: Extensions,
 }
 
@@ -81,7 +81,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             since_status_ms: 0,
             late_ticks: LateTicks::default(),
             status_frame: [0; STATUS_LEN],
-            telemetry: Telemetry::default(),
+            observed: Observed::default(),
             extensions: Extensions::new(),
             config,
         }
@@ -96,11 +96,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         &self.status_frame
-    }
-
-    /// What the last tick computed.
-    pub fn telemetry(&self) -> &Telemetry {
-        &self.telemetry
     }
 
     /// Why the last segment or the last Execute was refused by the check of J-36; `None` when it was not.

@@ -208,7 +208,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             nodes_missing: self.nodes.init_word(&self.config),
             boot_cause: identity.boot_cause,
             boots: identity.boots,
-            uptime_ms: self.telemetry.tick,
+            uptime_ms: self.observed.tick,
             lost_records: self.records.lost(),
             hash,
             capabilities,

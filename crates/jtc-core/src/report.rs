@@ -4,39 +4,53 @@ use jtc_wire::{GripperStatus, JointStatus, RawPoint, Response, Status};
 use crate::JOINTS;
 use crate::controller::Controller;
 use crate::nodes::GRIPPER;
-use crate::telemetry::JointTelemetry;
+use crate::telemetry::{JointTelemetry, Observed, Telemetry};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn observe(&mut self, torque: &[f64; JOINTS]) {
-        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
-        let t = &mut self.telemetry;
-        t.tick += 1;
-        (t.state, t.trajectory, t.errors) = (self.state, self.trajectory, self.errors.word());
-        // Index of the current 1 ms point.
-        t.point = self.clock.time as u32;
-        t.braking = self.braking_ms.is_some();
-        t.records_lost = self.records.lost();
-        for (j, out) in t.joints.iter_mut().enumerate() {
-            let (set, parts, report) =
-                (&self.motion.set.point, &self.motion.law.torque[j], &self.nodes.node(j).report);
-            *out = JointTelemetry {
-                set_position: set.position[j],
-                set_velocity: set.velocity[j],
-                set_acceleration: set.acceleration[j],
-                position: q[j],
-                velocity: v[j],
-                fresh: self.nodes.node(j).fresh(),
-                temperature: f64::from(report.temperature),
-                torque_model: parts.model,
-                torque_p: parts.pid.p,
-                torque_i: parts.pid.i,
-                torque_d: parts.pid.d,
-                torque_friction: parts.friction,
-                torque_other: parts.payload + parts.brake + parts.blend,
-                torque: torque[j],
-                state: report.state,
-                internal: self.errors.joint(j).0,
-            };
+        self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
+    }
+
+    /// What the last tick computed. It is made here, not in the tick: a board needs little of it.
+    #[inline]
+    pub fn telemetry(&self) -> Telemetry {
+        Telemetry {
+            tick: self.observed.tick,
+            state: self.state,
+            trajectory: self.trajectory,
+            point: self.point(),
+            braking: self.braking_ms.is_some(),
+            errors: self.errors.word(),
+            records_lost: self.records.lost(),
+            joints: core::array::from_fn(|j| self.joint_telemetry(j)),
+        }
+    }
+
+    /// Index of the current 1 ms point.
+    fn point(&self) -> u32 {
+        self.clock.time as u32
+    }
+
+    #[inline]
+    fn joint_telemetry(&self, j: usize) -> JointTelemetry {
+        let (set, parts, node) = (&self.motion.set.point, &self.motion.law.torque[j], self.nodes.node(j));
+        JointTelemetry {
+            set_position: set.position[j],
+            set_velocity: set.velocity[j],
+            set_acceleration: set.acceleration[j],
+            position: self.nodes.positions()[j],
+            velocity: self.nodes.velocities()[j],
+            fresh: node.fresh(),
+            temperature: f64::from(node.report.temperature),
+            torque_model: parts.model,
+            torque_p: parts.pid.p,
+            torque_i: parts.pid.i,
+            torque_d: parts.pid.d,
+            torque_friction: parts.friction,
+            torque_other: parts.payload + parts.brake + parts.blend,
+            torque: self.observed.torque[j],
+            state: node.report.state,
+            internal: self.errors.joint(j).0,
         }
     }
 
@@ -79,7 +93,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             jtc_init: self.parameters.missing(),
             node_init: self.nodes.init_word(&self.config),
             trajectory: self.trajectory.into(),
-            point: self.telemetry.point,
+            point: self.point(),
             friction_type: u8::from(self.parameters.friction_is_table),
             can_error: u8::from(self.errors.can_error()),
             can_current,
@@ -116,7 +130,7 @@ mod tests {
             blend: 128.0,
         };
         controller.observe(&[0.0, 0.0, 250.0, 0.0, 0.0, 0.0]);
-        let joint = controller.telemetry.joints[2];
+        let joint = controller.telemetry().joints[2];
         assert_eq!((joint.torque_model, joint.torque_friction, joint.torque_other), (1.0, 16.0, 224.0));
         assert_eq!((joint.torque_p, joint.torque_i, joint.torque_d, joint.torque), (2.0, 4.0, 8.0, 250.0));
     }

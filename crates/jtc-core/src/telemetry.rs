@@ -68,6 +68,15 @@ pub struct Telemetry {
     pub joints: [JointTelemetry; JOINTS],
 }
 
+/// What a tick remembers for the telemetry alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Observed {
+    /// Ticks since boot.
+    pub tick: u64,
+    /// Torques commanded, N·m.
+    pub torque: [f64; JOINTS],
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

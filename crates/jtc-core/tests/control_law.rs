@@ -48,7 +48,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
         .collect();
     let mut rig = Rig::holding();
     rig.move_along(&points, 105);
-    let t = *rig.controller.telemetry();
+    let t = rig.controller.telemetry();
     let (q, qd, qdd) = (
         t.joints.map(|j| j.position),
         t.joints.map(|j| j.set_velocity),

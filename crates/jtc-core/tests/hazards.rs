@@ -57,10 +57,10 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     rig.send(FrameType::TrajSetExecStatus, &[3]);
     rig.run(5);
     rig.nodes[0].report.velocity = 0.0;
-    let mut last = *rig.controller.telemetry();
+    let mut last = rig.controller.telemetry();
     for _ in 0..2500 {
         rig.tick();
-        let t = *rig.controller.telemetry();
+        let t = rig.controller.telemetry();
         assert!((t.joints[0].set_position - last.joints[0].set_position).abs() < 2e-4, "{last:?} {t:?}");
         last = t;
     }

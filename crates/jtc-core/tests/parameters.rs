@@ -278,7 +278,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     let mut last = asked.controller.telemetry().joints.map(|j| j.torque);
     for _ in 0..300 {
         asked.tick();
-        let t = *asked.controller.telemetry();
+        let t = asked.controller.telemetry();
         prop_assert_eq!((t.state, t.errors), (ControllerState::HoldPos, 0), "{}", accepted);
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;

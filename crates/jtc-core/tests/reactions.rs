@@ -50,7 +50,7 @@ fn j66_a_position_error_lets_the_arm_give_way_and_the_path_can_go_on() {
     let mut rig = bench(true);
     push(&mut rig, 0.097);
     rig.run(2);
-    let t = *rig.controller.telemetry();
+    let t = rig.controller.telemetry();
     assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Pause, 0));
     // Held where it is measured, to within the way of its deceleration.
     assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
@@ -128,7 +128,7 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_gives_way_while_it_still_
     rig.until(500, |r| r.trajectory() == TrajectoryState::Pause);
     push(&mut rig, 0.097);
     rig.run(2);
-    let t = *rig.controller.telemetry();
+    let t = rig.controller.telemetry();
     assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Pause, 0));
     assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);

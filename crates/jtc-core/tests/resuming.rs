@@ -37,7 +37,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 600);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
     rig.until(1_000, |r| r.trajectory() == TrajectoryState::Pause);
-    let paused = *rig.controller.telemetry();
+    let paused = rig.controller.telemetry();
     rig.push(2, paused.joints[2].set_position - 0.003);
     rig.run(100);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);

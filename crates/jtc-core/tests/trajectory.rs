@@ -127,7 +127,7 @@ fn j31_first_and_last_point_are_commanded_exactly_and_the_index_counts_milliseco
     rig.exec(ExecCommand::Execute);
     rig.until(1000, |r| r.controller.telemetry().point == 1);
     for k in 1..=1000u32 {
-        let t = *rig.controller.telemetry();
+        let t = rig.controller.telemetry();
         assert_eq!(t.point, k);
         if k % 25 == 0 {
             let point = &points[(k / 25) as usize];
@@ -179,7 +179,7 @@ fn j33_pause_and_resume_follow_the_path() {
     let mut rig = Rig::holding();
     rig.move_along(&points, 1400);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
-    let mut last = *rig.controller.telemetry();
+    let mut last = rig.controller.telemetry();
     let mut ticks_to_stand = 0;
     let check = |t: &jtc_core::Telemetry, last: &jtc_core::Telemetry| {
         let (x, y) = (t.joints[2].set_position, t.joints[5].set_position);
@@ -194,7 +194,7 @@ fn j33_pause_and_resume_follow_the_path() {
     while rig.trajectory() == TrajectoryState::Execute {
         rig.tick();
         ticks_to_stand += 1;
-        let t = *rig.controller.telemetry();
+        let t = rig.controller.telemetry();
         check(&t, &last);
         last = t;
     }
@@ -207,7 +207,7 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     while rig.trajectory() != TrajectoryState::Finish {
         rig.tick();
-        let t = *rig.controller.telemetry();
+        let t = rig.controller.telemetry();
         check(&t, &last);
         last = t;
     }

@@ -90,6 +90,8 @@ pub struct Board {
     pub lost_bytes: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
+    /// What the last tick computed.
+    telemetry: Telemetry,
 }
 
 impl Board {
@@ -109,6 +111,7 @@ impl Board {
             worked: Vec::new(),
             lost_bytes: 0,
             watchdog_resets: 0,
+            telemetry: Telemetry::default(),
         };
         board.boot();
         board
@@ -176,7 +179,7 @@ impl Board {
 
     /// What the last tick computed.
     pub fn telemetry(&self) -> &Telemetry {
-        self.controller.telemetry()
+        &self.telemetry
     }
 
     /// Between ticks: bytes that have arrived by `now_us` are looked at for urgent commands and go through the parser.
@@ -251,6 +254,7 @@ impl Board {
             host: &host,
             status_free: pins.status_free,
         });
+        self.telemetry = self.controller.telemetry();
         self.worked.clear();
         self.worked.extend(host.iter().take(outputs.host_done).map(|host| Worked::from(&host.event)));
         self.batch.done(outputs.host_done);

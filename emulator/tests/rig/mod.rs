@@ -133,7 +133,7 @@ impl Rig {
         let checked = self.invariants.check_moment(&Moment {
             time_us: ms * 1000,
             ticked: true,
-            telemetry: shadow.telemetry(),
+            telemetry: &shadow.telemetry(),
             truth: &truth,
             sent: flight.sent.as_ref(),
             worked: &shadow.worked,
@@ -196,13 +196,13 @@ impl Rig {
             }
             self.step();
         }
-        let t = self.shadow.as_ref().map(|s| *s.telemetry());
+        let t = self.shadow.as_ref().map(|s| s.telemetry());
         panic!("{what}: not within {ms} ms; {t:?}");
     }
 
     /// What the controller beside the board computed, with the same bits as the board.
     pub fn telemetry(&self) -> Telemetry {
-        self.shadow.as_ref().map(|s| *s.telemetry()).unwrap_or_default()
+        self.shadow.as_ref().map(|s| s.telemetry()).unwrap_or_default()
     }
 
     /// State of the controller.

@@ -28,7 +28,7 @@ impl Shadow {
     }
 
     /// What the last tick computed.
-    pub fn telemetry(&self) -> &Telemetry {
+    pub fn telemetry(&self) -> Telemetry {
         self.controller.telemetry()
     }
 

@@ -24,13 +24,15 @@ impl Nodes {
             if must_move || self.moves < MOVES_BETWEEN { None } else { self.instead_of_move(config, goal) };
         self.sent_move = instead.is_none();
         self.moves = if self.sent_move { self.moves.saturating_add(1) } else { 0 };
-        instead.unwrap_or(Request::Move { torque, pump }).emit()
+        match instead {
+            Some(request) => request.emit(),
+            None => Request::Move { torque, pump }.emit(),
+        }
     }
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         let present = self.present();
-        let to_reset = self.all().iter().filter(|node| node.reset).count();
-        if to_reset == present {
+        if self.all().iter().all(|node| node.reset) {
             for node in &mut self.nodes {
                 node.restart(config);
             }

@@ -153,6 +153,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Set values at the present path time.
     fn follow(&mut self) {
+        if self.clock.at_full_speed() {
+            self.clock.slope = 0.0;
+            self.store.put(self.clock.time, &mut self.motion.set.point);
+            return;
+        }
         let Some(at) = self.store.at(self.clock.time) else { return };
         if self.clock.ramping() {
             let bounds = self.motion.ramp.slope_bounds(

@@ -132,16 +132,14 @@ impl Step {
         Self { ms, per_ms: 1.0 / f64::from(ms), units }
     }
 
-    /// Set values at the fraction `u` (0..1) of the way from one point to the next.
+    /// Puts set values at the fraction `u` (0..1) of the way from one point to the next.
     #[inline(always)]
-    pub fn between(&self, a: &RawPoint, b: &RawPoint, u: f64) -> SetPoint {
+    pub fn between(&self, a: &RawPoint, b: &RawPoint, u: f64, out: &mut SetPoint) {
         let weights = Weights::at(u, &self.units);
-        let mut out = SetPoint::default();
         for j in 0..JOINTS {
             let samples = |p: &RawPoint| [p.position[j], p.velocity[j], p.acceleration[j]].map(f64::from);
             (out.position[j], out.velocity[j], out.acceleration[j]) = weights.between(samples(a), samples(b));
         }
-        out
     }
 }
 
@@ -233,7 +231,8 @@ mod tests {
             (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
         ) {
             let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
-            let got = Step::new(ms).between(&a, &b, u);
+            let mut got = SetPoint::default();
+            Step::new(ms).between(&a, &b, u, &mut got);
             // A step of a minute leads far away between its ends.
             let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
             for j in 0..JOINTS {
@@ -246,9 +245,11 @@ mod tests {
         /// Where a trajectory has a point, it is met to the last bit, and at rest it is at rest.
         #[test]
         fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
-            let step = Step::new(ms);
-            prop_assert_eq!(step.between(&a, &b, 0.0), SetPoint::from(&a));
-            prop_assert_eq!(step.between(&a, &b, 1.0), SetPoint::from(&b));
+            let (step, mut at) = (Step::new(ms), SetPoint::default());
+            step.between(&a, &b, 0.0, &mut at);
+            prop_assert_eq!(at, SetPoint::from(&a));
+            step.between(&a, &b, 1.0, &mut at);
+            prop_assert_eq!(at, SetPoint::from(&b));
         }
 
         /// The speed of the position is its derivative.

@@ -124,6 +124,11 @@ impl PathClock {
         self.rate != self.target
     }
 
+    /// Path time goes as fast as time.
+    pub fn at_full_speed(&self) -> bool {
+        self.rate == 1.0 && self.target == 1.0
+    }
+
     /// Moves on by one tick, at most to `end` (ms).
     pub fn advance(&mut self, end: f64) {
         self.time = (self.time + self.rate).min(end);

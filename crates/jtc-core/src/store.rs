@@ -126,18 +126,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
-    #[inline(always)]
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
-        let points = self.points.as_ref().get(..self.received)?;
+        let mut at = SetPoint::default();
+        self.put(time_ms, &mut at).then_some(at)
+    }
+
+    /// The same put where they are wanted, in place of what is there; false without points.
+    #[inline]
+    pub fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
+        let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
         // The product may be rounded to below a point that the time has reached. `as` saturates: a negative or NaN time is point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
-        let start = points.get(index).or(points.last())?;
+        let Some(start) = points.get(index).or(points.last()) else { return false };
         // Also at a point itself and at the last one, where it changes nothing: the same work in every tick.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),
         };
-        Some(self.step.between(start, end, u))
+        self.step.between(start, end, u, at);
+        true
     }
 }

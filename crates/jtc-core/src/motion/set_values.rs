@@ -165,10 +165,6 @@ impl SetValues {
 
     /// A tick on the path: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
     pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
-        if rate == 1.0 && slope == 0.0 {
-            self.point = *at;
-            return;
-        }
         self.point.position = at.position;
         for j in 0..JOINTS {
             self.point.velocity[j] = at.velocity[j] * rate;

@@ -11,7 +11,7 @@ use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
 const LOADS: [(f64, f64, bool); 6] = [
     (0.90, 0.2, true),
     (0.95, 0.2, true),
-    (0.99, 0.2, true),
+    (0.97, 0.2, true),
     (0.99, 0.4, false),
     (1.02, 0.2, false),
     (1.02, 0.4, false),

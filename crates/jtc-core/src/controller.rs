@@ -150,7 +150,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            teachable: self.motion.may_be_taught(&self.config),
+            teachable: self.teaching && self.motion.may_be_taught(&self.config),
             execute: self.trajectory == TrajectoryState::Execute,
         }
     }

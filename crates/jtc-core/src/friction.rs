@@ -2,20 +2,26 @@
 use crate::interpolation::ROUNDING;
 use crate::parameters::TableOf;
 
-/// Sign of a speed, smoothed: a straight line between −`width` and `width` (rad/s).
-fn smooth_sign(v: f64, width: f64) -> f64 {
-    // The quotient is the same for every joint of a tick.
-    (v * (1.0 / width)).clamp(-1.0, 1.0)
-}
-
 /// Torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
 /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³); the temperature factor is kept within 0.2..2, because the straight line of
 /// the measured drives changes its sign near 60 °C and compensation would become drag.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
-    let s = smooth_sign(v, sign_width);
-    let factor = (1.0 + c[4] * (t - c[5])).clamp(0.2, 2.0);
+    polynomial_by_slope(c, v, t, 1.0 / sign_width)
+}
+
+/// The same; `sign_slope`: one over the speed at which the sign of the speed, which is a straight line around 0, is whole, s/rad.
+#[inline]
+pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
+    // A speed that is NaN makes the torque NaN by c1.
+    let s = within(v * sign_slope, -1.0, 1.0);
+    let factor = within(1.0 + c[4] * (t - c[5]), 0.2, 2.0);
     factor * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
+}
+
+/// Not `clamp`, which compares: the board has an instruction for each of these.
+fn within(x: f64, low: f64, high: f64) -> f64 {
+    x.max(low).min(high)
 }
 
 /// Lowest and highest velocity of the table, rad/s.

@@ -12,7 +12,7 @@ pub(crate) struct Conditions {
     pub initialised: bool,
     /// The host has enabled teaching.
     pub teaching: bool,
-    /// The arm is held at rest, and what it carries is known, or does not count (J-25).
+    /// The arm is held at rest, and what it carries is known, or does not count (J-25); asked only when teaching is.
     pub teachable: bool,
     /// A trajectory is being executed.
     pub execute: bool,

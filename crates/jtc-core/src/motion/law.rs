@@ -154,7 +154,6 @@ impl ControlLaw {
         saturated: &[bool; JOINTS],
     ) -> [u16; JOINTS] {
         let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
-        let mut errors = [0; JOINTS];
         let before = self.transfer.begin(&self.torque);
         let q = nodes.positions();
         let v = nodes.velocities();
@@ -168,11 +167,14 @@ impl ControlLaw {
         } else {
             [0.0; JOINTS]
         };
+        let (friction, errors) =
+            if mode.moves() { compensation(inputs, &qd) } else { ([0.0; JOINTS], [0; JOINTS]) };
         for j in 0..JOINTS {
             let limit = &config.joints[j];
             let mut torque = JointTorque {
                 model: model[j] + limit.rotor_inertia * qdd[j],
                 payload: payload[j],
+                friction: friction[j],
                 ..JointTorque::default()
             };
             if mode != ControlMode::Teach {
@@ -180,23 +182,6 @@ impl ControlLaw {
                 let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
                 torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step);
-            }
-            if mode.moves() {
-                let t = friction::celsius(nodes.node(j).report.temperature);
-                torque.friction = match parameters.table {
-                    None => {
-                        friction::polynomial(&parameters.polynomial[j], qd[j], t, config.friction_sign_width)
-                    }
-                    Some(tables) => {
-                        let (slowest, fastest) = friction::velocities(&tables[j]);
-                        let nearest = qd[j].max(slowest).min(fastest);
-                        let v = if mode == ControlMode::Approach { nearest } else { qd[j] };
-                        friction::table(&tables[j], v, t).unwrap_or_else(|| {
-                            errors[j] |= joint_error::FRICTION_TABLE;
-                            0.0
-                        })
-                    }
-                };
             }
             self.torque[j] = torque;
         }
@@ -242,6 +227,32 @@ impl ControlLaw {
             torque.blend += correction.max(-most).min(most) - correction;
         }
     }
+}
+
+/// Torques that compensate friction at the commanded velocities, N·m, and joint errors: a velocity that the table has not (J-42).
+#[inline]
+fn compensation(inputs: &LawInputs<'_>, velocity: &[f64; JOINTS]) -> ([f64; JOINTS], [u16; JOINTS]) {
+    let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
+    let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
+    let celsius = |j: usize| friction::celsius(nodes.node(j).report.temperature);
+    let Some(tables) = parameters.table else {
+        let sign_slope = 1.0 / config.friction_sign_width;
+        for j in 0..JOINTS {
+            torque[j] =
+                friction::polynomial_by_slope(&parameters.polynomial[j], velocity[j], celsius(j), sign_slope);
+        }
+        return (torque, errors);
+    };
+    for j in 0..JOINTS {
+        let (slowest, fastest) = friction::velocities(&tables[j]);
+        let nearest = velocity[j].max(slowest).min(fastest);
+        let v = if mode == ControlMode::Approach { nearest } else { velocity[j] };
+        torque[j] = friction::table(&tables[j], v, celsius(j)).unwrap_or_else(|| {
+            errors[j] |= joint_error::FRICTION_TABLE;
+            0.0
+        });
+    }
+    (torque, errors)
 }
 
 /// As much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.

@@ -32,6 +32,8 @@ pub(super) struct Transfer {
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
+    /// Time left until nothing is left of any of them, ms.
+    left_ms: u16,
     /// Joints that were latched in this tick: their torque starts from that of the model.
     just_enabled: [bool; JOINTS],
     /// The next torque has to continue the last one.
@@ -74,22 +76,41 @@ impl Transfer {
     ) {
         if let Some((continued, before)) = before {
             for j in 0..JOINTS {
-                (self.step[j], self.step_ms[j]) = (before[j] - continued.of(&torque[j]), 0);
+                self.begin_step(j, before[j] - continued.of(&torque[j]), config);
             }
         }
-        let per_tick = 1.0 / f64::from(config.blend_ms.max(1));
-        for j in 0..JOINTS {
-            if core::mem::take(&mut self.just_enabled[j]) {
-                (self.step[j], self.step_ms[j]) = (-torque[j].correction(), 0);
+        if self.just_enabled.contains(&true) {
+            for j in 0..JOINTS {
+                if core::mem::take(&mut self.just_enabled[j]) {
+                    self.begin_step(j, -torque[j].correction(), config);
+                }
             }
-            let left = 1.0 - smooth(f64::from(self.step_ms[j]) * per_tick);
-            self.step_ms[j] = self.step_ms[j].saturating_add(1);
-            if nodes.node(j).enabled() {
-                torque[j].blend = self.step[j] * left;
-            } else {
-                torque[j] = JointTorque::default();
+        }
+        if self.left_ms > 0 {
+            self.left_ms -= 1;
+            self.blend_steps(torque, config);
+        }
+        for (j, torque) in torque.iter_mut().enumerate() {
+            if !nodes.node(j).enabled() {
+                *torque = JointTorque::default();
                 self.step[j] = 0.0;
             }
+        }
+    }
+
+    /// A step of a joint is to be blended out from now on.
+    fn begin_step(&mut self, j: usize, step: f64, config: &Config) {
+        (self.step[j], self.step_ms[j]) = (step, 0);
+        self.left_ms = config.blend_ms.max(1);
+    }
+
+    /// Adds what is left of the steps in this tick.
+    fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS], config: &Config) {
+        let per_tick = 1.0 / f64::from(config.blend_ms.max(1));
+        for j in 0..JOINTS {
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) * per_tick);
+            self.step_ms[j] = self.step_ms[j].saturating_add(1);
+            torque[j].blend = self.step[j] * left;
         }
     }
 }

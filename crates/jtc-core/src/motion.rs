@@ -85,7 +85,9 @@ impl Motion {
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> ([f64; JOINTS], [u16; JOINTS]) {
         let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
         let mut limited = self.limiter.step(inputs, &self.law.torque, &mut self.set);
-        self.law.sag(&limited.sag);
+        if let Some(sag) = &limited.sag {
+            self.law.sag(sag);
+        }
         for (j, error) in limited.errors.iter_mut().enumerate() {
             if inputs.nodes.node(j).enabled() {
                 *error |= missing[j];

@@ -138,11 +138,9 @@ impl ControlLaw {
     }
 
     /// The set positions of joints have sagged, rad: that is no motion.
-    pub fn sag(&mut self, sag: &[Option<f64>; JOINTS]) {
-        for (pid, sag) in self.pid.iter_mut().zip(sag) {
-            if let Some(way) = sag {
-                pid.shift(*way);
-            }
+    pub fn sag(&mut self, sag: &[f64; JOINTS]) {
+        for (pid, way) in self.pid.iter_mut().zip(sag) {
+            pid.shift(*way);
         }
     }
 

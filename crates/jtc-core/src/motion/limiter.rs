@@ -20,8 +20,8 @@ pub(crate) struct Limited {
     pub torque: [f64; JOINTS],
     /// Joint errors found.
     pub errors: [u16; JOINTS],
-    /// By how much the set position of a joint has sagged whose load is being caught, rad.
-    pub sag: [Option<f64>; JOINTS],
+    /// By how much the set positions of joints have sagged whose loads are being caught, rad; `None` where none is.
+    pub sag: Option<[f64; JOINTS]>,
 }
 
 impl Limiter {
@@ -39,7 +39,7 @@ impl Limiter {
         set: &mut SetValues,
     ) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        let mut limited = Limited { torque: [0.0; JOINTS], errors: [0; JOINTS], sag: [None; JOINTS] };
+        let mut limited = Limited { torque: [0.0; JOINTS], errors: [0; JOINTS], sag: None };
         // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
         let on_path = braking && mode == ControlMode::Follow;
         let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
@@ -56,7 +56,8 @@ impl Limiter {
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
             let set_error = limits::check_set(point, q[j], limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
-                limited.sag[j] = Some(set.sag(j, computed - within, parameters.pid[j].kp, q[j], limits));
+                let sag = set.sag(j, computed - within, parameters.pid[j].kp, q[j], limits);
+                limited.sag.get_or_insert([0.0; JOINTS])[j] = sag;
             }
             limited.torque[j] = within;
             limited.errors[j] = torque_error

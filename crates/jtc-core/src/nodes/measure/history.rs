@@ -1,8 +1,10 @@
 //! The last usable answers of a joint, and the rate of their positions.
 use crate::DT;
 
-/// Answers that are kept, and milliseconds over which a rate is taken at least.
+/// Answers that are looked at, and milliseconds over which a rate is taken at least.
 const WINDOW: usize = 5;
+/// Slots of the ring: a power of two, so that an index needs no comparison.
+const SLOTS: usize = WINDOW.next_power_of_two();
 const WINDOW_MS: u32 = 5;
 /// One over the time that it is taken over while no answer is lost, 1/s.
 const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
@@ -35,23 +37,21 @@ pub(super) struct Rate {
 /// The last answers, in a ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
-    answers: [Answered; WINDOW],
-    /// Where the next one goes: the oldest is there, once there are so many.
+    answers: [Answered; SLOTS],
+    /// Where the next one goes; it wraps around.
     next: u8,
-    /// How many there are.
+    /// How many there are, of those that are looked at.
     known: u8,
     /// Which were about where they had been predicted; the newest is bit 0.
     as_predicted: u8,
 }
 
 impl History {
-    /// Keeps an answer in place of the oldest.
+    /// Keeps an answer.
     pub fn push(&mut self, answer: Answered, as_predicted: bool) {
-        if let Some(slot) = self.answers.get_mut(usize::from(self.next)) {
-            *slot = answer;
-        }
-        self.next = if usize::from(self.next) + 1 < WINDOW { self.next + 1 } else { 0 };
-        self.known = self.known.saturating_add(1).min(WINDOW as u8);
+        self.answers[usize::from(self.next) % SLOTS] = answer;
+        self.next = self.next.wrapping_add(1);
+        self.known = (self.known + 1).min(WINDOW as u8);
         self.as_predicted = self.as_predicted << 1 | u8::from(as_predicted);
     }
 
@@ -85,10 +85,7 @@ impl History {
 
     /// The answer before which `n` younger ones came.
     fn nth(&self, n: usize) -> &Answered {
-        let behind = usize::from(self.next) + WINDOW - 1 - n.min(WINDOW - 1);
-        // An index of this type's own; the first slot stands in rather than a panic.
-        let at = if behind < WINDOW { behind } else { behind - WINDOW };
-        self.answers.get(at).unwrap_or(&self.answers[0])
+        &self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS]
     }
 }
 

@@ -49,8 +49,8 @@ impl Limiter {
             let computed = torque[j].sum();
             let catching = set.catch[j].step(v[j]) && mode == ControlMode::Hold;
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
-            let driven = computed.signum() * v[j] > DRIVEN;
-            let stopping = (catching || set.deceleration[j].is_some()) && !driven;
+            let driven = || computed.signum() * v[j] > DRIVEN;
+            let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let (within, torque_error) =
                 self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);

@@ -106,7 +106,8 @@ impl Answer {
         }
     }
 
-    /// Controller side.
+    /// Controller side. Inlined, so that a report is not stored by bytes and copied by words, which a PC waits for.
+    #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
         if usize::from(node) >= NODES {
@@ -153,6 +154,7 @@ impl Answer {
     }
 }
 
+#[inline]
 fn joint(frame: &Frame, scale: Scale) -> JointReport {
     let long = frame.data().len() >= field::LONG_LEN;
     JointReport {

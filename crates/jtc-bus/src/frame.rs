@@ -71,6 +71,7 @@ impl Frame {
         Self { id: id & 0x7FF, len: LEN as u8, data: [0; MAX_LEN] }
     }
 
+    #[inline]
     pub(crate) fn put<const N: usize>(&mut self, at: usize, bytes: [u8; N]) {
         if let Some(place) = self.data.get_mut(at..at + N) {
             place.copy_from_slice(&bytes);
@@ -78,6 +79,7 @@ impl Frame {
     }
 
     /// Bytes at a place; beyond the payload they are 0, as in a node's receive buffer.
+    #[inline]
     pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
         if let Some(place) = self.data.get(at..at + N) {
@@ -86,11 +88,13 @@ impl Frame {
         bytes
     }
 
+    #[inline]
     pub(crate) fn byte(&self, at: usize) -> u8 {
         self.get::<1>(at)[0]
     }
 
     /// The payload.
+    #[inline]
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
@@ -111,6 +115,7 @@ impl Frame {
         Self::new(id, data.get(..len_of(dlc)?)?)
     }
 
+    #[inline]
     pub(crate) fn need(&self, need: u8) -> Result<(), FrameError> {
         if self.len < need {
             return Err(FrameError::TooShort { id: self.id, len: self.len, need });

@@ -28,6 +28,7 @@ impl Default for Scale {
 }
 
 /// Nearest 16-bit value, within ±32767; NaN is 0.
+#[inline]
 pub(crate) fn to_i16(value: f64, full_scale: f64) -> [u8; 2] {
     (nearest(value, full_scale, f64::from(i16::MAX)) as i16).to_be_bytes()
 }
@@ -39,10 +40,12 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
 
 /// The quotient is taken first: it is the same for every answer of a tick, and a division takes the board as long as seven
 /// products.
+#[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
 }
 
+#[inline]
 pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }

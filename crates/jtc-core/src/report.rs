@@ -57,7 +57,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// A JtcStatus is due: at once for a response, else every period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        let due = free && (!self.records.is_empty() || self.since_status_ms >= self.config.status_period_ms);
+        // Found out also where the line is busy: the same work in every tick.
+        let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
+        let due = wanted && free;
         if due {
             self.since_status_ms = 0;
         }

@@ -58,6 +58,9 @@ impl Errors {
     }
 
     pub fn raise_can(&mut self, flags: u32) {
+        if flags == 0 {
+            return;
+        }
         self.can |= flags;
         self.can_occurred |= flags;
         self.occurred |= self.word();

@@ -39,12 +39,12 @@ impl Limiter {
         set: &mut SetValues,
     ) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        let mut limited = Limited { torque: [0.0; JOINTS], errors: [0; JOINTS], sag: None };
+        let mut sags = None;
         // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
         let on_path = braking && mode == ControlMode::Follow;
         let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         let (q, v) = (nodes.positions(), nodes.velocities());
-        for j in 0..JOINTS {
+        let joints: [(f64, u16); JOINTS] = core::array::from_fn(|j| {
             let limits = &config.joints[j];
             let computed = torque[j].sum();
             let catching = set.catch[j].step(v[j]) && mode == ControlMode::Hold;
@@ -57,12 +57,16 @@ impl Limiter {
             let set_error = limits::check_set(point, q[j], limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
                 let sag = set.sag(j, computed - within, parameters.pid[j].kp, q[j], limits);
-                limited.sag.get_or_insert([0.0; JOINTS])[j] = sag;
+                sags.get_or_insert([0.0; JOINTS])[j] = sag;
             }
-            limited.torque[j] = within;
-            limited.errors[j] = torque_error
-                | if mode != ControlMode::Teach && set.holding[j] { set_error & !excused } else { 0 };
+            let set_error =
+                if mode != ControlMode::Teach && set.holding[j] { set_error & !excused } else { 0 };
+            (within, torque_error | set_error)
+        });
+        Limited {
+            torque: joints.map(|(torque, _)| torque),
+            errors: joints.map(|(_, error)| error),
+            sag: sags,
         }
-        limited
     }
 }

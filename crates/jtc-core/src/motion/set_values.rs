@@ -108,6 +108,9 @@ impl SetValues {
     pub fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
+        if self.holding == [true; JOINTS] && enabled == self.holding {
+            return Latched { held: enabled, just_enabled: [false; JOINTS] };
+        }
         let held = core::array::from_fn(|j| enabled[j] && self.holding[j]);
         let just_enabled: [bool; JOINTS] = core::array::from_fn(|j| enabled[j] && !self.holding[j]);
         let another = just_enabled.contains(&true);

@@ -2,10 +2,11 @@
 //! program is asked to store by its mailbox, which only a test or a debugger can reach.
 mod rig;
 
+use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::flash::{BANK2, Bank2, OperationKind, WORD, sr};
 use openjtc_emulator::observe::ResetCause;
-use openjtc_emulator::{BoardConfig, FIRST_LINE, Machine};
+use openjtc_emulator::{BoardConfig, FIRST_LINE, Machine, Port};
 use rig::{BOARDS, Rig, elf};
 
 /// Interrupt of the tick.
@@ -132,6 +133,55 @@ fn j54_a_stored_image_outlasts_the_power() {
     store(&mut rig, &images[1]);
     let rig = board(rig.board.machine.cut_power(9));
     assert_eq!(loaded(&rig.board.machine), Some((images[1].clone(), 6)));
+}
+
+/// J-50 to J-54: a host gives the board an arm by frames, has it stored, and after a loss of power the defaults mean it.
+#[test]
+fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
+    const HOST: Port = Port::Usart3;
+    let mut rig = board(Bank2::default());
+    rig.ask(HOST, &fixed::GET_INFO);
+    rig.run(60);
+    let info = rig.hosts[1].info.expect("an Info");
+    assert_eq!((info.store, info.boots, info.board.as_str()), (StoreState::Empty, 1, BOARDS[0]));
+    assert_eq!(rig.hosts[0].info, None, "the other line is told nothing");
+
+    let mut settings = [0; 26];
+    let values = [
+        SettingValue { setting: 33, joint: 0, value: 1.5 },
+        SettingValue { setting: 8, joint: 3, value: 1.3 },
+    ];
+    let n = set_settings(&mut settings, values).expect("it fits");
+    rig.ask(HOST, &settings[..n]);
+    rig.ask(HOST, &fixed::set_name(&Name::cut("on the wall")));
+    for frame in
+        [fixed::FRICTION_POLYNOMIAL_USE_DEFAULT, fixed::PID_PARAM_USE_DEFAULT, fixed::ARM_MODEL_USE_DEFAULT]
+    {
+        rig.ask(HOST, &frame);
+    }
+    rig.ask(HOST, &fixed::STORE_ARM);
+    rig.wait("the arm is stored", 4_000, |rig| !working(rig));
+    assert_eq!(mailbox(&rig.board.machine).state, DONE);
+    rig.ask(HOST, &fixed::GET_INFO);
+    rig.run(60);
+    let given = rig.hosts[1].info.expect("an Info");
+    assert_eq!((given.store, given.sequence, given.arm.as_str()), (StoreState::Stored, 1, "on the wall"));
+
+    let mut rig = board(rig.board.machine.cut_power(5));
+    rig.ask(HOST, &fixed::GET_INFO);
+    rig.run(60);
+    let again = rig.hosts[1].info.expect("an Info");
+    assert_eq!((again.arm, again.defaults_stored, again.missing), (given.arm, true, 7));
+    for frame in
+        [fixed::FRICTION_POLYNOMIAL_USE_DEFAULT, fixed::PID_PARAM_USE_DEFAULT, fixed::ARM_MODEL_USE_DEFAULT]
+    {
+        rig.ask(HOST, &frame);
+    }
+    rig.ask(HOST, &fixed::GET_INFO);
+    rig.run(60);
+    let used = rig.hosts[1].info.expect("an Info");
+    assert_eq!((used.hash, used.missing), (given.hash, 0));
+    clean(&mut rig);
 }
 
 /// J-12: a sector is erased for two seconds and more; every tick comes at its time, with the same instructions as if nothing were

@@ -26,8 +26,10 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
 pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has; where it is safe \
                 to use that, leave --arm out or add --accept-device-limits";
-    let message =
-        |count: &str| format!("{}: the controller has another arm, {}: {count} differ", arm.name, has.name);
+    let message = |count: &str| {
+        let verb = if count.starts_with("1 ") { "differs" } else { "differ" };
+        format!("{}: the controller has another arm, {}: {count} {verb}", arm.name, has.name)
+    };
     listed(arm.differences(has), accepted, ("other-arm", message, hint), out)
 }
 

@@ -151,3 +151,39 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     let refused = sim.jtc(&["jog", "1", "0.1"]).ends(1);
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
+
+/// The simulated board keeps its arm as flash does: in a file, over the end of the simulator.
+#[test]
+fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let kept = dir.path().join("flash.bin");
+    let kept = kept.to_str().unwrap();
+    let sim = Sim::start(&["--no-throttle", "--speed", "max", "--store", kept]);
+    let arm = another(&sim);
+    let pushed = sim.json(&["arm", "push", &arm, "--store"], 0);
+    assert_eq!(sim.end("-TERM").0, 0);
+    let sim = Sim::start(&["--no-throttle", "--speed", "max", "--store", kept]);
+    let info = sim.json(&["info"], 0);
+    assert_eq!((info["arm"].as_str(), info["missing"].as_array().unwrap().len()), (Some("another"), 3));
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
+    drop(sim);
+    std::fs::write(kept, "no arm").unwrap();
+    let refused = jtc(&["sim", "--serial", "/nowhere/tty", "--store", kept]).ends(2);
+    assert!(refused.err.contains("holds no stored arm"), "{}", refused.err);
+}
+
+/// A simulated arm of one's own: its controller knows it as a board does, from its memory.
+#[test]
+fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = include_str!("../../../arms/avena.toml").replacen("name = \"avena\"", "name = \"mine\"", 1);
+    let arm = dir.path().join("mine.toml");
+    std::fs::write(&arm, text.replacen("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 1.1", 1)).unwrap();
+    let arm = arm.to_str().unwrap();
+    let sim = Sim::start(&["--no-throttle", "--speed", "max", "--arm", arm]);
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let info = sim.json(&["info"], 0);
+    assert_eq!((info["arm"].as_str(), info["defaults"].as_str()), (Some("mine"), Some("stored")));
+    assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
+}

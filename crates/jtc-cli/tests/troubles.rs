@@ -54,7 +54,6 @@ fn arms(page: &mut Page, desk: &Desk) {
         ("An arm that its drives cannot hold", "jtc arm check weak.toml"),
         ("An arm file of an older form", "jtc params show old.toml"),
         ("A trajectory instead of an arm file", "jtc traj check motion.csv --arm motion.csv"),
-        ("An arm whose limits the controller does not have", "jtc traj run motion.csv --arm slower.toml"),
     ] {
         page.case(title, command, &desk.run(command));
     }
@@ -74,7 +73,17 @@ fn link(page: &mut Page, desk: &Desk) {
     page.case("Another rate, or another device", "jtc status", &noisy.run("jtc status").blurred());
     let sim = Desk::simulated(&["--speed", "max", "--no-throttle"]);
     page.case("No parameters yet", "jtc traj run motion.csv", &sim.run("jtc traj run motion.csv"));
+    let push = "jtc params push slower.toml";
+    page.case("An arm whose limits the controller does not have", push, &sim.run(push));
     sim.run("jtc params use-defaults");
+    let other = "jtc traj run motion.csv --arm slower.toml";
+    page.case("A run for another arm than the controller has", other, &sim.run(other));
+    page.case(
+        "Settings while the arm is held",
+        "jtc arm push slower.toml",
+        &sim.run("jtc arm push slower.toml"),
+    );
+    page.case("No joint is jogged that fast", "jtc jog 1 5", &sim.run("jtc jog 1 5"));
     let second = "jtc sim --serial /tmp/jtc";
     page.case("A second simulator at the same place", second, &sim.run(second));
     page.case("Stop, and nothing moves", "jtc traj stop", &sim.run("jtc traj stop"));

@@ -145,6 +145,11 @@ impl Board {
         self.boot();
     }
 
+    /// The settings that the controller has.
+    pub fn controller_config(&self) -> &Config {
+        self.controller.config()
+    }
+
     /// The arm in the memory that lasts, and its number.
     pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))

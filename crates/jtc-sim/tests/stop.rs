@@ -163,6 +163,8 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
     operator
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
+    // Only who asked is told why (J-51).
+    operator.ask(&fixed::GET_INFO).expect("it answers");
     operator.listener.responses.clear();
     // An Execute behind gains that are executed one a tick, and a Stop behind it.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();

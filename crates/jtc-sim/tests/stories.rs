@@ -49,6 +49,10 @@ fn j33_pause_and_resume_stay_on_the_path() {
 fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
     let mut operator = held();
     operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
+    // Existing hosts know no data status above 6 (J-51).
+    let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
+    assert_eq!(response.data, DataStatus::IncorrectValue);
+    operator.ask(&jtc_wire::fixed::GET_INFO).unwrap();
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::StartPositionMismatch);
     let before = operator.world.truth().q;

@@ -38,7 +38,9 @@ pub fn fast_elf() -> Elf {
 /// The record at the fixed address, as `docs/board.md` has it.
 #[derive(Debug)]
 pub struct Version {
+    pub version: String,
     pub board: String,
+    pub build: String,
     pub points: u32,
     pub segments: u32,
     pub segment_points: u32,
@@ -58,7 +60,9 @@ pub fn version(elf: &Elf) -> Option<Version> {
         return None;
     }
     let number = |n: usize| u32::from_le_bytes(bytes[72 + 4 * n..][..4].try_into().expect("four"));
-    let board = String::from_utf8_lossy(&bytes[24..48]).trim_end_matches('\0').to_owned();
+    let text =
+        |at: std::ops::Range<usize>| String::from_utf8_lossy(&bytes[at]).trim_end_matches('\0').to_owned();
+    let (version, board, build) = (text(12..24), text(24..48), text(48..72));
     let [points, segments, segment_points, tick_hz, baud, core_hz] = core::array::from_fn(number);
-    Some(Version { board, points, segments, segment_points, tick_hz, baud, core_hz })
+    Some(Version { version, board, build, points, segments, segment_points, tick_hz, baud, core_hz })
 }

@@ -1,7 +1,7 @@
 //! A host on a line: what it sent, and what it received.
 use std::collections::VecDeque;
 
-use jtc_wire::{FrameRef, Response, Status, StatusReceiver};
+use jtc_wire::{Answer, FrameRef, FromDevice, Info, Response, Status, StatusReceiver};
 use openjtc_emulator::WireByte;
 use openjtc_emulator::clock::Time;
 
@@ -19,6 +19,8 @@ pub struct Host {
     receiver: StatusReceiver,
     /// The newest status.
     pub last: Option<Status>,
+    /// The newest Info.
+    pub info: Option<Info>,
     /// When statuses were complete.
     pub times: Vec<Time>,
     /// Records received, oldest first.
@@ -44,10 +46,14 @@ impl Host {
                 panic!("byte {} from the device, {:#04x}, belongs to no status", self.received, byte.byte);
             }
             let mut one = &[byte.byte][..];
-            if let Some(status) = self.receiver.next(&mut one) {
-                self.records.extend(status.response());
-                self.last = Some(status);
-                self.times.push(byte.end);
+            match self.receiver.next_frame(&mut one) {
+                Some(FromDevice::Status(status)) => {
+                    self.records.extend(status.response());
+                    self.last = Some(status);
+                    self.times.push(byte.end);
+                }
+                Some(FromDevice::Answer(Answer::Info(info))) => self.info = Some(info),
+                Some(FromDevice::Answer(_)) | None => {}
             }
         }
     }

@@ -17,13 +17,14 @@ use openjtc_emulator::{Board, BoardConfig, Port};
 use jtc_core::{ControllerState, Telemetry};
 use jtc_sim::invariants::{Invariants, Moment};
 use jtc_sim::{FaultKind, host as frames};
-use jtc_wire::{DataStatus, FrameStatus, Response, Status};
+use jtc_wire::{DataStatus, FrameStatus, Response, Status, StoreState};
 
 #[allow(unused_imports, reason = "each test uses its part")]
 pub use elf::{BOARDS, Version, elf, fast_elf, version};
 pub use flight::{FLIGHT_SIZE, Flight};
 pub use host::Host;
 pub use shadow::Shadow;
+use shadow::Start;
 
 /// Both lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
@@ -54,6 +55,7 @@ pub struct Rig {
     pub ticks: u64,
     invariants: Invariants,
     flight_at: u32,
+    mailbox_at: u32,
     resets: usize,
     /// Frames that the last ticks gave out and that were not on the bus yet.
     to_pass: Vec<jtc_bus::Frame>,
@@ -73,6 +75,7 @@ impl Rig {
     /// With this very program.
     pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
         let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
+        let mailbox_at = elf.symbol("ARM_STORE").expect("the mailbox").address;
         let board = Board::new(elf, config);
         Self {
             board,
@@ -84,6 +87,7 @@ impl Rig {
             ticks: 0,
             invariants: Invariants::default(),
             flight_at,
+            mailbox_at,
             resets: 1,
             to_pass: Vec::new(),
         }
@@ -124,8 +128,15 @@ impl Rig {
     fn ticked(&mut self, flight: Flight) {
         let ms = self.board.now_ms();
         self.ticks = flight.tick;
-        let shadow = self.shadow.get_or_insert_with(|| Shadow::new(flight.cause));
+        let start = self.shadow.is_none().then(|| self.start(flight.cause));
+        let [state, _, sequence, ..] = self.mailbox();
+        let shadow = self.shadow.get_or_insert_with(|| Shadow::new(start.expect("it has just started")));
         shadow.tick(&flight, &mut self.hosts);
+        match state {
+            3 => shadow.stored(StoreState::Stored, sequence),
+            4 => shadow.stored(StoreState::Failed, sequence),
+            _ => {}
+        }
         self.to_pass.extend(flight.sent);
         let level = flight.safety_output;
         assert_eq!(self.board.safety_output(), Some(level), "{ms} ms: safety output");
@@ -144,6 +155,22 @@ impl Rig {
             panic!("{violation}");
         }
         self.flight = flight;
+    }
+
+    /// The program's mailbox of the stored arm: words in the order of `firmware/src/arm_store.rs`.
+    fn mailbox(&self) -> [u32; 8] {
+        core::array::from_fn(|n| self.board.machine.word(self.mailbox_at + 4 * n as u32).expect("memory"))
+    }
+
+    /// How the board has just started.
+    fn start(&self, cause: u32) -> Start {
+        let [.., address, length, sequence] = self.mailbox();
+        let arm = (address != 0).then(|| {
+            let image = self.board.machine.memory(address, length as usize).expect("memory");
+            (image, sequence)
+        });
+        let version = version(self.board.machine.elf()).expect("the record of the version");
+        Start { cause, boots: self.resets as u32, version, arm }
     }
 
     /// What the controller sent passes unchanged and in order, or not at all.

@@ -1,8 +1,9 @@
 //! The same controller on this machine.
-use jtc_core::{Config, Controller, HostEvent, Inputs, POINTS_MAX, Telemetry};
+use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::Worked;
-use jtc_wire::{FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status};
+use jtc_wire::{BootCause, FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status, StoreState};
 
+use super::elf::Version;
 use super::flight::{Event, Flight};
 use super::host::Host;
 
@@ -16,15 +17,48 @@ pub struct Shadow {
     pub worked: Vec<Worked>,
 }
 
+/// How a board started.
+pub struct Start {
+    /// Cause, as the flight record has it.
+    pub cause: u32,
+    /// The how-manieth start it is.
+    pub boots: u32,
+    /// What the program is.
+    pub version: Version,
+    /// The arm that it found in its flash, and its number.
+    pub arm: Option<(Vec<u8>, u32)>,
+}
+
 impl Shadow {
     /// Beside a board that has just started.
-    pub fn new(cause: u32) -> Self {
+    pub fn new(start: Start) -> Self {
+        let Start { cause, boots, version, arm } = start;
         let points = vec![RawPoint::default(); POINTS_MAX];
         let mut controller = Controller::new(Config::default(), points);
+        controller.set_identity(Identity {
+            board: version.board.leak(),
+            firmware: version.version.leak(),
+            revision: version.build.leak(),
+            boots,
+            boot_cause: BootCause::from_byte(cause as u8).unwrap_or_default(),
+        });
+        match &arm {
+            None => controller.set_store_state(StoreState::Empty, 0),
+            Some((image, sequence)) => {
+                let taken = controller.load_arm(image);
+                let state = if taken { StoreState::Stored } else { StoreState::Failed };
+                controller.set_store_state(state, *sequence);
+            }
+        }
         if FAILED.contains(&cause) {
             controller.raise_internal();
         }
         Self { controller, worked: Vec::new() }
+    }
+
+    /// What has become of the arm that was to be stored, as the board's mailbox says after the tick.
+    pub fn stored(&mut self, state: StoreState, sequence: u32) {
+        self.controller.set_store_state(state, sequence);
     }
 
     /// What the last tick computed.
@@ -68,6 +102,10 @@ impl Shadow {
         if outputs.status {
             let status = *self.controller.status_frame();
             expect_status(&status, outputs.record_line, hosts);
+        }
+
+        if let Some(line) = outputs.answer_line {
+            hosts[line].expected.extend(self.controller.answer_frame());
         }
 
         let t = self.controller.telemetry();

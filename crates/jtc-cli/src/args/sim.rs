@@ -35,9 +35,12 @@ pub struct SimArgs {
     /// Path that becomes a symbolic link to the pseudo-terminal; default: its own name is printed
     #[arg(long, env = "JTC_SERIAL", value_name = "PATH")]
     pub serial: Option<PathBuf>,
-    /// Arm to simulate, TOML or URDF; default: the built-in one
+    /// Arm to simulate, TOML or URDF, which the controller has stored where the file is complete; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
+    /// File that keeps a stored arm, as the flash of a board does: read at the start, written by `jtc arm push --store`
+    #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
+    pub store: Option<PathBuf>,
     /// Rate of the simulated line, Bd: it is as slow as a real one
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200,
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]

@@ -46,12 +46,17 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let inputs: Vec<&Path> = [&args.arm, &args.faults].into_iter().filter_map(|p| p.as_deref()).collect();
     let file =
         args.record.as_deref().map(|path| OutputFile::open(path, args.force.force, &inputs)).transpose()?;
-    let config = SimConfig {
+    let stored = stored(args, &arm)?;
+    let mut config = SimConfig {
         baud: (!args.no_throttle).then_some(args.baud),
         seed: args.seed,
         faults,
         ..SimConfig::new(arm.config(), &arm.parameters())
     };
+    if stored.is_some() {
+        // What the controller knows of the arm it has as a board has it: from its memory, and from frames.
+        (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
+    }
     let support = config.support;
     let world = World::new(config);
     let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;
@@ -71,6 +76,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let tape = file.map(begin).transpose()?;
     let time_s = Server::new(world, pty, tap, Typed::listen())
         .recorded(tape.as_ref().map(Tape::sink))
+        .keeping(args.store.clone())
         .run(args.speed, &stop, ready)
         .map_err(Failure::usage)?;
     out.note(format!("ended after {time_s:.1} s of virtual time"));
@@ -79,6 +85,27 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     tape.finish(&Ending { outcome: "ended".into(), reason: "the simulator was ended".into() })?;
     out.note(format!("{name}: {time_s:.1} s, each millisecond of it"));
     Ok(())
+}
+
+/// The arm that the controller has stored: that of the file which keeps it, else the simulated one where its file is complete.
+#[cfg(unix)]
+fn stored(args: &SimArgs, arm: &jtc_host::arm::Arm) -> Result<Option<Vec<u8>>, Failure> {
+    let unreadable = |path: &std::path::Path, what: String| {
+        Failure::usage(format!("{}: {what}", path.display()))
+            .hint("name another file; `jtc arm push --store` writes it")
+    };
+    if let Some(path) = &args.store {
+        match std::fs::read(path) {
+            Ok(image) if jtc_wire::ArmImage::parse(&image).is_some() => return Ok(Some(image)),
+            Ok(_) => return Err(unreadable(path, "holds no stored arm".into())),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+            Err(e) => return Err(unreadable(path, e.to_string())),
+        }
+    }
+    if args.arm.is_none() {
+        return Ok(None);
+    }
+    arm.image().map_err(Failure::usage)
 }
 
 #[cfg(unix)]

@@ -4,6 +4,7 @@ mod frames;
 mod pty;
 mod typed;
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use can_link::CanBus;
@@ -46,6 +47,8 @@ pub struct Server {
     answers: bool,
     /// Takes every tick.
     sink: Option<SampleSink>,
+    /// Where a stored arm is kept, and the number of the one that is there.
+    keeps: Option<(PathBuf, u32)>,
 }
 
 impl Server {
@@ -63,12 +66,34 @@ impl Server {
             stalled: false,
             answers: false,
             sink: None,
+            keeps: None,
         }
     }
 
     /// Hands what each tick of the controller computed to `sink`.
     pub fn recorded(self, sink: Option<SampleSink>) -> Self {
         Self { sink, ..self }
+    }
+
+    /// Keeps what the controller stores in this file.
+    pub fn keeping(self, file: Option<PathBuf>) -> Self {
+        let number = self.world.stored_arm().map_or(0, |(_, number)| number);
+        Self { keeps: file.map(|file| (file, number)), ..self }
+    }
+
+    /// Writes an arm that the controller has just stored.
+    fn keep(&mut self) {
+        if let (Some((file, kept)), Some((image, number))) = (&mut self.keeps, self.world.stored_arm())
+            && *kept != number
+        {
+            *kept = number;
+            match host_kit::write_whole(file, image) {
+                Ok(()) => eprintln!("jtc: arm number {number} is kept in {}", file.display()),
+                Err(e) => {
+                    eprintln!("jtc: {}: {e}; the stored arm lasts as long as this simulator", file.display())
+                }
+            }
+        }
     }
 
     /// Runs until `stop`; calls `ready` when the first status has left the controller. Returns the virtual time, s.
@@ -99,6 +124,7 @@ impl Server {
             }
             self.typed.act(&mut self.world);
             self.world.step();
+            self.keep();
             if let Some(sink) = &self.sink
                 && self.world.ticked()
             {

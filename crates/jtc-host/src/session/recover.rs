@@ -248,7 +248,12 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn give(&mut self) -> Result<(), Error> {
-        (self.report)(&RecoverStep::Give(self.parameters.arm_name()));
+        let stored = match self.parameters {
+            ParameterSource::ControllerDefaults => self.session.info()?.filter(|info| info.defaults_stored),
+            _ => None,
+        };
+        let stored = stored.map(|info| format!("{}, the arm that is stored in the controller", info.arm));
+        (self.report)(&RecoverStep::Give(self.parameters.arm_name().or(stored)));
         self.session.give(self.parameters)?;
         self.given = true;
         self.session.pause_for(TAKEN_IN, &self.ended)

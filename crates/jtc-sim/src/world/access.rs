@@ -172,7 +172,7 @@ impl World {
             sent: self.sent.as_ref(),
             worked: &self.board.worked,
             safety_output: self.safety_output,
-            config: &self.config.controller,
+            config: self.board.controller_config(),
         }
     }
 

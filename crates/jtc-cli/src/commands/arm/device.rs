@@ -146,7 +146,7 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
         let mut text = if equal {
             format!("nothing differs: the controller has arm {}", arm.name)
         } else {
-            format!("{} differ\n{}", count(&differences), as_table(&differences))
+            format!("{}\n{}", count(&differences), as_table(&differences))
         };
         if !known {
             text += "\nthis controller has no extensions: compared with the settings that its kind is known to have; friction, \
@@ -158,7 +158,11 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
 }
 
 fn count(differences: &[Difference]) -> String {
-    if differences.len() == 1 { "1 value".into() } else { format!("{} values", differences.len()) }
+    if differences.len() == 1 {
+        "1 value differs".into()
+    } else {
+        format!("{} values differ", differences.len())
+    }
 }
 
 fn as_table(differences: &[Difference]) -> String {

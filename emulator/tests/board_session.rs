@@ -108,6 +108,7 @@ fn a_whole_session() {
     }
 
     // J-25.
+    rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);

@@ -130,6 +130,23 @@ pub enum ConfigError {
         /// Highest position, rad.
         limit: f64,
     },
+    /// A pause or stop may take longer than there is braking for it (J-33).
+    Braking {
+        /// [`Config::braking_ms_max`].
+        value: u16,
+        /// Twice [`Config::stop_ms`].
+        limit: u32,
+    },
+    /// The approach to the first point may be faster than the joint (J-34): it takes [`Config::ramp_ms`] for
+    /// [`Config::start_tolerance_rad`].
+    Approach {
+        /// Joint, from 1.
+        joint: usize,
+        /// The way, rad.
+        value: f64,
+        /// The time for it, ms.
+        limit: u16,
+    },
     /// The torque limit times the torque gain (J-61) is above what the bus carries.
     TorqueScale {
         /// Joint, from 1.
@@ -160,9 +177,11 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// The joint that it is about, from 1.
+    /// The joint that it is about, from 1; 0: the whole arm.
     pub const fn joint(&self) -> usize {
         match *self {
+            Self::Braking { .. } => 0,
+            Self::Approach { joint, .. } => joint,
             Self::Position { joint, .. }
             | Self::Range { joint, .. }
             | Self::TorqueScale { joint, .. }
@@ -187,6 +206,15 @@ impl core::fmt::Display for ConfigError {
                     "joint {joint}: lowest position {value} rad is not below the highest one, {limit} rad"
                 )
             }
+            Self::Braking { value, limit } => write!(
+                f,
+                "braking_ms_max {value} is below twice stop_ms, {limit}: a stop would end in an error while it goes on"
+            ),
+            Self::Approach { joint, value, limit } => write!(
+                f,
+                "joint {joint}: start_tolerance_rad {value} within ramp_ms {limit} is faster than its velocity or acceleration \
+                 limit"
+            ),
             Self::TorqueScale { joint, value, limit } => write!(
                 f,
                 "joint {joint}: torque limit times torque gain is {value} N·m, the bus carries {limit} N·m at most"
@@ -215,6 +243,10 @@ impl Config {
     /// The first joint whose limits the drives cannot do; a limit that is NaN is one.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
+        let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);
+        if (value as u32) < limit {
+            return Err(ConfigError::Braking { value, limit });
+        }
         let mut j = 0;
         while j < JOINTS {
             let limits = &self.joints[j];
@@ -240,6 +272,12 @@ impl Config {
             if !(limits.position_min < limits.position_max) {
                 let (value, limit) = (limits.position_min, limits.position_max);
                 return Err(ConfigError::Range { joint, value, limit });
+            }
+            // A minimum-jerk polynomial: 15/8 of the mean velocity, 5.774 of the way over the square of its time.
+            let (way, ramp_s) = (self.start_tolerance_rad, self.ramp_ms as f64 / 1000.0);
+            let slow = 1.875 * way <= limits.velocity_max * ramp_s;
+            if !(slow && 5.774 * way <= limits.acceleration_max * ramp_s * ramp_s) {
+                return Err(ConfigError::Approach { joint, value: way, limit: self.ramp_ms });
             }
             let value = limits.torque_max * limits.torque_gain;
             if !(value <= TORQUE_FULL_SCALE) {

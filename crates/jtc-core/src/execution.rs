@@ -170,10 +170,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             let ramp_ms = f64::from(self.config.ramp_ms);
             if self.clock.halting() {
                 self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
-            } else if self.clock.slowing() {
-                self.clock.ease_off(ramp_ms, bounds.easy);
             } else {
-                self.clock.speed_up(ramp_ms, bounds.easy);
+                self.clock.change_pace(ramp_ms, bounds.easy);
             }
         } else {
             self.clock.slope = 0.0;

@@ -19,6 +19,9 @@ use image::{ImageSource, StoredArm};
 /// Bytes of an arm image that are hashed or written in one tick.
 const IMAGE_PER_TICK: usize = 256;
 
+/// Most values of a SetSettings frame in a state with torque.
+const LIVE_MAX: usize = 4;
+
 /// Who the device is, as its board knows it (J-52).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Identity {
@@ -41,6 +44,8 @@ pub(crate) struct Extensions {
     pub stored: StoredArm,
     /// The stored arm is to be written to the memory that lasts.
     pub store_requested: bool,
+    /// An arm is stored, and is not in use: it could not be loaded, or could not be written. The built-in arm does not stand in.
+    pub unusable: bool,
     /// Of the arm in use; `None` when it has to be computed anew.
     pub hash: Option<u64>,
     /// Ticks since a host was heard.
@@ -57,6 +62,7 @@ impl Extensions {
             answers: Answers::new(),
             stored: StoredArm::new(),
             store_requested: false,
+            unusable: false,
             hash: None,
             hosts_silent_ms: 0,
             identity: Identity::default(),
@@ -74,18 +80,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// The arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
-    /// parameters stay missing. For the board to call before the first tick. False, and nothing is changed, when it is no arm that
-    /// this controller takes.
+    /// parameters stay missing. For the board to call before the first tick. False when it is no arm that this controller takes: its
+    /// settings stay as they were, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
-        let Some(arm) = ArmImage::parse(image) else { return false };
-        let Ok(config) = settings::with_values(&self.config, arm.settings.iter()) else { return false };
-        if !takes(&arm, &config) {
+        let arm = ArmImage::parse(image);
+        let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
+        let (Some(arm), Some(config)) = (arm, config) else {
+            self.extensions.unusable = true;
             return false;
+        };
+        self.extensions.unusable = !takes(&arm, &config);
+        if !self.extensions.unusable {
+            self.extensions.stored.set(image);
+            self.extensions.name = arm.name;
+            self.use_settings(config);
         }
-        self.extensions.stored.set(image);
-        self.extensions.name = arm.name;
-        self.use_settings(config);
-        true
+        !self.extensions.unusable
     }
 
     /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] says so; empty where there is none.
@@ -95,7 +105,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// What has become of the stored arm, and its number: for the board to call when that changes.
     pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
-        (self.extensions.store, self.extensions.sequence) = (state, sequence);
+        let before = core::mem::replace(&mut self.extensions.store, state);
+        self.extensions.sequence = sequence;
+        if before == StoreState::Busy && state == StoreState::Failed {
+            // After the next start it would be another one: until then there is none.
+            self.extensions.stored.clear();
+            self.extensions.unusable = true;
+        }
     }
 
     /// What an extension request returns, to be sent when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
@@ -106,12 +122,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// One of the extension requests.
     pub(crate) fn carry_out_extension(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
         match command {
+            command if self.asked_twice(line, &command) => SliceOutcome::Refused(DataStatus::NotAllowed),
             Command::GetInfo => self.get_info(line),
             Command::GetSettings { first } => {
                 self.get_settings(line, first);
                 SliceOutcome::Done
             }
-            Command::SetSettings(values) => self.set_settings(values).into(),
+            Command::SetSettings(values) => self.set_settings(values),
             Command::SetName(name) if self.settable() => {
                 self.extensions.name = name;
                 SliceOutcome::Done
@@ -174,6 +191,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn image(&self) -> ImageSource<'_> {
         ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
+    }
+
+    /// J-50: what was asked for on this line before is on its way.
+    fn asked_twice(&self, line: usize, command: &Command<'_>) -> bool {
+        let returns =
+            matches!(command, Command::GetInfo | Command::GetSettings { .. } | Command::GetArm { .. });
+        returns && self.extensions.answers.waits(line)
     }
 
     fn get_info(&mut self, line: usize) -> SliceOutcome {
@@ -243,31 +267,41 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
-    /// All values or none (J-53).
-    fn set_settings(&mut self, values: Values<'_>) -> Result<(), DataStatus> {
+    /// All values or none (J-53). Where friction tables are in use, one is checked a tick.
+    fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
         let live = |value: SettingValue| {
             settings::setting(value.setting).is_some_and(|setting| setting.live == Live::Always)
         };
-        let all_live = values.iter().all(live);
+        // A few only: they are taken beside the work of every state.
+        let all_live = values.len() <= LIVE_MAX && values.iter().all(live);
         if !all_live && !self.settable() {
-            return Err(DataStatus::NotAllowed);
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        let config =
-            settings::with_values(&self.config, values.iter()).map_err(|_| DataStatus::IncorrectValue)?;
+        let Ok(config) = settings::with_values(&self.config, values.iter()) else {
+            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        };
         if all_live {
             self.set_speed(config.speed);
-            return Ok(());
+            return SliceOutcome::Done;
         }
-        if !self.parameters.fits(&config) {
-            return Err(DataStatus::IncorrectValue);
+        let table = if let SliceProgress::TableCheck(j) = self.slice_progress { j } else { 0 };
+        let fits = if table == 0 { self.parameters.fits(&config) } else { true };
+        if !fits || !self.parameters.table_fits(table, &config) {
+            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        }
+        if self.parameters.tables_in_use().is_some() && table + 1 < JOINTS {
+            return SliceOutcome::Unfinished(SliceProgress::TableCheck(table + 1));
         }
         self.use_settings(config);
-        Ok(())
+        SliceOutcome::Done
     }
 
     /// From now on these settings count, in a state without torque.
     fn use_settings(&mut self, config: Config) {
-        self.nodes.use_settings(&config, &self.config);
+        if self.nodes.use_settings(&config, &self.config) {
+            // It does not start again by itself (J-23).
+            self.pump = false;
+        }
         self.config = config;
         self.parameters.set_gravity(&self.config);
         self.extensions.hash = None;
@@ -292,6 +326,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return SliceOutcome::Unfinished(SliceProgress::Image(next));
         }
         extensions.stored.finish(source.len());
+        extensions.unusable = false;
         extensions.store = StoreState::Busy;
         extensions.store_requested = true;
         SliceOutcome::Done

@@ -87,6 +87,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
+                            // It is older than a Stop or a Pause that has acted.
+                            Command::Jog(_) if received.overtaken => {
+                                (SliceOutcome::Refused(DataStatus::NotAllowed), Served::Quickly)
+                            }
                             command => {
                                 let quick = self.is_quick(&command);
                                 (
@@ -129,10 +133,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn carry_out(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
+    pub(crate) fn carry_out(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
         // Parameters would change the torque under a moving arm.
+        let jogging = self.motion.set.jogging();
         let settable =
-            matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
+            matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
+                && !jogging;
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
                 if jtc {
@@ -159,7 +165,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // J-23: torque would be taken from a moving arm.
             Command::ResetCanDevices { nodes }
                 if nodes & JOINTS_MASK != 0
-                    && matches!(self.state, ControllerState::Operate | ControllerState::Teaching) =>
+                    && (jogging
+                        || matches!(self.state, ControllerState::Operate | ControllerState::Teaching)) =>
             {
                 SliceOutcome::Refused(DataStatus::NotAllowed)
             }
@@ -185,8 +192,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Friction, gains or model.
     fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
         self.extensions.hash = None;
-        if self.extensions.stored.is_there() && command.frame_type().is_default() {
-            return self.use_stored(command.frame_type());
+        if command.frame_type().is_default() {
+            if self.extensions.unusable {
+                // What is built in is another arm than the one that was stored (J-54).
+                return SliceOutcome::Refused(DataStatus::NotAllowed);
+            }
+            if self.extensions.stored.is_there() {
+                return self.use_stored(command.frame_type());
+            }
         }
         let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
         match *command {
@@ -310,6 +323,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.trajectory, command) {
+            (_, ExecCommand::Stop | ExecCommand::Pause) if self.motion.set.jogging() => {
+                self.motion.set.end_jog();
+                Ok(())
+            }
             // Teaching was accepted, and begins as soon as the arm is held.
             (_, ExecCommand::Execute) if self.teaching || self.motion.set.jogging() => {
                 Err(DataStatus::NotAllowed)

@@ -114,11 +114,6 @@ impl PathClock {
         self.target == 0.0 && self.rate != 0.0
     }
 
-    /// The rate is above the one that is wanted, which is not standstill.
-    pub fn slowing(&self) -> bool {
-        self.target != 0.0 && self.rate > self.target
-    }
-
     /// Not at the rate that is wanted.
     pub fn ramping(&self) -> bool {
         self.rate != self.target
@@ -134,31 +129,30 @@ impl PathClock {
         self.time = (self.time + self.rate).min(end);
     }
 
-    /// On the way to a lower rate: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. The rate never rises.
-    pub fn ease_off(&mut self, ramp_ms: f64, bounds: Bounds) {
-        let distance = self.rate - self.target;
-        let wanted = Ramp::of(ramp_ms).next(-self.slope, distance);
-        let (low, high) = (-bounds.1, -bounds.0);
-        // Bounds that leave nothing, or only the other direction: keep the rate for now.
-        let slope = if low <= high { wanted.min(high).max(low.min(wanted)).max(0.0) } else { 0.0 };
-        if slope * DT >= distance || distance < 1e-9 {
+    /// On the way to the rate that is wanted: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. When another
+    /// rate is wanted on the way, the slope changes as fast as it may and does not step; meanwhile the rate goes on, never beyond the
+    /// one that was wanted before.
+    pub fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
+        let ahead = self.target - self.rate;
+        let sign = if ahead < 0.0 { -1.0 } else { 1.0 };
+        // In here slopes are positive towards the wanted rate.
+        let (distance, now) = (ahead.abs(), sign * self.slope);
+        let (low, high) = if sign < 0.0 { (-bounds.1, -bounds.0) } else { bounds };
+        let ramp = Ramp::of(ramp_ms);
+        let wanted = ramp.next(now, distance);
+        // Bounds that leave nothing: keep the rate for now. Those of the other direction do not turn it round.
+        let (within, high) = if low <= high {
+            (wanted.min(high).max(low.min(wanted)).max(wanted.min(0.0)), high.max(0.0))
+        } else {
+            (0.0, 0.0)
+        };
+        let step = REVERSAL * ramp.round;
+        let slope = within.max((now - step).min(high));
+        if slope.abs() <= step && (slope * DT >= distance || distance < 1e-9) {
             (self.rate, self.slope) = (self.target, 0.0);
         } else {
-            (self.rate, self.slope) = (self.rate - slope * DT, -slope);
-        }
-    }
-
-    /// On the way to a higher rate: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. The rate never falls.
-    pub fn speed_up(&mut self, ramp_ms: f64, bounds: Bounds) {
-        let distance = self.target - self.rate;
-        let wanted = Ramp::of(ramp_ms).next(self.slope, distance);
-        let (low, high) = bounds;
-        // Bounds that leave nothing, or only the other direction: keep the rate for now.
-        self.slope = if low <= high { wanted.min(high).max(low.min(wanted)).max(0.0) } else { 0.0 };
-        if self.slope * DT >= distance || distance < 1e-9 {
-            (self.rate, self.slope) = (self.target, 0.0);
-        } else {
-            self.rate += self.slope * DT;
+            self.rate = (self.rate + sign * slope * DT).clamp(0.0, 1.0);
+            self.slope = sign * slope;
         }
     }
 

@@ -100,22 +100,24 @@ impl ReceivedParameters {
         self.dynamics = Dynamics::new(&self.model, config.gravity);
     }
 
-    /// What was received is within the bounds of these settings, too (J-06).
+    /// What was given since the start is within the bounds of these settings, too (J-06); but for friction tables, see
+    /// [`table_fits`](Self::table_fits).
     pub fn fits(&self, config: &Config) -> bool {
         let bounds = &config.parameter_bounds;
-        let has = |part: u8| self.received & part != 0;
+        let has = |part: u8| self.given & part != 0;
         let joints = || config.joints.iter();
         let gains =
             || self.pid.iter().zip(joints()).all(|(gains, joint)| bounds.check_gains(gains, joint).is_ok());
-        let friction = || match self.tables_in_use() {
-            Some(tables) => {
-                tables.iter().zip(joints()).all(|(table, joint)| bounds.check_table(table, joint).is_ok())
-            }
-            None => check_polynomials(&self.polynomial, config).is_ok(),
-        };
+        let friction = || self.friction_is_table || check_polynomials(&self.polynomial, config).is_ok();
         (!has(missing_parameter::PID) || gains())
             && (!has(missing_parameter::FRICTION) || friction())
             && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
+    }
+
+    /// So is the friction table of the joint with this index, where tables are in use.
+    pub fn table_fits(&self, j: usize, config: &Config) -> bool {
+        let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
+        table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
     pub fn take_pid(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {

@@ -89,14 +89,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.latch(&self.nodes, &self.config);
         let jogged = self.motion.set.jogging();
         self.motion.set.hold(&self.config);
-        if !jogged {
-            return self.control(ControlMode::Hold);
+        if self.motion.set.jogging() {
+            return self.control(ControlMode::Approach);
         }
-        if !self.motion.set.jogging() {
+        if jogged {
             // It has come to rest.
             self.motion.law.change_mode();
         }
-        self.control(ControlMode::Approach)
+        self.control(ControlMode::Hold)
     }
 
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {

@@ -192,7 +192,8 @@ impl Rig {
 
     /// The flight record; a tick that lies across two milliseconds is waited for.
     fn complete_flight(&mut self) -> Option<Flight> {
-        for _ in 0..20 {
+        // The longest takes a third of a millisecond: a model with all that follows from it.
+        for _ in 0..80 {
             let flight = self.read_flight()?;
             if flight.phase != Flight::PHASE_INPUTS {
                 return Some(flight);

@@ -57,6 +57,11 @@ impl Answers {
         }
     }
 
+    /// An answer on this line has not been sent.
+    pub fn waits(&self, line: usize) -> bool {
+        self.lines.get(line).is_some_and(|line| line.len > 0)
+    }
+
     /// Puts an answer on a line, in place of one that has not been sent yet.
     pub fn put(&mut self, line: usize, answer: &Answer<'_>) {
         if let Some(line) = self.lines.get_mut(line) {

@@ -136,6 +136,11 @@ impl StoredArm {
         self.len > 0
     }
 
+    /// There is none any more.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
     /// Takes another in its place; one that is too long leaves none.
     pub fn set(&mut self, image: &[u8]) {
         self.len = match self.bytes.get_mut(..image.len()) {

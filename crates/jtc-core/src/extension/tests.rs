@@ -6,7 +6,8 @@ use std::vec::Vec;
 
 use jtc_bus::Target;
 use jtc_wire::{
-    EncodeError, FrameRef, FrameStatus, LinkEvent, Response, Status, fixed, missing_parameter, set_settings,
+    EncodeError, FrameRef, FrameStatus, LinkEvent, Response, Status, UrgentCommand, fixed, missing_parameter,
+    set_settings,
 };
 
 use super::*;
@@ -477,4 +478,140 @@ fn j61_drives_are_asked_for_the_joint_torque_times_the_gain() {
     let status = bench.controller.status(Response::NONE);
     let report = bench.controller.nodes.node(2).report.torque;
     assert!((f64::from(status.joints[2].torque) * 1.2 - report).abs() < 1e-6);
+}
+
+/// J-04, J-58: whoever wants the arm to stand ends a jog, too, and what was jogged before that does not begin again.
+#[test]
+fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
+    for command in [UrgentCommand::Stop, UrgentCommand::Pause] {
+        let mut bench = Bench::new();
+        bench.force(ControllerState::HoldPos);
+        bench.controller.motion.set.hold_for_test();
+        let mut frame = [0; 30];
+        jtc_wire::floats(&mut frame, jtc_wire::FrameType::Jog, [0.3; JOINTS]).expect("it fits");
+        let jog = FrameRef::new_checked(&frame).expect("a good frame");
+        let host = |overtaken| [HostEvent { line: 0, overtaken, event: LinkEvent::Frame(jog) }];
+        bench.controller.serve_host(&Inputs { host: &host(false), ..Inputs::QUIET });
+        assert!(bench.controller.motion.set.jogging());
+        let mut position = [0.0; JOINTS];
+        for _ in 0..50 {
+            bench.controller.motion.set.hold(&Config::avena());
+        }
+        let mut urgent = [jtc_wire::UrgentCommands::NONE; 2];
+        urgent[1].push(command);
+        bench.controller.serve_host(&Inputs { urgent, host: &host(true), ..Inputs::QUIET });
+        let before = bench.controller.motion.set.point.velocity[2];
+        for _ in 0..2_000 {
+            bench.controller.motion.set.hold(&Config::avena());
+            position = bench.controller.motion.set.point.position;
+            // The acceleration has to turn first.
+            assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
+        }
+        assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);
+    }
+}
+
+/// J-06: what changes the torque does so at standstill only.
+#[test]
+fn j58_parameters_and_resets_wait_for_the_end_of_a_jog() {
+    let mut bench = Bench::new();
+    bench.force(ControllerState::HoldPos);
+    bench.controller.motion.set.hold_for_test();
+    bench.controller.motion.set.jog(&[0.1; JOINTS]);
+    for command in [
+        Command::FrictionPolynomialUseDefault,
+        Command::FrictionTableUseDefault,
+        Command::PidParamUseDefault,
+        Command::ArmModelUseDefault,
+        Command::ResetCanDevices { nodes: 1 },
+        Command::TrajSetExecStatus(jtc_wire::ExecCommand::Execute),
+    ] {
+        let outcome = bench.controller.carry_out(0, command);
+        assert!(matches!(outcome, SliceOutcome::Refused(DataStatus::NotAllowed)), "{command}");
+    }
+}
+
+/// A stored arm that cannot be used does not make the built-in one the arm that is meant.
+#[test]
+fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
+    let (mut image, _) = other_arm();
+    image[8..12].copy_from_slice(&f32::NAN.to_be_bytes());
+    let mut bench = Bench::new();
+    bench.info(0);
+    assert!(!bench.controller.load_arm(&image));
+    let refused = |bench: &mut Bench| bench.send(0, &fixed::PID_PARAM_USE_DEFAULT);
+    assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
+    // One that could not be written is another one after the next start.
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.info(0);
+    assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NoError);
+    assert_eq!(refused(&mut bench), DataStatus::NoError);
+    bench.controller.set_store_state(StoreState::Failed, 0);
+    assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
+    assert!(!bench.info(0).defaults_stored);
+    assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NoError, "what is in use can be stored again");
+}
+
+/// What was given is checked, also when it was withdrawn since.
+#[test]
+fn j53_settings_fit_to_what_disable_has_withdrawn() {
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.controller.parameters.withdraw_all();
+    assert_eq!(bench.set(96, 0, 7_000.0), DataStatus::IncorrectValue);
+    // Friction tables, too: one a tick.
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.send(0, &fixed::FRICTION_TABLE_USE_DEFAULT);
+    assert_eq!(bench.set(103, 0, 0.001), DataStatus::IncorrectValue);
+    let before = bench.controller.telemetry().tick;
+    assert_eq!(bench.set(34, 0, 9.81), DataStatus::NoError);
+    assert!(bench.controller.telemetry().tick - before >= 6);
+}
+
+/// What is asked while an answer waits is refused rather than lost.
+#[test]
+fn j50_a_second_request_waits_for_the_first_answer() {
+    let mut bench = Bench::new();
+    bench.info(0);
+    assert_eq!(bench.at_once(Command::GetSettings { first: 0 }), DataStatus::NoError);
+    for command in [Command::GetInfo, Command::GetSettings { first: 0 }, Command::GetArm { offset: 0 }] {
+        assert_eq!(bench.at_once(command), DataStatus::NotAllowed, "{command}");
+    }
+    bench.run(1);
+    assert_eq!(bench.answers.len(), 1);
+    assert_eq!(bench.at_once(Command::GetInfo), DataStatus::NoError);
+}
+
+/// In motion a few values are taken, not hundreds.
+#[test]
+fn j07_j53_settings_in_motion_are_few() {
+    let value = SettingValue { setting: settings::SPEED, joint: 0, value: 0.5 };
+    for (count, taken) in [(1, true), (LIVE_MAX, true), (LIVE_MAX + 1, false), (200, false)] {
+        let mut bench = Bench::new();
+        bench.controller.state = ControllerState::Operate;
+        let frame = settings_frame(&vec![value; count]).expect("it fits");
+        let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
+        let outcome = bench.at_once(Command::SetSettings(values));
+        assert_eq!(outcome, if taken { DataStatus::NoError } else { DataStatus::NotAllowed }, "{count}");
+    }
+}
+
+#[test]
+fn j33_j34_settings_under_which_stops_or_approaches_fail_are_refused() {
+    let mut bench = Bench::new();
+    bench.info(0);
+    for (setting, value, taken) in [
+        (53, 501.0, false),
+        (54, 999.0, false),
+        (54, 1000.0, true),
+        (50, 100.0, true),
+        (50, 20.0, false),
+        (49, 0.4, false),
+    ] {
+        let expected = if taken { DataStatus::NoError } else { DataStatus::IncorrectValue };
+        assert_eq!(bench.set(setting, 0, value), expected, "{setting} = {value}");
+        bench.controller.use_settings(Config::avena());
+    }
 }

@@ -400,14 +400,17 @@ impl Nodes {
 }
 
 impl Nodes {
-    /// Other settings count from now on, in a state without torque: where they are sent to the nodes, these are configured anew.
-    pub fn use_settings(&mut self, config: &Config, before: &Config) {
+    /// Other settings count from now on, in a state without torque: where they are sent to the nodes, these are configured anew, and
+    /// it returns true.
+    pub fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         let bits = |config: &Config| (config.joint_config_bits, config.gripper_config_bits, config.gripper);
-        if bits(config) != bits(before) {
+        let changed = bits(config) != bits(before);
+        if changed {
             for node in &mut self.nodes {
                 node.lose_configuration();
             }
         }
+        changed
     }
 }

@@ -1,4 +1,5 @@
 //! Path time: what each tick does, and how long ramps take (J-33).
+extern crate std;
 use super::*;
 use proptest::prelude::*;
 
@@ -10,7 +11,7 @@ fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     if clock.halting() {
         clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (-easy, easy), full: (-full, full) });
     } else if clock.ramping() {
-        clock.speed_up(200.0, (-easy, easy));
+        clock.change_pace(200.0, (-easy, easy));
     }
 }
 
@@ -180,7 +181,7 @@ proptest! {
 /// A clock on its way to full speed, after one tick.
 fn sped_up(rate: f64, slope: f64, bounds: Bounds) -> PathClock {
     let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
-    clock.speed_up(200.0, bounds);
+    clock.change_pace(200.0, bounds);
     clock
 }
 
@@ -197,7 +198,7 @@ fn j33_each_tick_of_a_resume() {
         (0.5, 5.0, (0.0, 0.0), 0.0),
     ] {
         let clock = sped_up(rate, slope, bounds);
-        assert!((clock.slope - expected.max(0.0)).abs() < 1e-12, "{rate} {slope} {bounds:?}: {clock:?}");
+        assert!((clock.slope - expected).abs() < 1e-12, "{rate} {slope} {bounds:?}: {clock:?}");
         assert!(
             (clock.rate - (rate + clock.slope * DT)).abs() < 1e-12,
             "{rate} {slope} {bounds:?}: {clock:?}"
@@ -266,34 +267,32 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
 }
 
 proptest! {
-    /// Whatever speeds are set and when: path time gets there by itself, never turns, never jumps, and is not faster than was wanted.
+    /// Whatever speeds are set and when: path time gets there by itself, within what was wanted before, and its slope never steps.
     #[test]
     fn j57_path_time_gets_to_every_speed_along_the_ramp(
         start in 0.05..1.0f64,
-        changes in prop::collection::vec((0.05..1.0f64, 1u32..400), 1..8),
+        changes in prop::collection::vec((0.05..1.0f64, 1u32..400), 1..12),
     ) {
         let mut clock = PathClock::start(start);
-        let mut steepest = 0.0f64;
+        let (round, mut wanted) = (Ramp::of(200.0).round, std::vec![start]);
         for (pace, ticks) in changes {
-            let (from, turned) = (clock.rate, clock.slope);
-            prop_assert!(clock.set_pace(pace) || clock.target == pace);
+            clock.set_pace(pace);
+            wanted.push(pace);
             for ms in 0..ticks {
                 let before = clock;
                 clock.advance(1e9);
-                if clock.slowing() {
-                    clock.ease_off(200.0, FREE);
-                } else if clock.ramping() {
-                    clock.speed_up(200.0, FREE);
+                if clock.ramping() {
+                    clock.change_pace(200.0, FREE);
                 }
-                steepest = steepest.max((clock.rate - before.rate).abs() / DT);
-                prop_assert!(clock.rate >= pace.min(from) - 1e-12 && clock.rate <= pace.max(from) + 1e-12);
-                prop_assert!((clock.rate - before.rate) * (pace - from) >= 0.0, "it turns at {ms} ms, slope {turned}");
+                // Nothing that was wanted so far is left, but for what a slope that is taken out needs.
+                let (least, most) = wanted.iter().fold((1.0f64, 0.0f64), |(l, m), w| (l.min(*w), m.max(*w)));
+                prop_assert!(clock.rate >= least - 1e-9 && clock.rate <= most + 1e-9, "{clock:?}");
+                prop_assert!((clock.slope - before.slope).abs() <= REVERSAL * round + 1e-9, "{before:?} {clock:?}");
+                prop_assert!(clock.slope.abs() <= 1.5 / 0.2 + 1e-9, "the middle of an S of 200 ms");
                 prop_assert!(clock.time > before.time);
-                prop_assert!(ms < 220 || clock.rate == pace, "{ms} ms: {clock:?}");
+                prop_assert!(ms < 300 || clock.rate == pace, "{ms} ms: {clock:?}");
             }
         }
-        // The middle of an S of 200 ms.
-        prop_assert!(steepest <= 1.5 / 0.2 + 1e-9, "{steepest}");
     }
 }
 
@@ -305,7 +304,7 @@ fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     assert!(!clock.set_pace(1.0));
     let mut ticks = 0;
     while !clock.standing() {
-        assert!(clock.halting() && !clock.slowing());
+        assert!(clock.halting());
         tick(&mut clock, f64::INFINITY, f64::INFINITY);
         ticks += 1;
         assert!(ticks < 206);
@@ -325,7 +324,7 @@ fn j57_the_speed_keeps_to_what_the_arm_can_follow() {
         clock.set_pace(0.2);
         for _ in 0..100 {
             clock.advance(1e9);
-            clock.ease_off(200.0, bounds);
+            clock.change_pace(200.0, bounds);
             assert!(clock.slope <= 0.0 && clock.slope >= bounds.0.min(0.0) - 1e-12, "{bounds:?}: {clock:?}");
         }
     }

@@ -195,7 +195,8 @@ impl Arm {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
         // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
         self.config().check().map_err(|e| {
-            let name = self.joint_names.get(e.joint() - 1).map_or("", String::as_str);
+            let name =
+                e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
             FileError::at(Place::name(format!("joint {name}")), e.to_string())
         })
     }

@@ -90,8 +90,9 @@ impl<P: Port> Session<P> {
                 Flow::Pause if status.is_executing() => unless_ended(self.pause())?,
                 Flow::Resume if status.trajectory == TrajectoryState::Pause => self.go()?,
                 Flow::Speed(percent) => match self.set_speed(f64::from(percent) / 100.0) {
-                    // The motion goes on as it was.
-                    Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
+                    // The motion goes on as it was, and is followed.
+                    Err(Error::Link(error)) if !matches!(error, LinkError::Port(_)) => {}
+                    Err(Error::Link(error)) => return Err(self.lost_in_motion(error)),
                     other => other?,
                 },
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.

@@ -6,8 +6,9 @@ use anyhow::{Context, Result, ensure};
 use crate::firmware;
 use crate::shell::{self, cargo};
 
-/// Bytes that the controller may take with its trajectory; the receive buffer of 60 000 bytes comes beside it.
-pub const LIMIT: u64 = 448 * 1024;
+/// Bytes that the controller may take with its trajectory: 432 000 of points, and 40 KiB of the board's fast memory for all else, the
+/// stored arm included. The receive buffers of 60 000 bytes come beside it.
+pub const LIMIT: u64 = 432_000 + 40 * 1024;
 
 /// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.
 pub fn controller_bytes() -> Result<u64> {

@@ -10,7 +10,9 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, pac, rcc};
 use embassy_time::Instant;
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, Outputs};
-use jtc_wire::{BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, StoreState, UrgentWatch};
+use jtc_wire::{
+    BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, StoreState, UrgentWatch,
+};
 use openjtc_firmware::clock;
 use openjtc_firmware::flight::Flight;
 use openjtc_firmware::lines;
@@ -56,7 +58,7 @@ pub struct Parts {
 }
 
 struct Tick {
-    controller: Jtc,
+    controller: &'static mut Jtc,
     can: Fdcan,
     received: ReceivedFrames,
     pins: Pins,
@@ -95,13 +97,20 @@ impl Links {
 /// The tick's own; it takes it out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
-/// Starts the ticks. Not inlined: the controller is large, and its way through the stack should not last.
+/// The controller, in its place. Not inlined: it is large, and its way through the stack is over when this returns.
+#[inline(never)]
+fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
+    static PLACE: StaticCell<Jtc> = StaticCell::new();
+    PLACE.init_with(|| Controller::new(Config::default(), points))
+}
+
+/// Starts the ticks. Not inlined: what it needs of the stack should not last.
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
     let Parts { points, can, pins, ahead, slot, lines, watchdog, boot } = parts;
     let tick = PLACE.init_with(|| Tick {
-        controller: Controller::new(Config::default(), points),
+        controller: controller(points),
         can,
         received: ReceivedFrames::new(),
         pins,
@@ -124,7 +133,7 @@ pub fn start(parts: Parts) {
         boots: boot.boots,
         boot_cause: BootCause::from_byte(boot.cause as u8).unwrap_or_default(),
     });
-    load_arm(&mut tick.controller);
+    load_arm(tick.controller);
     if boot.cause.failed() {
         tick.controller.raise_internal();
     }
@@ -146,6 +155,7 @@ pub fn start(parts: Parts) {
 }
 
 /// The arm that was stored is in use from the start (J-54).
+#[inline(never)]
 fn load_arm(controller: &mut Jtc) {
     match arm_store::loaded() {
         None => controller.set_store_state(StoreState::Empty, 0),
@@ -193,7 +203,7 @@ impl Tick {
             status_free: self.lines.iter().all(Transmitter::is_free),
         };
         self.flight.begin(&inputs, counters.wrong_format);
-        let outputs = control_step(&mut self.controller, &inputs);
+        let outputs = control_step(self.controller, &inputs);
 
         self.pins.safety_output.set_level(outputs.safety_output.into());
         if let Some(frame) = &outputs.bus {

@@ -137,16 +137,6 @@ pub enum ConfigError {
         /// Twice [`Config::stop_ms`].
         limit: u32,
     },
-    /// The approach to the first point may be faster than the joint (J-34): it takes [`Config::ramp_ms`] for
-    /// [`Config::start_tolerance_rad`].
-    Approach {
-        /// Joint, from 1.
-        joint: usize,
-        /// The way, rad.
-        value: f64,
-        /// The time for it, ms.
-        limit: u16,
-    },
     /// The torque limit times the torque gain (J-61) is above what the bus carries.
     TorqueScale {
         /// Joint, from 1.
@@ -181,7 +171,6 @@ impl ConfigError {
     pub const fn joint(&self) -> usize {
         match *self {
             Self::Braking { .. } => 0,
-            Self::Approach { joint, .. } => joint,
             Self::Position { joint, .. }
             | Self::Range { joint, .. }
             | Self::TorqueScale { joint, .. }
@@ -209,11 +198,6 @@ impl core::fmt::Display for ConfigError {
             Self::Braking { value, limit } => write!(
                 f,
                 "braking_ms_max {value} is below twice stop_ms, {limit}: a stop would end in an error while it goes on"
-            ),
-            Self::Approach { joint, value, limit } => write!(
-                f,
-                "joint {joint}: start_tolerance_rad {value} within ramp_ms {limit} is faster than its velocity or acceleration \
-                 limit"
             ),
             Self::TorqueScale { joint, value, limit } => write!(
                 f,
@@ -272,12 +256,6 @@ impl Config {
             if !(limits.position_min < limits.position_max) {
                 let (value, limit) = (limits.position_min, limits.position_max);
                 return Err(ConfigError::Range { joint, value, limit });
-            }
-            // A minimum-jerk polynomial: 15/8 of the mean velocity, 5.774 of the way over the square of its time.
-            let (way, ramp_s) = (self.start_tolerance_rad, self.ramp_ms as f64 / 1000.0);
-            let slow = 1.875 * way <= limits.velocity_max * ramp_s;
-            if !(slow && 5.774 * way <= limits.acceleration_max * ramp_s * ramp_s) {
-                return Err(ConfigError::Approach { joint, value: way, limit: self.ramp_ms });
             }
             let value = limits.torque_max * limits.torque_gain;
             if !(value <= TORQUE_FULL_SCALE) {

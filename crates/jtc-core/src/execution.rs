@@ -1,6 +1,7 @@
 //! The execution of a trajectory (J-30 to J-36): from Execute to standstill, wherever that comes about.
 pub(crate) mod phase;
 
+use jtc_dynamics::sqrt;
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
@@ -115,7 +116,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     // The arm was held until now, without friction compensation.
                     self.motion.law.change_mode();
                 }
-                let length = f64::from(self.config.ramp_ms.max(1));
+                let length = self.approach_ms(&from);
                 let elapsed_ms = elapsed_ms + 1.0;
                 self.motion.set.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
@@ -149,6 +150,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
         }
+    }
+
+    /// Time for the approach from where the arm is held, ms: that of a ramp, or as long as velocity and acceleration limits ask.
+    fn approach_ms(&self, from: &[f64; JOINTS]) -> f64 {
+        let to = self.path_point();
+        let mut length = f64::from(self.config.ramp_ms.max(1));
+        for (j, limits) in self.config.joints.iter().enumerate() {
+            // A minimum-jerk polynomial has 15/8 of its mean velocity, and 5.774 ways over the square of its time.
+            let way = (to[j] - from[j]).abs();
+            length = length.max(1_875.0 * way / limits.velocity_max);
+            length = length.max(1_000.0 * sqrt(5.774 * way / limits.acceleration_max));
+        }
+        length
     }
 
     /// Set values at the present path time.

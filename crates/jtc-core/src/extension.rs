@@ -85,17 +85,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        let (Some(arm), Some(config)) = (arm, config) else {
-            self.extensions.unusable = true;
-            return false;
-        };
-        self.extensions.unusable = !takes(&arm, &config);
-        if !self.extensions.unusable {
-            self.extensions.stored.set(image);
-            self.extensions.name = arm.name;
-            self.use_settings(config);
+        // Its numbers are taken where they are used, not tried on the stack, which is no larger than it has to be.
+        let loaded = arm.zip(config).is_some_and(|(arm, config)| {
+            let taken = takes(&mut self.parameters, &arm, &config);
+            if taken {
+                self.extensions.stored.set(image);
+                self.extensions.name = arm.name;
+                self.nodes.use_settings(&config, &self.config);
+                self.config = config;
+            }
+            taken
+        });
+        if !loaded {
+            self.parameters.begin(&self.config);
         }
-        !self.extensions.unusable
+        // The host has to ask for them.
+        self.parameters.forget();
+        self.extensions.hash = None;
+        self.extensions.unusable = !loaded;
+        loaded
     }
 
     /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] says so; empty where there is none.
@@ -351,15 +359,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 }
 
-/// Whether gains, model and friction of an arm are such as these settings take.
-fn takes(arm: &ArmImage<'_>, config: &Config) -> bool {
-    let mut trial = ReceivedParameters::new(config);
+/// Takes gains, model and friction of an arm; false when they are not such as these settings take.
+fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
     let friction = match arm.friction {
-        FrictionImage::Polynomial(floats) => trial.take_polynomial(&floats, config).is_ok(),
+        FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
         FrictionImage::Table(floats) => {
             let mut progress = SliceProgress::Begin;
             // Twelve slices are all of it.
-            (0..16).any(|_| match trial.take_table(&floats, progress, config) {
+            (0..16).any(|_| match parameters.take_table(&floats, progress, config) {
                 SliceOutcome::Unfinished(next) => {
                     progress = next;
                     false
@@ -368,7 +375,9 @@ fn takes(arm: &ArmImage<'_>, config: &Config) -> bool {
             })
         }
     };
-    friction && trial.take_pid(&arm.pid, config).is_ok() && trial.take_model(&arm.model, None, config).is_ok()
+    friction
+        && parameters.take_pid(&arm.pid, config).is_ok()
+        && parameters.take_model(&arm.model, None, config).is_ok()
 }
 
 #[cfg(test)]

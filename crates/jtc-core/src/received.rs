@@ -54,6 +54,22 @@ impl ReceivedParameters {
         }
     }
 
+    /// As if nothing had been received, in its place.
+    pub fn begin(&mut self, config: &Config) {
+        self.model = defaults::MODEL;
+        self.set_gravity(config);
+        self.pid = defaults::PID;
+        self.polynomial = defaults::POLYNOMIAL;
+        self.tables.iter_mut().for_each(|table| *table = NO_TABLE);
+        self.forget();
+    }
+
+    /// Nobody has given what is here: it was loaded.
+    pub fn forget(&mut self) {
+        (self.received, self.given) = (0, 0);
+        (self.friction_is_table, self.friction_is_new) = (false, false);
+    }
+
     /// The byte of the status: 1 = missing.
     pub fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)

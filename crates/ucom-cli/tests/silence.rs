@@ -19,14 +19,17 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     assert!(program.err.is_empty(), "{}", program.err);
     let mut peer = sim.peer();
     let child = sim.spawn(&["record", &file, "--count", "1", "--force"]);
+    let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let its = recorded.clone();
     let ask = std::thread::spawn(move || {
-        // Until the recorder is on the bus.
-        for _ in 0..40 {
+        // Until the recorder is on the bus and has its frame, however loaded the machine is.
+        while !its.load(std::sync::atomic::Ordering::Relaxed) {
             peer.send("240#");
             std::thread::sleep(std::time::Duration::from_millis(25));
         }
     });
     let output = ended(child).ends(0);
+    recorded.store(true, std::sync::atomic::Ordering::Relaxed);
     ask.join().unwrap();
     assert!(!output.err.contains("nothing has come"), "{}", output.err);
 }

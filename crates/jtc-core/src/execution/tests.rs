@@ -191,3 +191,32 @@ fn j66_an_arm_that_gave_way_goes_on_when_it_has_come_to_rest() {
         assert_eq!(controller.motion.law.yielding(), !held, "it stands firm when it goes on");
     }
 }
+
+/// The approach is a ramp long, or as long as the joint that has the furthest to go for its limits needs.
+#[test]
+fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
+    for (way, velocity_max, acceleration_max) in
+        [(0.0, 1.5, 12.0), (0.02, 1.5, 12.0), (0.4, 1.5, 12.0), (0.02, 0.01, 12.0), (0.3, 9.0, 0.5)]
+    {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.config.joints[3].velocity_max = velocity_max;
+        controller.config.joints[3].acceleration_max = acceleration_max;
+        let length = controller.approach_ms(&[0.0, 0.0, 0.0, way, 0.0, 0.0]) / 1_000.0;
+        // Its velocity and its acceleration, seen at a thousand places.
+        let at = |u: f64| way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
+        let step = 1e-3;
+        let (mut fastest, mut hardest) = (0.0f64, 0.0f64);
+        for i in 1..1_000 {
+            let u = f64::from(i) * step;
+            let (before, now, after) = (at(u - step), at(u), at(u + step));
+            fastest = fastest.max((after - before) / (2.0 * step * length));
+            hardest = hardest.max((after - 2.0 * now + before).abs() / (step * step * length * length));
+        }
+        assert!(
+            fastest <= 1.001 * velocity_max && hardest <= 1.001 * acceleration_max,
+            "{way}: {fastest} {hardest}"
+        );
+        let needed = fastest > 0.99 * velocity_max || hardest > 0.99 * acceleration_max;
+        assert!(needed || length == 0.2, "{way}: {length} s");
+    }
+}

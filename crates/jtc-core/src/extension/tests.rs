@@ -599,17 +599,10 @@ fn j07_j53_settings_in_motion_are_few() {
 }
 
 #[test]
-fn j33_j34_settings_under_which_stops_or_approaches_fail_are_refused() {
+fn j33_settings_under_which_stops_fail_are_refused() {
     let mut bench = Bench::new();
     bench.info(0);
-    for (setting, value, taken) in [
-        (53, 501.0, false),
-        (54, 999.0, false),
-        (54, 1000.0, true),
-        (50, 100.0, true),
-        (50, 20.0, false),
-        (49, 0.4, false),
-    ] {
+    for (setting, value, taken) in [(53, 501.0, false), (54, 999.0, false), (54, 1000.0, true)] {
         let expected = if taken { DataStatus::NoError } else { DataStatus::IncorrectValue };
         assert_eq!(bench.set(setting, 0, value), expected, "{setting} = {value}");
         bench.controller.use_settings(Config::avena());

@@ -343,7 +343,7 @@ fn the_existing_parameter_files_are_read() {
     if let Some(file) = load("Avena.urdf") {
         let found = file.arm.unwrap();
         assert_eq!(found.model.joints[6].xyz, [0.0, 0.0, 0.0181]);
-        assert_eq!(found.joints[2].position_max, 2.9);
+        assert_eq!(found.joints[2].position_max, 2.9905);
         assert!(file.warnings.iter().any(|w| w.problem.contains("no position limits")));
     }
     if let Some(dir) = existing::file("Avena.urdf").and_then(|p| p.parent().map(Path::to_owned)) {

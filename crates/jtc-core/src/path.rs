@@ -148,7 +148,7 @@ impl PathClock {
         };
         let step = REVERSAL * ramp.round;
         let slope = within.max((now - step).min(high));
-        if slope.abs() <= step && (slope * DT >= distance || distance < 1e-9) {
+        if now.abs() <= step && (slope * DT >= distance || distance < 1e-9) {
             (self.rate, self.slope) = (self.target, 0.0);
         } else {
             self.rate = (self.rate + sign * slope * DT).clamp(0.0, 1.0);

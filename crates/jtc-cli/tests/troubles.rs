@@ -75,7 +75,7 @@ fn link(page: &mut Page, desk: &Desk) {
     page.case("No parameters yet", "jtc traj run motion.csv", &sim.run("jtc traj run motion.csv"));
     let push = "jtc params push slower.toml";
     page.case("An arm whose limits the controller does not have", push, &sim.run(push));
-    sim.run("jtc params use-defaults");
+    assert_eq!(sim.run("jtc recover --defaults").code, 0, "it waits until all drives are enabled");
     let other = "jtc traj run motion.csv --arm slower.toml";
     page.case("A run for another arm than the controller has", other, &sim.run(other));
     page.case(

@@ -13,10 +13,11 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
         "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries {NOT_CARRIED}. Where \
          the controller's values are safe for this arm, add --accept-device-limits"
     );
-    let message = |count: &str| {
+    let message = |count| {
         format!(
-            "{}: {count} of this arm cannot be given to the controller, which uses its own; nothing was sent",
-            arm.name
+            "{}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
+            arm.name,
+            values(count)
         )
     };
     listed(differences, accepted, ("device-limits", message, &hint), out)
@@ -26,18 +27,26 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
 pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has; where it is safe \
                 to use that, leave --arm out or add --accept-device-limits";
-    let message = |count: &str| {
-        let verb = if count.starts_with("1 ") { "differs" } else { "differ" };
-        format!("{}: the controller has another arm, {}: {count} {verb}", arm.name, has.name)
+    let message = |count| {
+        format!("{}: the controller has another arm, {}: {}", arm.name, has.name, values_differ(count))
     };
     listed(arm.differences(has), accepted, ("other-arm", message, hint), out)
+}
+
+fn values(count: usize) -> String {
+    if count == 1 { "1 value".into() } else { format!("{count} values") }
+}
+
+/// So many values differ, in words.
+pub fn values_differ(count: usize) -> String {
+    format!("{} {}", values(count), if count == 1 { "differs" } else { "differ" })
 }
 
 /// Lists differences; an error, with its code, message and hint, where there are any that nobody has accepted.
 fn listed(
     differences: Vec<Difference>,
     accepted: bool,
-    (code, message, hint): (&'static str, impl Fn(&str) -> String, &str),
+    (code, message, hint): (&'static str, impl Fn(usize) -> String, &str),
     out: &Output,
 ) -> Result<Vec<Difference>, Failure> {
     if differences.is_empty() {
@@ -49,9 +58,7 @@ fn listed(
         }
         return Ok(differences);
     }
-    let count =
-        if differences.len() == 1 { "1 value".to_owned() } else { format!("{} values", differences.len()) };
-    let message = message(&count);
+    let message = message(differences.len());
     if out.is_json() {
         let error = Failure::new(ErrorKind::Refused, code, &message).hint(hint).to_json();
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);

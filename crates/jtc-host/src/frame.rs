@@ -49,6 +49,12 @@ pub fn pid(gains: &[PidGains; JOINTS]) -> Result<Vec<u8>, EncodeError> {
 ///
 /// A number that is no finite 32-bit float.
 pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
+    let (joints, links) = model_rows(model);
+    written(FRAME_MAX, |out| jtc_wire::arm_model(out, &joints, &links))
+}
+
+/// The numbers of a model as its frame has them: the origins of six joints and the flange, and the seven links.
+pub(crate) fn model_rows(model: &ArmModel) -> ([[f64; 6]; JOINTS + 1], [[f64; 13]; JOINTS + 1]) {
     let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
     let joints = model.joints.map(|j| origin(&j));
     let links = model.links.map(|l| {
@@ -58,7 +64,7 @@ pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
         numbers[12] = l.mass;
         numbers
     });
-    written(FRAME_MAX, |out| jtc_wire::arm_model(out, &joints, &links))
+    (joints, links)
 }
 
 /// Friction compensation: the polynomial (six coefficients) or the tables.

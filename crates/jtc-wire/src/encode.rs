@@ -166,19 +166,24 @@ impl core::error::Error for EncodeError {}
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FloatName(pub FrameType, pub usize);
 
+impl FloatName {
+    /// What the numbers of a link are, in the order of the wire; the first six are those of an origin, too.
+    pub const LINK: [&'static str; 13] =
+        ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
+}
+
 impl fmt::Display for FloatName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const PID: [&str; 5] = ["Kp", "Ki", "Kd", "IntMin", "IntMax"];
-        const ORIGIN: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
-        const LINK: [&str; 13] =
-            ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
         let Self(kind, index) = *self;
         write!(f, "{kind} ")?;
         match kind {
             FrameType::PidParam => write!(f, "joint {} {}", 1 + index / 5, PID[index % 5]),
-            FrameType::ArmModel if index < 36 => write!(f, "joint {} {}", 1 + index / 6, ORIGIN[index % 6]),
-            FrameType::ArmModel if index < 42 => write!(f, "flange {}", ORIGIN[index % 6]),
-            FrameType::ArmModel => write!(f, "link {} {}", (index - 42) / 13, LINK[(index - 42) % 13]),
+            FrameType::ArmModel if index < 36 => {
+                write!(f, "joint {} {}", 1 + index / 6, Self::LINK[index % 6])
+            }
+            FrameType::ArmModel if index < 42 => write!(f, "flange {}", Self::LINK[index % 6]),
+            FrameType::ArmModel => write!(f, "link {} {}", (index - 42) / 13, Self::LINK[(index - 42) % 13]),
             FrameType::FrictionTable => {
                 let (joint, i) = (1 + index / 440, index % 440);
                 match i {

@@ -8,6 +8,7 @@ use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, NodeState, Status, TrajectoryState};
 use serde_json::json;
 
+use super::run::BRING_UP;
 use crate::args::JogArgs;
 
 /// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
@@ -16,8 +17,6 @@ const AGAIN: Duration = Duration::from_millis(50);
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// Drives take 4 s for their first enable.
-const BRING_UP: Duration = Duration::from_secs(15);
 /// An arm comes to rest within this time.
 const REST: Duration = Duration::from_secs(3);
 

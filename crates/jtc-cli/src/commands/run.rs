@@ -27,8 +27,8 @@ use crate::operator::Operator;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Drives take 4 s for their first enable.
-const BRING_UP: Duration = Duration::from_secs(15);
+/// How long the drives may take: 4 s for their first enable.
+pub(super) const BRING_UP: Duration = Duration::from_secs(15);
 
 /// Runs a trajectory from a file.
 pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
@@ -49,8 +49,9 @@ fn match_device(
     out: &Output,
 ) -> Result<(), Failure> {
     let accepted = args.accept.accept_device_limits;
+    let info = session.info()?;
     job.device = session.device_config()?;
-    match session.info()? {
+    match info {
         None => drop(limits::accept(&job.arm, &job.device, accepted, out)?),
         Some(info) if job.arm.hash().ok().flatten() == Some(info.hash) => {}
         Some(info) => {

@@ -4,8 +4,8 @@
 //! A controller that runs with other limits or another gravity than the arm file gives moves another arm than the one that was
 //! checked (J-55). It is known to use the built-in arm's settings, [`Config::avena`].
 
+use jtc_core::settings::{Setting, TABLE};
 use jtc_core::{Config, JointConfig};
-
 use jtc_wire::Joint;
 
 use super::Arm;
@@ -38,23 +38,6 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// Key, unit and value of each setting of a joint.
-type Setting = (&'static str, &'static str, fn(&JointConfig) -> f64);
-
-const JOINT_SETTINGS: [Setting; 8] = [
-    ("position_min_rad", "rad", |j| j.position_min),
-    ("position_max_rad", "rad", |j| j.position_max),
-    ("velocity_max_rad_s", "rad/s", |j| j.velocity_max),
-    ("acceleration_max_rad_s2", "rad/s²", |j| j.acceleration_max),
-    ("torque_max_nm", "N·m", |j| j.torque_max),
-    ("position_error_max_rad", "rad", |j| j.position_error_max),
-    (ROTOR, "kg·m²", |j| j.rotor_inertia),
-    ("torque_gain", "", |j| j.torque_gain),
-];
-
-/// The setting that a URDF has no place for.
-const ROTOR: &str = "rotor_inertia_kg_m2";
-
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
 /// What no frame of the protocol carries, in words.
@@ -62,6 +45,15 @@ pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
 impl Arm {
+    /// Whether the arm has a value of its own for a setting: no URDF has a place for gravity and rotor inertia.
+    pub(super) fn gives(&self, setting: &Setting, joint: Option<Joint>) -> bool {
+        match setting.name {
+            "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
+            name if name.starts_with("gravity_") => self.gravity.is_some(),
+            _ => true,
+        }
+    }
+
     /// The settings of this arm that a controller with the settings `device` uses otherwise: gravity first, then joint by joint.
     /// Empty: the controller's settings are those of this arm.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
@@ -77,10 +69,11 @@ impl Arm {
         {
             compare(name, None, file, device, "m/s²");
         }
-        for (joint, (file, device)) in Joint::ALL.into_iter().zip(own.joints.iter().zip(&device.joints)) {
-            for (name, unit, value) in JOINT_SETTINGS {
-                if name != ROTOR || self.rotors_given[joint.index()] {
-                    compare(name, Some(joint), value(file), value(device), unit);
+        for joint in Joint::ALL {
+            for row in TABLE.iter().filter(|row| row.of_joint() && self.gives(row, Some(joint))) {
+                let value = |config| row.get(config, joint.number());
+                if let (Some(file), Some(device)) = (value(&own), value(device)) {
+                    compare(row.name, Some(joint), file, device, row.unit);
                 }
             }
         }

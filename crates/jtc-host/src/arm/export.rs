@@ -56,27 +56,18 @@ impl Arm {
                 }
             }
         }
+        let config = self.config();
         for (i, origin) in self.model.joints.iter().enumerate() {
             let name = self.joint_names.get(i).unwrap_or(&self.flange_name);
             let _ = writeln!(out, "\n[[joint]]\nname = {}", quoted(name));
             let _ =
                 writeln!(out, "origin_xyz_m = {}\norigin_rpy_rad = {}", list(&origin.xyz), list(&origin.rpy));
-            let Some(limit) = self.joints.get(i) else { continue };
-            for (key, value) in [
-                ("position_min_rad", limit.position_min),
-                ("position_max_rad", limit.position_max),
-                ("velocity_max_rad_s", limit.velocity_max),
-                ("acceleration_max_rad_s2", limit.acceleration_max),
-                ("torque_max_nm", limit.torque_max),
-                ("position_error_max_rad", limit.position_error_max),
-                ("rotor_inertia_kg_m2", limit.rotor_inertia),
-            ] {
-                if key != "rotor_inertia_kg_m2" || self.rotors_given[i] {
-                    let _ = writeln!(out, "{key} = {value:?}");
+            let Some(joint) = Joint::from_index(i) else { continue };
+            for row in settings::TABLE.iter().filter(|row| row.of_joint() && self.gives(row, Some(joint))) {
+                let Some(value) = row.get(&config, joint.number()) else { continue };
+                if row.name != "torque_gain" || value != 1.0 {
+                    let _ = writeln!(out, "{} = {value:?}", row.name);
                 }
-            }
-            if limit.torque_gain != 1.0 {
-                let _ = writeln!(out, "torque_gain = {:?}", limit.torque_gain);
             }
             if let Some(g) = self.pid.map(|p| p[i]) {
                 let _ = writeln!(

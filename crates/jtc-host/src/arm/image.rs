@@ -4,9 +4,10 @@ use jtc_core::settings::{self, SettingError};
 use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::field::{frame, image};
-use jtc_wire::{ArmImage, EncodeError, Floats, FrictionImage, Hash, Joint, Name, SettingValue};
+use jtc_wire::{ArmImage, EncodeError, FloatName, Floats, FrictionImage, Hash, Joint, Name, SettingValue};
 
-use super::{Arm, Difference};
+use super::{Arm, Difference, values};
+use crate::frame::model_rows;
 
 /// Why an image is not that of an arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -19,18 +20,6 @@ pub enum ImageError {
     #[error("{0}")]
     Setting(SettingError),
 }
-
-/// The order in which a frame of the model has the numbers of a frame.
-const ORIGIN: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
-const LINK: [&str; 13] =
-    ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
-const PID: [(&str, &str); 5] = [
-    ("pid.kp", "N·m/rad"),
-    ("pid.ki", "N·m/(rad·s)"),
-    ("pid.kd", "N·m·s/rad"),
-    ("pid.int_min_rad_s", "rad·s"),
-    ("pid.int_max_rad_s", "rad·s"),
-];
 
 impl Arm {
     /// The values of the settings that a controller of this arm has, in the order of its table. What the file does not give is as
@@ -112,20 +101,14 @@ impl Arm {
         for value in self.settings() {
             let joint = Joint::from_number(value.joint.into());
             let Some(row) = settings::setting(value.setting) else { continue };
-            let given = match row.name {
-                "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
-                name if name.starts_with("gravity_") => self.gravity.is_some(),
-                _ => true,
-            };
-            if let (true, Some(has)) = (given, row.get(&device_config, value.joint)) {
+            if let (true, Some(has)) = (self.gives(row, joint), row.get(&device_config, value.joint)) {
                 compare(row.name.to_owned(), joint, value.value, has, row.unit);
             }
         }
         if let (Some(own), Some(has)) = (&self.pid, &device.pid) {
             for (joint, (own, has)) in Joint::ALL.into_iter().zip(own.iter().zip(has)) {
-                let numbers = |g: &PidGains| [g.kp, g.ki, g.kd, g.int_min, g.int_max];
-                for ((name, unit), (own, has)) in PID.iter().zip(numbers(own).into_iter().zip(numbers(has))) {
-                    compare((*name).to_owned(), Some(joint), own, has, unit);
+                for (kind, get) in values::gains(&device_config.parameter_bounds) {
+                    compare(kind.name.to_owned(), Some(joint), get(own), get(has), kind.unit);
                 }
             }
         }
@@ -235,25 +218,18 @@ fn tables(floats: &Floats<'_>) -> [TableOf<f32>; JOINTS] {
 
 /// Every number of two models, with its name.
 fn model_numbers(own: &ArmModel, has: &ArmModel) -> Vec<(String, f64, f64)> {
-    let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
-    let link = |l: &Link| {
-        let mut numbers = [0.0; 13];
-        numbers[..6].copy_from_slice(&origin(&l.origin));
-        numbers[6..12].copy_from_slice(&l.inertia);
-        numbers[12] = l.mass;
-        numbers
-    };
+    let (own, has) = (model_rows(own), model_rows(has));
     let mut all = Vec::new();
-    for (i, (own, has)) in own.joints.iter().zip(&has.joints).enumerate() {
+    for (i, (own, has)) in own.0.iter().zip(&has.0).enumerate() {
         let part =
             if i < JOINTS { format!("origin of joint {}", i + 1) } else { "origin of the flange".into() };
-        for ((name, own), has) in ORIGIN.iter().zip(origin(own)).zip(origin(has)) {
-            all.push((format!("{part}, {name}"), own, has));
+        for ((name, own), has) in FloatName::LINK.iter().zip(own).zip(has) {
+            all.push((format!("{part}, {name}"), *own, *has));
         }
     }
-    for (i, (own, has)) in own.links.iter().zip(&has.links).enumerate() {
-        for ((name, own), has) in LINK.iter().zip(link(own)).zip(link(has)) {
-            all.push((format!("link {i}, {name}"), own, has));
+    for (i, (own, has)) in own.1.iter().zip(&has.1).enumerate() {
+        for ((name, own), has) in FloatName::LINK.iter().zip(own).zip(has) {
+            all.push((format!("link {i}, {name}"), *own, *has));
         }
     }
     all

@@ -56,15 +56,10 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         flange_name: chain.flange.last().map_or_else(|| "flange".to_owned(), |j| j.name.clone()),
         model,
         joints,
-        // The form has no place for it.
-        rotors_given: [false; JOINTS],
-        gravity: None,
-        others: Vec::new(),
-        pid: None,
-        polynomial: None,
-        table: None,
         warnings: chain.warnings,
         sources: chain.sources,
+        // The form has no place for the rest.
+        ..Arm::nameless()
     };
     Ok(Described { arm, gravity, friction })
 }

@@ -32,9 +32,9 @@ pub struct ArmValue {
 }
 
 /// What is known of a number whatever the arm.
-struct Kind {
-    name: &'static str,
-    unit: &'static str,
+pub(super) struct Kind {
+    pub name: &'static str,
+    pub unit: &'static str,
     min: Option<f64>,
     max: Option<f64>,
     default: Option<f64>,
@@ -67,7 +67,7 @@ const FRICTION: [(&str, &str); 6] = [
 ];
 
 /// Numbers of one thing: what each is, and where it stands there.
-type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
+pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
 /// A setting of each joint or of the controller: its range is that of the table, and what the drives can do of it.
 fn setting(row: &Setting, drives: &Config) -> Kind {
@@ -90,7 +90,8 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
     Kind { default, ..kind(row.name, row.unit, Some(low), Some(high)) }
 }
 
-fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
+/// What the gains of a joint are.
+pub(super) fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
     let (none, least, most) = (Some(0.0), Some(-bounds.integral_max), Some(bounds.integral_max));
     [
         (kind("pid.kp", "N·m/rad", none, Some(bounds.kp_max)), |g| g.kp),
@@ -139,8 +140,8 @@ impl Arm {
             let j = joint.index();
             let mut add = |v: ArmValue| all.push(ArmValue { joint: Some(joint), ..v });
             for row in settings::TABLE.iter().filter(|row| row.of_joint()) {
-                let absent = row.name == "rotor_inertia_kg_m2" && !self.rotors_given[j];
-                let from = if absent { Source::Default } else { self.sources.of((Some(joint), row.name)) };
+                let given = self.gives(row, Some(joint));
+                let from = if given { self.sources.of((Some(joint), row.name)) } else { Source::Default };
                 add(value(setting(row, &drives), row.get(&config, joint.number()), from));
             }
             let source =

@@ -8,7 +8,7 @@ use jtc_wire::{
     fixed, floats, set_settings,
 };
 
-use super::{PushReport, Session};
+use super::{PushReport, Session, frame_type, type_byte};
 use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
@@ -70,7 +70,7 @@ impl<P: Port> Session<P> {
 
     /// Sends an extension request; an error when it is refused or not known.
     fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
-        let request = frame.get(1).copied().and_then(FrameType::from_byte).unwrap_or(FrameType::GetInfo);
+        let request = frame_type(type_byte(frame));
         if self.extensions == Extensions::None {
             return Err(LinkError::NoExtension { request });
         }
@@ -109,8 +109,32 @@ impl<P: Port> Session<P> {
                 self.read(end - now)?;
             }
         }
-        let request = frame.get(1).copied().and_then(FrameType::from_byte).unwrap_or(FrameType::GetInfo);
+        let request = frame_type(type_byte(frame));
         Err(LinkError::NotConfirmed { request, tries: self.timeouts.tries, last: None })
+    }
+
+    /// Asks for what is longer than a frame, page by page: `request` asks for the page from an index on, and `take` returns that
+    /// page and the length of the whole.
+    fn ask_pages<T, const N: usize>(
+        &mut self,
+        request: impl Fn(u16) -> [u8; N],
+        take: impl Fn(Answer<'_>, u16) -> Option<(Vec<T>, u16)>,
+    ) -> Result<Vec<T>, LinkError> {
+        let mut all = Vec::new();
+        loop {
+            let from = all.len() as u16;
+            let (page, total) = self.ask(&request(from), |answer| take(answer, from))?;
+            let done = page.is_empty();
+            all.extend(page);
+            if done || all.len() >= usize::from(total) {
+                return Ok(all);
+            }
+        }
+    }
+
+    /// Who the device is, which `request` needs.
+    fn info_for(&mut self, request: FrameType) -> Result<Info, LinkError> {
+        self.info()?.ok_or(LinkError::NoExtension { request })
     }
 
     /// Every setting as the device has it, in the order of its table.
@@ -119,21 +143,12 @@ impl<P: Port> Session<P> {
     ///
     /// [`LinkError::NoExtension`], and those of the line.
     pub fn settings(&mut self) -> Result<Vec<SettingValue>, LinkError> {
-        let mut all = Vec::new();
-        loop {
-            let from = all.len() as u16;
-            let (page, total) = self.ask(&fixed::get_settings(from), |answer| match answer {
-                Answer::Settings { first, total, values } if first == from => {
-                    Some((values.iter().collect::<Vec<_>>(), usize::from(total)))
-                }
-                _ => None,
-            })?;
-            let done = page.is_empty();
-            all.extend(page);
-            if done || all.len() >= total {
-                return Ok(all);
+        self.ask_pages(fixed::get_settings, |answer, from| match answer {
+            Answer::Settings { first, total, values } if first == from => {
+                Some((values.iter().collect(), total))
             }
-        }
+            _ => None,
+        })
     }
 
     /// The settings that the device computes with; those that are built in where it has no extensions.
@@ -142,7 +157,7 @@ impl<P: Port> Session<P> {
     ///
     /// Those of the line, and [`ExtensionError::NoArm`] for settings of no arm.
     pub fn device_config(&mut self) -> Result<Config, Error> {
-        if self.info()?.is_none() {
+        if !self.has_extensions() && self.info()?.is_none() {
             return Ok(Config::avena());
         }
         let values = self.settings()?;
@@ -255,22 +270,11 @@ impl<P: Port> Session<P> {
     ///
     /// [`ExtensionError::Changed`] when the arm changed meanwhile; those of [`Session::settings`].
     pub fn arm_image(&mut self) -> Result<Vec<u8>, Error> {
-        let info = self.info()?.ok_or(LinkError::NoExtension { request: FrameType::GetArm })?;
-        let mut image = Vec::new();
-        loop {
-            let from = image.len() as u16;
-            let (page, total) = self.ask(&fixed::get_arm(from), |answer| match answer {
-                Answer::Arm { offset, total, bytes } if offset == from => {
-                    Some((bytes.to_vec(), usize::from(total)))
-                }
-                _ => None,
-            })?;
-            let done = page.is_empty();
-            image.extend(page);
-            if done || image.len() >= total {
-                break;
-            }
-        }
+        let info = self.info_for(FrameType::GetArm)?;
+        let image = self.ask_pages(fixed::get_arm, |answer, from| match answer {
+            Answer::Arm { offset, total, bytes } if offset == from => Some((bytes.to_vec(), total)),
+            _ => None,
+        })?;
         let whole = jtc_wire::ArmImage::parse(&image).is_some();
         if whole && jtc_wire::Hash::of_image(&image) == info.hash {
             Ok(image)
@@ -288,7 +292,7 @@ impl<P: Port> Session<P> {
         self.extension(&fixed::STORE_ARM)?;
         let end = self.port.now() + STORING;
         loop {
-            let info = self.info()?.ok_or(LinkError::NoExtension { request: FrameType::StoreArm })?;
+            let info = self.info_for(FrameType::StoreArm)?;
             match info.store {
                 StoreState::Stored => return Ok(info.sequence),
                 StoreState::Busy if self.port.now() < end => {

@@ -256,7 +256,7 @@ impl<P: Port> Session<P> {
 
     /// Sends a frame and waits for its record; frames that arrive damaged are sent again. Not public: a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
-        let kind = frame.get(1).copied().unwrap_or(0);
+        let kind = type_byte(frame);
         let mut bad = None;
         self.catch_up()?;
         self.records.clear();
@@ -338,6 +338,11 @@ impl<P: Port> Session<P> {
             }
         }
     }
+}
+
+/// The type of a frame as the wire has it; 0, which is none, for bytes that are no frame.
+fn type_byte(frame: &[u8]) -> u8 {
+    frame.get(1).copied().unwrap_or(0)
 }
 
 /// The type of a request that this library sent itself.

@@ -43,7 +43,7 @@ pub(super) fn push(
     if session.info()?.is_none() {
         return without_extensions(&mut session, &arm, store, accept, out);
     }
-    let pushed = session.push_arm(&arm, |p| out.note(told(p))).map_err(|e| refused(e, &arm))?;
+    let pushed = session.push_arm(&arm, |p| out.note(sent(p))).map_err(|e| refused(e, &arm))?;
     let stored = if store { Some(keep(&mut session, out)?) } else { None };
     let now = arm.hash().ok().flatten().unwrap_or_default();
     let value = json!({
@@ -61,7 +61,8 @@ pub(super) fn push(
     Ok(())
 }
 
-fn told(p: &PushReport) -> String {
+/// What was sent, in words.
+fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
@@ -110,7 +111,7 @@ fn without_extensions(
         return Err(Failure::new(ErrorKind::Refused, "no-extension", message).hint("push without --store"));
     }
     let differences = limits::accept(arm, &Config::avena(), accept.accept_device_limits, out)?;
-    let pushed = session.push(&arm.parameter_set(), |p| out.note(told(p)))?;
+    let pushed = session.push(&arm.parameter_set(), |p| out.note(sent(p)))?;
     let value = json!({
         "arm": arm.name, "hash": null, "parts": pushed, "stored_number": null, "differences": differences,
     });
@@ -146,7 +147,7 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
         let mut text = if equal {
             format!("nothing differs: the controller has arm {}", arm.name)
         } else {
-            format!("{}\n{}", count(&differences), as_table(&differences))
+            format!("{}\n{}", limits::values_differ(differences.len()), as_table(&differences))
         };
         if !known {
             text += "\nthis controller has no extensions: compared with the settings that its kind is known to have; friction, \
@@ -155,14 +156,6 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
         text.trim_end().to_owned()
     });
     if equal { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
-}
-
-fn count(differences: &[Difference]) -> String {
-    if differences.len() == 1 {
-        "1 value differs".into()
-    } else {
-        format!("{} values differ", differences.len())
-    }
 }
 
 fn as_table(differences: &[Difference]) -> String {

@@ -1,0 +1,121 @@
+//! What is read and set, and when (J-53).
+use super::*;
+
+#[test]
+fn j53_settings_are_read_page_by_page() {
+    let mut bench = Bench::new();
+    let mut values = Vec::new();
+    while values.len() < settings::count(false) {
+        bench.send(1, &fixed::get_settings(values.len() as u16));
+        let (line, bytes) = bench.answers.pop().expect("an answer");
+        let frame = FrameRef::new_checked(&bytes).expect("a good frame");
+        let Some(Answer::Settings { first, total, values: page }) = Answer::parse(frame) else {
+            panic!("no Settings")
+        };
+        assert_eq!((line, usize::from(first), usize::from(total)), (1, values.len(), settings::count(false)));
+        values.extend(page.iter());
+    }
+    assert_eq!(values, settings::values(&Config::avena(), 0, false).collect::<Vec<_>>());
+}
+
+#[test]
+fn j53_settings_change_whole_and_without_torque_only() {
+    let mut bench = Bench::new();
+    bench.info(0);
+    let good = SettingValue { setting: 34, joint: 0, value: 9.81 };
+    let bad = SettingValue { setting: 3, joint: 2, value: -1.0 };
+    let both = settings_frame(&[good, bad]).expect("it fits");
+    assert_eq!(bench.send(0, &both), DataStatus::IncorrectValue);
+    assert_eq!(bench.controller.config(), &Config::avena(), "nothing is half changed");
+    for (state, taken) in [
+        (ControllerState::Init, true),
+        (ControllerState::Error, true),
+        (ControllerState::HoldPos, false),
+        (ControllerState::Teaching, false),
+        (ControllerState::Operate, false),
+    ] {
+        let expected = if taken { DataStatus::NoError } else { DataStatus::NotAllowed };
+        bench.controller.state = state;
+        let frame = settings_frame(&[good]).expect("it fits");
+        let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
+        assert_eq!(bench.at_once(Command::SetSettings(values)), expected, "{state:?}");
+        assert_eq!(bench.controller.config.gravity[2], if taken { 9.81 } else { -9.81 });
+        // The speed override changes in every state.
+        let frame = settings_frame(&[SettingValue { setting: 128, joint: 0, value: 0.5 }]).expect("it fits");
+        let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
+        assert_eq!(bench.at_once(Command::SetSettings(values)), DataStatus::NoError, "{state:?}");
+        let name = Command::SetName(Name::default());
+        assert_eq!(bench.at_once(name), expected, "{state:?}");
+        bench.controller.use_settings(Config::avena());
+    }
+}
+
+/// Gravity decides the torque of the model from the next tick on.
+#[test]
+fn j53_gravity_that_is_set_is_computed_with() {
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    let at = [0.0, 0.7, 0.3, 0.0, 0.2, 0.0];
+    let before = bench.controller.parameters.dynamics.gravity_torque(&at);
+    assert_eq!(bench.set(34, 0, 9.81), DataStatus::NoError);
+    let after = bench.controller.parameters.dynamics.gravity_torque(&at);
+    assert!(before.iter().zip(after).all(|(b, a)| (b + a).abs() < 1e-9) && before[1].abs() > 10.0);
+}
+
+/// What was received must also fit to the settings that come later.
+#[test]
+fn j53_settings_that_the_parameters_contradict_are_refused() {
+    for (setting, value) in [(96, 7_000.0), (101, 0.5), (103, 0.001)] {
+        let mut bench = Bench::new();
+        assert_eq!(bench.set(setting, 0, value), DataStatus::NoError, "nothing was received yet");
+        let mut bench = Bench::new();
+        bench.use_defaults();
+        assert_eq!(bench.set(setting, 0, value), DataStatus::IncorrectValue, "{setting}");
+    }
+    // And the other way round.
+    let mut bench = Bench::new();
+    bench.set(96, 0, 7_000.0);
+    assert_eq!(bench.send(0, &fixed::PID_PARAM_USE_DEFAULT), DataStatus::IncorrectValue);
+}
+
+/// What was given is checked, also when it was withdrawn since.
+#[test]
+fn j53_settings_fit_to_what_disable_has_withdrawn() {
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.controller.parameters.withdraw_all();
+    assert_eq!(bench.set(96, 0, 7_000.0), DataStatus::IncorrectValue);
+    // Friction tables, too: one a tick.
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.send(0, &fixed::FRICTION_TABLE_USE_DEFAULT);
+    assert_eq!(bench.set(103, 0, 0.001), DataStatus::IncorrectValue);
+    let before = bench.controller.telemetry().tick;
+    assert_eq!(bench.set(34, 0, 9.81), DataStatus::NoError);
+    assert!(bench.controller.telemetry().tick - before >= 6);
+}
+
+/// In motion a few values are taken, not hundreds.
+#[test]
+fn j07_j53_settings_in_motion_are_few() {
+    let value = SettingValue { setting: settings::SPEED, joint: 0, value: 0.5 };
+    for (count, taken) in [(1, true), (LIVE_MAX, true), (LIVE_MAX + 1, false), (200, false)] {
+        let mut bench = Bench::new();
+        bench.controller.state = ControllerState::Operate;
+        let frame = settings_frame(&vec![value; count]).expect("it fits");
+        let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
+        let outcome = bench.at_once(Command::SetSettings(values));
+        assert_eq!(outcome, if taken { DataStatus::NoError } else { DataStatus::NotAllowed }, "{count}");
+    }
+}
+
+#[test]
+fn j33_settings_under_which_stops_fail_are_refused() {
+    let mut bench = Bench::new();
+    bench.info(0);
+    for (setting, value, taken) in [(53, 501.0, false), (54, 999.0, false), (54, 1000.0, true)] {
+        let expected = if taken { DataStatus::NoError } else { DataStatus::IncorrectValue };
+        assert_eq!(bench.set(setting, 0, value), expected, "{setting} = {value}");
+        bench.controller.use_settings(Config::avena());
+    }
+}

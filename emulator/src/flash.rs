@@ -41,7 +41,7 @@ pub mod sr {
     pub const EOP: u32 = 1 << 16;
     /// Write protection.
     pub const WRPERR: u32 = 1 << 17;
-    /// Programming without being told so before.
+    /// Programming without having been set to do so.
     pub const PGSERR: u32 = 1 << 18;
     /// A byte was written twice.
     pub const STRBERR: u32 = 1 << 19;
@@ -270,7 +270,7 @@ impl Flash {
         }
     }
 
-    /// The core reads; the flag says that the word cannot be read.
+    /// The core reads; the flag shows that the word cannot be read.
     pub fn load(&mut self, address: u32, size: usize) -> (u32, bool) {
         let at = (address - BANK2) as usize;
         let bad = self.bank.cells[at / WORD] == Cell::Unreadable;

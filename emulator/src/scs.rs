@@ -207,7 +207,7 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // Strongly ordered and device memory; what the program only reads is not told apart here.
+        // Strongly ordered and device memory; what the program only reads is not distinguished here.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }

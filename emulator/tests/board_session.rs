@@ -87,7 +87,7 @@ fn a_whole_session() {
     assert!(accepted(rig.exec(ExecCommand::Stop)));
     let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
     // J-34: from somewhere on the path it cannot be started.
-    // J-51: only a host that asks is told why.
+    // J-51: only a host that asks receives the reason.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::IncorrectValue);
     rig.ask(HOST, &fixed::GET_INFO);
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);

@@ -144,7 +144,7 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     rig.run(60);
     let info = rig.hosts[1].info.expect("an Info");
     assert_eq!((info.store, info.boots, info.board.as_str()), (StoreState::Empty, 1, BOARDS[0]));
-    assert_eq!(rig.hosts[0].info, None, "the other line is told nothing");
+    assert_eq!(rig.hosts[0].info, None, "the other line receives nothing");
 
     let mut settings = [0; 26];
     let values = [
@@ -318,7 +318,7 @@ fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     }
 }
 
-/// The flash reports an error: the program says so, the image of before stays, and the next attempt may succeed.
+/// The flash reports an error: the program reports it, the image of before stays, and the next attempt may succeed.
 #[test]
 fn j54_a_failed_store_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));

@@ -21,7 +21,7 @@ pub type Buffer = [u8; IMAGE_MAX];
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
-/// What tick and links tell each other. Its form is fixed, so that a debugger can look at it: words in this order.
+/// What tick and links exchange. Its form is fixed, so that a debugger can look at it: words in this order.
 #[repr(C)]
 pub struct Mailbox {
     /// [`Mailbox::IDLE`] and so on.

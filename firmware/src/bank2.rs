@@ -111,7 +111,7 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
 /// A word; `None` when it cannot be read. Not while the bank is busy.
 ///
 /// A word whose programming or erasing was cut off may have more wrong bits than the flash corrects. Reading it is a bus fault,
-/// which the core ignores here; the flag that the flash sets instead says it.
+/// which the core ignores here; the flag that the flash sets instead shows it.
 pub fn read(slot: usize, word: usize) -> Option<Word> {
     clear();
     // SAFETY: a register of the core. Nothing else changes it, and the bit acts only where faults are masked.

@@ -233,7 +233,7 @@ impl Tick {
         Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
     }
 
-    /// Hands an arm over to be stored, and tells the controller what becomes of it (J-54).
+    /// Hands an arm over to be stored, and reports to the controller what becomes of it (J-54).
     fn store_arm(&mut self, requested: bool) {
         let state = if requested && arm_store::begin(self.controller.stored_arm()).is_err() {
             Some(StoreState::Failed)

@@ -106,7 +106,7 @@ pub enum Command {
     /// Who the controller is: firmware, arm in use, what is missing, why it started last
     #[command(
         after_help = "The hash is that of all that decides how the arm moves: model, gains, friction, settings. On a device without\n\
-                            extensions only what a status tells is shown.\n\nExamples:\n  jtc info\n  jtc --json info | jq -r .hash"
+                            extensions only what a status carries is shown.\n\nExamples:\n  jtc info\n  jtc --json info | jq -r .hash"
     )]
     Info(LinkArgs),
     /// Live view of the controller and the joints

@@ -1,4 +1,4 @@
-//! What a controller with extensions tells and takes: identity, arm, speed, jogging (J-52 to J-58).
+//! What a controller with extensions reports and takes: identity, arm, speed, jogging (J-52 to J-58).
 
 mod common;
 

@@ -48,7 +48,7 @@ pub(crate) struct Extensions {
     pub unusable: bool,
     /// Of the arm in use; `None` when it has to be computed anew.
     pub hash: Option<u64>,
-    /// Ticks since a host was heard.
+    /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
     identity: Identity,
     name: Name,
@@ -74,7 +74,7 @@ impl Extensions {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Tells the controller who it is. For the board to call before the first tick.
+    /// Gives the controller its identity. For the board to call before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.identity = identity;
     }
@@ -106,7 +106,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         loaded
     }
 
-    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] says so; empty where there is none.
+    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] asks for it; empty where there is none.
     pub fn stored_arm(&self) -> &[u8] {
         self.extensions.stored.bytes()
     }
@@ -340,13 +340,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Done
     }
 
-    /// J-59: hosts that say nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
+    /// J-59: hosts that send nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         self.extensions.answers.tick();
-        let heard = inputs.urgent.iter().any(|commands| !commands.is_empty())
+        let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));
         let silent = &mut self.extensions.hosts_silent_ms;
-        *silent = if heard { 0 } else { silent.saturating_add(1) };
+        *silent = if received { 0 } else { silent.saturating_add(1) };
         let limit = u32::from(self.config.host_timeout_ms);
         if limit == 0 || *silent < limit {
             return;

@@ -16,9 +16,9 @@
 //! | 32.. | the image; the rest of its last word is 0xFF |
 //!
 //! The header is written last: a slot whose writing was cut off has none. A word that was being programmed, and a sector that was
-//! being erased, may hold anything; the CRC tells. All numbers are little-endian.
+//! being erased, may hold anything; the CRC shows it. All numbers are little-endian.
 //!
-//! There is no hardware here: [`Storing`] says what to do next, whoever has the flash does it. A flash word can be programmed
+//! There is no hardware here: [`Storing`] returns what to do next, whoever has the flash does it. A flash word can be programmed
 //! once after it was erased, and [`Storing`] asks for no more.
 use core::cmp::Ordering;
 
@@ -63,7 +63,7 @@ impl Header {
         Some(Self { crc: digest.finalize(), ..header })
     }
 
-    /// What a word says if it is a header; whether its slot is whole is for [`Header::accepts`] to say.
+    /// The header that a word is, if it is one; whether its slot is whole is decided by [`Header::accepts`].
     pub fn parse(word: &Word) -> Option<Self> {
         let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
         let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };

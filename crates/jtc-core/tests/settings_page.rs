@@ -1,4 +1,4 @@
-//! docs/settings.md is what the table of settings says (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page` writes it.
+//! docs/settings.md is the table of settings (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page` writes it.
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -228,7 +228,7 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would tell a slot that is not whole; without a header nobody needs to compute it.
+/// The CRC alone would find a slot that is not whole; without a header nobody needs to compute it.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);

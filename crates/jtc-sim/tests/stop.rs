@@ -163,7 +163,7 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
     operator
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
-    // Only who asked is told why (J-51).
+    // Only who asked receives the reason (J-51).
     operator.ask(&fixed::GET_INFO).expect("it answers");
     operator.listener.responses.clear();
     // An Execute behind gains that are executed one a tick, and a Stop behind it.

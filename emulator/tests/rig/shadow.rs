@@ -56,7 +56,7 @@ impl Shadow {
         Self { controller, worked: Vec::new() }
     }
 
-    /// What has become of the arm that was to be stored, as the board's mailbox says after the tick.
+    /// What has become of the arm that was to be stored, as the board's mailbox has it after the tick.
     pub fn stored(&mut self, state: StoreState, sequence: u32) {
         self.controller.set_store_state(state, sequence);
     }

@@ -25,7 +25,7 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The hash as everybody writes it.
+/// The hash as it is written everywhere.
 pub fn hash(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -83,7 +83,7 @@ fn as_text(info: &Info) -> String {
     )
 }
 
-/// A time as people say it.
+/// A time in the unit that fits.
 fn span(s: u64) -> String {
     match s {
         0..120 => format!("{s} s"),
@@ -114,7 +114,7 @@ fn without_extensions(s: &Status) -> String {
     let missing = words::missing_parameters(s.jtc_init);
     let missing = if missing.is_empty() { "nothing".into() } else { missing.join(", ") };
     format!(
-        "a controller without extensions: it does not tell its firmware, its arm or its limits\n\
+        "a controller without extensions: it does not report its firmware, its arm or its limits\n\
          state:     {}\n\
          missing:   {missing}\n\
          next: jtc status; limits, gravity and rotor inertia are those built into it",
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_is_told_in_its_unit() {
+    fn a_time_is_written_in_its_unit() {
         let spans = [0, 119, 120, 7_199, 7_200, 172_799, 172_800].map(span);
         assert_eq!(spans, ["0 s", "119 s", "2 min", "119 min", "2 h", "47 h", "2 days"]);
     }

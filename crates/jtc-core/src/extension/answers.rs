@@ -3,7 +3,7 @@ use jtc_wire::{ANSWER_MAX, Answer, DataStatus, Response};
 
 use crate::HOST_LINES;
 
-/// Ticks after an extension request in which the line is told every data status.
+/// Ticks after an extension request in which the line receives every data status.
 const KNOWN_MS: u16 = 10_000;
 
 /// One line.
@@ -103,14 +103,14 @@ mod tests {
             let old = matches!(data, DataStatus::NotAllowed | DataStatus::StartPositionMismatch);
             let translated = if old { DataStatus::IncorrectValue } else { data };
             let mut answers = Answers::new();
-            let told = |answers: &Answers| [0, 1].map(|line| answers.record_for(line, record).data);
-            assert_eq!(told(&answers), [translated; 2]);
+            let sent = |answers: &Answers| [0, 1].map(|line| answers.record_for(line, record).data);
+            assert_eq!(sent(&answers), [translated; 2]);
             answers.asked(1);
             for ms in 0..10_000 {
-                assert_eq!(told(&answers), [translated, data], "{ms} ms");
+                assert_eq!(sent(&answers), [translated, data], "{ms} ms");
                 answers.tick();
             }
-            assert_eq!(told(&answers), [translated; 2]);
+            assert_eq!(sent(&answers), [translated; 2]);
         }
     }
 

@@ -47,7 +47,7 @@ pub struct Rig {
     /// Stop and Pause that arrive before the next tick.
     urgent: [UrgentCommands; HOST_LINES],
     host: std::collections::VecDeque<Sent>,
-    /// Tick in which the hosts last asked for an extension: they are told each data status (J-51).
+    /// Tick in which the hosts last asked for an extension: they receive each data status (J-51).
     known: Option<u64>,
 }
 

@@ -58,7 +58,7 @@ pub struct ArmChoice {
     pub tip: Option<String>,
 }
 
-/// The arm of a robot description, and what else that says which an arm has a place for.
+/// The arm of a robot description, and what else it gives that an arm has no place for.
 struct Described {
     arm: Arm,
     /// Acceleration of gravity in the base frame, m/s²: z of the description points upwards.

@@ -136,8 +136,8 @@ impl Arm {
             let torque = (2.0 * worst[j]).max(strongest / 20.0).clamp(0.1, jtc_bus::TORQUE_FULL_SCALE);
             self.joints[j].torque_max = rounded(torque, 2);
             let place = format!("joint {}", self.joint_names[j]);
-            let told = |w: &&mut Warning| w.place == place && w.problem.starts_with("effort limit");
-            if let Some(warning) = self.warnings.iter_mut().find(told) {
+            let assumed = |w: &&mut Warning| w.place == place && w.problem.starts_with("effort limit");
+            if let Some(warning) = self.warnings.iter_mut().find(assumed) {
                 let given = warning.problem.split(':').next().unwrap_or_default();
                 warning.problem = format!("{given}: {} N·m is used", self.joints[j].torque_max);
             }

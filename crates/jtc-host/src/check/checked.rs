@@ -24,7 +24,7 @@ pub struct CheckOptions {
     /// the controller, and those of the controller are safe for this arm. Without it such an arm is refused (J-55).
     pub accept_device_limits: bool,
     /// Settings of the controller: by default those that are built in, and what [`Session::device_config`](crate::Session::device_config)
-    /// tells of one with extensions.
+    /// returns for one with extensions.
     pub device: Config,
 }
 

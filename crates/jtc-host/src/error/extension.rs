@@ -45,7 +45,7 @@ pub enum ExtensionError {
 /// The first of them; the others are counted.
 fn listed(differences: &[Difference]) -> String {
     match differences {
-        [] => "it tells of no difference".into(),
+        [] => "it reports no difference".into(),
         [one] => one.to_string(),
         [one, rest @ ..] => format!("{one}, and {} more", rest.len()),
     }

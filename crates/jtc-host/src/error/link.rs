@@ -84,7 +84,7 @@ impl Diagnose for LinkError {
             Self::NoExtension { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-extension",
-                "its firmware knows the protocol of existing devices only; `jtc info` tells what could be found out",
+                "its firmware knows the protocol of existing devices only; `jtc info` shows what could be found out",
             ),
             Self::Refused { request, code, state, trajectory } => {
                 let next = match request {

@@ -88,7 +88,7 @@ impl<'a> ArmImage<'a> {
 }
 
 /// Hash of an arm image without its name: of all that decides how the arm moves (J-52). FNV-1a with 64 bits (RFC 9923), fed in any
-/// pieces. It tells arms apart that differ by accident, not by malice.
+/// pieces. It distinguishes arms that differ by accident, not by malice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hash(u64);
 

@@ -254,8 +254,11 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             let expected = if filled.contains(&key) { Source::Default } else { Source::File };
             assert_eq!(arm.sources.of((three, key)), expected, "{limit}: {key}");
         }
-        let told = changes(&arm, Change::LimitAssumed);
-        assert!(!told.is_empty() && told.iter().all(|w| w.starts_with("joint a3: ")), "{limit}: {told:?}");
+        let assumed = changes(&arm, Change::LimitAssumed);
+        assert!(
+            !assumed.is_empty() && assumed.iter().all(|w| w.starts_with("joint a3: ")),
+            "{limit}: {assumed:?}"
+        );
     }
     // A torque limit that is proposed is this arm's own, not that of another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
@@ -263,9 +266,9 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);
     let holding = arm.check().holding;
     assert!(holding.iter().all(|h| h.torque_nm <= 0.53 * h.limit_nm), "{holding:?}");
-    let told = changes(&arm, Change::LimitAssumed);
+    let assumed = changes(&arm, Change::LimitAssumed);
     let words = format!("effort limit 0: {} N·m is used", arm.joints[1].torque_max);
-    assert!(told.contains(&format!("joint a2: {words}")), "{told:?}");
+    assert!(assumed.contains(&format!("joint a2: {words}")), "{assumed:?}");
 }
 
 #[test]

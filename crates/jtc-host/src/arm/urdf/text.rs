@@ -75,7 +75,7 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
-/// The error of the reader about a text, at the element that it is about: the reader says what, not where.
+/// The error of the reader about a text, at the element that it is about: the reader names what is wrong, not where.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");
     let mut open = None;

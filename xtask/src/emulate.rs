@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::shell::{self, run, run_lines, works};
 use crate::tally::{Counts, Outcome, Tally};
 use crate::test::count_results;
-use crate::{firmware, size};
+use crate::{firmware, python, size};
 
 /// Figures of the boards' programs, kept in the repository so that a change to them is a decision.
 const FIGURES: &str = "docs/board-figures.txt";
@@ -36,6 +36,7 @@ pub fn steps(tally: &mut Tally, update: bool) {
         Ok(Outcome::Passed)
     });
     tally.step("board: sessions on the emulated chip", tests);
+    tally.step("board: arms of other people's robot descriptions", driving);
     tally.step("board: figures", || figures(update).map(|()| Outcome::Passed));
 }
 
@@ -92,6 +93,17 @@ fn tests() -> Result<Outcome> {
         ensure!(counts.passed > 0, "cargo ran no test at all");
     }
     Ok(Outcome::Counted(counts))
+}
+
+/// From a robot description to a motion, on the program that is flashed.
+fn driving() -> Result<Outcome> {
+    let jtc = build_jtc()?;
+    run(&mut cargo(&["build", "--release"]))?;
+    let emulator = shell::target().join("emulator/release/openjtc-emulate");
+    let mut script = shell::command(python::environment("requirements.txt")?);
+    script.arg("references/arms/check_driving.py").arg(jtc);
+    script.arg("--board").arg(emulator).arg(firmware::elf(firmware::BOARDS[0]));
+    run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 
 /// Measures, prints, and compares with what is kept.

@@ -1,5 +1,5 @@
 //! Settings of the simulated world.
-use jtc_core::{Config, Parameters};
+use jtc_core::{Config, JointConfig, Parameters};
 use jtc_dynamics::{JOINTS, JointVec};
 
 use crate::arm::SimArm;
@@ -8,6 +8,9 @@ use crate::faults::FaultPlan;
 
 /// Over-speed trip of a drive over the velocity limit of its joint: with the default arm that of known drives.
 const OVER_SPEED: f64 = 1.2;
+
+/// A joint that does not get to 0 starts so far from its end, rad.
+const END_DISTANCE: f64 = 0.2;
 
 /// How far the true arm is from the one that it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +76,7 @@ pub struct SimConfig {
     pub stored_arm: Option<Vec<u8>>,
     /// How far the true arm is from `arm`.
     pub model_error: ModelError,
-    /// Pose at the start, rad.
+    /// Pose at the start, rad; 0 at first, and where a joint does not get there as near to it as it does.
     pub start: JointVec,
     /// What supports the arm while drives are not enabled.
     pub support: Support,
@@ -119,10 +122,10 @@ impl SimConfig {
         Self {
             arm: SimArm::new(&controller, parameters),
             gripper: controller.gripper,
+            start: core::array::from_fn(|j| near_zero(&controller.joints[j])),
             controller,
             stored_arm: None,
             model_error: ModelError::default(),
-            start: [0.0; JOINTS],
             support: Support::Brakes,
             drives,
             absent_drives: 0,
@@ -134,6 +137,36 @@ impl SimConfig {
             seed: 1,
             faults: FaultPlan::default(),
             log_entries: 10_000,
+        }
+    }
+}
+
+/// The angle nearest to 0 that keeps some distance from the ends of a joint, rad. Many arms do not get to 0 with each joint.
+fn near_zero(joint: &JointConfig) -> f64 {
+    let (low, high) = (joint.position_min, joint.position_max);
+    let distance = END_DISTANCE.min(0.5 * (high - low));
+    0.0_f64.max(low + distance).min(high - distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_joint_starts_within_its_limits_and_at_zero_where_it_can() {
+        for (ends, start) in [
+            ((-1.0, 1.0), 0.0),
+            ((-0.2, 3.0), 0.0),
+            ((0.8, 2.9), 1.0),
+            ((0.0, 2.9), 0.2),
+            ((-2.5, -0.5), -0.7),
+            ((0.3, 0.4), 0.35),
+        ] {
+            let mut config = Config::avena();
+            (config.joints[2].position_min, config.joints[2].position_max) = ends;
+            let sim = SimConfig::new(config, &Parameters::avena());
+            assert!((sim.start[2] - start).abs() < 1e-12, "{ends:?}: {}", sim.start[2]);
+            assert_eq!(sim.start[1], 0.0);
         }
     }
 }

@@ -44,6 +44,21 @@ impl fmt::Debug for Bank2 {
 }
 
 impl Bank2 {
+    /// A bank that holds these bytes from its begin on, as [`Self::bytes`] gave them: a word of ones is an erased one, and none is
+    /// unreadable. What exceeds the bank is left out.
+    pub fn from_bytes(bytes: &[u8]) -> Self {
+        let mut bank = Self::default();
+        for (n, word) in bytes
+            .chunks(WORD)
+            .take(WORDS)
+            .enumerate()
+            .filter(|(_, word)| word.iter().any(|byte| *byte != 0xFF))
+        {
+            bank.put(BANK2 + (n * WORD) as u32, word);
+        }
+        bank
+    }
+
     /// Bytes at an address, as they are read without regard to errors.
     pub fn bytes(&self, address: u32, length: usize) -> Vec<u8> {
         let at = (address - BANK2) as usize;

@@ -1,6 +1,6 @@
 //! Bank 2 of the flash: locks, times, errors, the core that waits for it, what a loss of power leaves.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
-use openjtc_emulator::flash::{BANK2, Bank2, Flash, OperationKind, sr};
+use openjtc_emulator::flash::{BANK2, BANK2_SIZE, Bank2, Flash, OperationKind, WORD, sr};
 use openjtc_emulator::{Machine, ResetCause};
 
 use crate::programs::{ERASE_AND_READ, READ_BANK2};
@@ -172,4 +172,17 @@ fn an_unreadable_word_is_a_fault_and_outlasts_the_power() {
     assert_eq!(faults.first().map(|fault| fault.address), Some(AT), "{faults:?}");
     let bank = machine.cut_power(0);
     assert_eq!(format!("{bank:?}"), "0 words programmed, 1 unreadable");
+}
+
+/// As a file keeps it while the board is off.
+#[test]
+fn a_bank_of_the_bytes_that_another_had_is_that_bank() {
+    let mut bank = Bank2::default();
+    bank.put(BANK2 + 6 * 0x2_0000, &[0x5A; 3 * WORD]);
+    bank.put(BANK2 + BANK2_SIZE - WORD as u32, &[0; WORD]);
+    let bytes = bank.bytes(BANK2, BANK2_SIZE as usize);
+    assert!(Bank2::from_bytes(&bytes) == bank);
+    let longer = [&bytes[..], &[1; 100]].concat();
+    assert!(Bank2::from_bytes(&longer) == bank, "what exceeds the bank is left out");
+    assert!(Bank2::from_bytes(&[]) == Bank2::default());
 }

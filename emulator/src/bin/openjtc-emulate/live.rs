@@ -3,6 +3,7 @@ use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use openjtc_emulator::flash::Bank2;
 use openjtc_emulator::observe::ResetCause;
 use openjtc_emulator::{Board, Port};
 
@@ -71,6 +72,11 @@ impl Live {
             resets: 1,
             faults: 0,
         }
+    }
+
+    /// What bank 2 of the flash holds if the power goes now.
+    pub fn cut_power(&self, seed: u64) -> Bank2 {
+        self.board.machine.cut_power(seed)
     }
 
     /// Runs until `stop` is set.

@@ -10,12 +10,15 @@ mod log;
 #[allow(dead_code)]
 mod pty;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::{Parser, ValueEnum};
+use jtc_host::arm::Arm;
+use jtc_sim::SimConfig;
+use openjtc_emulator::flash::{BANK2, BANK2_SIZE, Bank2};
 use openjtc_emulator::{Board, BoardConfig, Elf, Port};
 
 use live::{Live, Speed};
@@ -44,6 +47,13 @@ struct Args {
     /// Seed of the arm's deviations and of what RAM holds at first.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// The arm that is on the bus, as an arm file; without it the default one.
+    #[arg(long, value_name = "FILE")]
+    arm: Option<PathBuf>,
+    /// File that bank 2 of the flash is kept in, where the stored arm is: read at the start when it is there, written at the
+    /// end, as if the power had gone then.
+    #[arg(long, value_name = "FILE")]
+    bank2: Option<PathBuf>,
     /// Print the firmware's defmt log on stderr; needs the program defmt-print.
     #[arg(long)]
     defmt: bool,
@@ -72,7 +82,14 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let elf = Elf::parse(&bytes).map_err(|e| format!("{}: {e}", args.elf.display()))?;
     let log = if args.defmt { Some(DefmtLog::new(&args.elf)?) } else { None };
     let mut config = BoardConfig { seed: args.seed, ..BoardConfig::default() };
+    if let Some(path) = &args.arm {
+        let arm = Arm::load(path)?;
+        config.sim = SimConfig::new(arm.config(), &arm.parameters());
+    }
     config.sim.seed = args.seed;
+    if let Some(path) = &args.bank2 {
+        config.bank2 = kept(path)?;
+    }
     let board = Board::new(elf, &config);
     let port = if args.usart == 2 { Port::Usart2 } else { Port::Usart3 };
     let stop = Arc::new(AtomicBool::new(false));
@@ -85,5 +102,25 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         SpeedArg::Realtime => Speed::Realtime,
         SpeedArg::Max => Speed::Max,
     };
-    Live::new(board, port, args.baud, terminal, speed, log).run(&stop)
+    let mut live = Live::new(board, port, args.baud, terminal, speed, log);
+    live.run(&stop)?;
+    if let Some(path) = &args.bank2 {
+        let bank = live.cut_power(args.seed);
+        std::fs::write(path, bank.bytes(BANK2, BANK2_SIZE as usize)).map_err(|e| named(path, &e))?;
+    }
+    Ok(())
+}
+
+/// Bank 2 as an earlier run left it; a new one where there was none.
+fn kept(path: &Path) -> Result<Bank2, String> {
+    match std::fs::read(path) {
+        Ok(bytes) if bytes.len() == BANK2_SIZE as usize => Ok(Bank2::from_bytes(&bytes)),
+        Ok(bytes) => Err(format!("{}: {} bytes, bank 2 has {BANK2_SIZE}", path.display(), bytes.len())),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Bank2::default()),
+        Err(e) => Err(named(path, &e)),
+    }
+}
+
+fn named(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: {error}", path.display())
 }

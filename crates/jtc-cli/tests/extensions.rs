@@ -161,6 +161,20 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max", "--store", kept]);
     let arm = another(&sim);
     let pushed = sim.json(&["arm", "push", &arm, "--store"], 0);
+    let status = sim.json(&["status"], 0);
+    assert_eq!(
+        (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
+        (&"Init".into(), 3)
+    );
+    // Of an arm that is held nothing is taken without asking.
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
+    assert!(
+        refused.err.contains("HoldPos; nothing was sent") && refused.err.contains("jtc disable"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(sim.json(&["status"], 0)["state"], "HoldPos");
     assert_eq!(sim.end("-TERM").0, 0);
     let sim = Sim::start(&["--no-throttle", "--speed", "max", "--store", kept]);
     let info = sim.json(&["info"], 0);
@@ -186,4 +200,22 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     let info = sim.json(&["info"], 0);
     assert_eq!((info["arm"].as_str(), info["defaults"].as_str()), (Some("mine"), Some("stored")));
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
+}
+
+/// Numbers that nobody has tried hold no arm because they are to be kept.
+#[test]
+fn j54_an_arm_that_is_stored_is_not_held_in_between() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = dir.path().join("each.csv");
+    let sim = Sim::start(&["--no-throttle", "--speed", "max", "--record", record.to_str().unwrap()]);
+    let arm = another(&sim);
+    let held = |path: &std::path::Path| {
+        let text = std::fs::read_to_string(path).unwrap();
+        text.lines().filter(|line| line.split(',').nth(1) == Some("2")).count()
+    };
+    sim.json(&["arm", "push", &arm, "--store"], 0);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert_eq!(sim.json(&["status"], 0)["state"], "Init");
+    assert_eq!(sim.end("-TERM").0, 0);
+    assert_eq!(held(&record), 0);
 }

@@ -146,8 +146,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::StoreArm => self.store_arm(),
-            Command::Disable if self.state == ControllerState::HoldPos && self.at_rest() => {
-                // J-53: with its parameters missing the controller goes to Init, without torque.
+            Command::Disable if self.state == ControllerState::Init || self.holds_at_rest() => {
+                // J-53: with its parameters missing the controller goes to Init, without torque, and stays there.
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -185,6 +185,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.motion.set.jog(&wanted);
         Ok(())
+    }
+
+    fn holds_at_rest(&self) -> bool {
+        self.state == ControllerState::HoldPos && self.at_rest()
     }
 
     /// The arm stands, and is to; whether its drives are enabled already does not matter.

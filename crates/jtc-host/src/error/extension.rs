@@ -1,7 +1,7 @@
 //! Errors of reading, giving and keeping an arm as one thing.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::StoreState;
+use jtc_wire::{Code, ControllerState, StoreState};
 
 use crate::arm::Difference;
 
@@ -33,6 +33,12 @@ pub enum ExtensionError {
         arm: String,
         /// Every value that differs.
         differences: Vec<Difference>,
+    },
+    /// Storing changes what the arm is held by; it is for an arm without torque.
+    #[error("the arm cannot be stored in {state}; nothing was sent")]
+    Powered {
+        /// What the device is in.
+        state: Code<ControllerState>,
     },
     /// The memory of the device does not have it.
     #[error("the arm was not stored: {state}")]
@@ -73,6 +79,11 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Refused,
                 "other-arm",
                 "`jtc arm diff FILE` lists every value; `jtc arm push FILE` gives the controller this arm",
+            ),
+            Self::Powered { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "powered",
+                "an arm is stored while it has no torque: `jtc disable` (an arm without brakes falls), then push again",
             ),
             Self::NotStored { .. } => Diagnosis::new(
                 ErrorKind::Device,

@@ -1,7 +1,6 @@
 //! `jtc arm push`, `pull`, `diff`: the arm of a controller.
 
 use std::path::Path;
-use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, table};
 use jtc_core::Config;
@@ -9,15 +8,11 @@ use jtc_host::arm::{Arm, Difference};
 use jtc_host::port::SerialPort;
 use jtc_host::session::PushReport;
 use jtc_host::{Error, LinkError, Session};
-use jtc_wire::ControllerState;
 use serde_json::json;
 
 use super::super::info::hash;
 use crate::args::{AcceptArgs, ForceArgs, LinkArgs};
 use crate::limits;
-
-/// A controller leaves Init, or goes back there, within this time.
-const CHANGE: Duration = Duration::from_secs(5);
 
 /// Gives the controller the whole arm.
 pub(super) fn push(
@@ -43,8 +38,13 @@ pub(super) fn push(
     if session.info()?.is_none() {
         return without_extensions(&mut session, &arm, store, accept, out);
     }
-    let pushed = session.push_arm(&arm, |p| out.note(sent(p))).map_err(|e| refused(e, &arm))?;
-    let stored = if store { Some(keep(&mut session, out)?) } else { None };
+    let report = |p: &PushReport| out.note(sent(p));
+    let (pushed, stored) = if store {
+        session.push_and_store_arm(&arm, report).map(|(pushed, number)| (pushed, Some(number)))
+    } else {
+        session.push_arm(&arm, report).map(|pushed| (pushed, None))
+    }
+    .map_err(|e| refused(e, &arm))?;
     let now = arm.hash().ok().flatten().unwrap_or_default();
     let value = json!({
         "arm": arm.name, "hash": hash(now), "parts": pushed, "stored_number": stored, "differences": [],
@@ -79,23 +79,6 @@ fn refused(error: Error, arm: &Arm) -> Failure {
         Error::Extension(_) => failure,
         _ => Failure { message: format!("{}: {}", arm.name, failure.message), ..failure },
     }
-}
-
-/// Keeps what was pushed. With all it needs the controller has left Init: it goes back there first.
-fn keep(session: &mut Session<SerialPort>, out: &Output) -> Result<u32, Failure> {
-    let state = session.fresh_status()?.state;
-    if state == ControllerState::Init {
-        // It may be about to leave.
-        let _ =
-            session.wait_for("HoldPos", Duration::from_millis(300), |s| s.state == ControllerState::HoldPos);
-    }
-    if session.fresh_status()?.state == ControllerState::HoldPos {
-        session.disable()?;
-        session
-            .wait_for("Init", CHANGE, |s| s.state.is_in(&[ControllerState::Init, ControllerState::Error]))?;
-    }
-    out.note("storing");
-    Ok(session.store_arm()?)
 }
 
 /// A device that takes friction, gains and model only.

@@ -2,14 +2,15 @@
 use super::*;
 
 #[test]
-fn j53_disable_is_for_an_arm_that_is_held_at_rest() {
+fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
     for (state, speed, taken) in [
         (ControllerState::HoldPos, 0.0, true),
         (ControllerState::HoldPos, 0.019, true),
         (ControllerState::HoldPos, 0.1, false),
         (ControllerState::Operate, 0.0, false),
         (ControllerState::Teaching, 0.0, false),
-        (ControllerState::Init, 0.0, false),
+        (ControllerState::Init, 0.0, true),
+        (ControllerState::Init, 0.1, true),
         (ControllerState::Error, 0.0, false),
     ] {
         let mut bench = Bench::new();

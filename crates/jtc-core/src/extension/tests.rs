@@ -17,6 +17,7 @@ use crate::{HostEvent, Inputs, JOINTS, Outputs};
 mod motion;
 mod setting_frames;
 mod stored;
+mod two_hosts;
 
 /// A controller on two lines, and what came out of it.
 struct Bench {

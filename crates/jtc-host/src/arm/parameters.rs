@@ -163,7 +163,8 @@ fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterE
     if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
+/// Axes that rise, and numbers that a frame carries.
+pub(super) fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;
         for (i, w) in values.windows(2).enumerate() {

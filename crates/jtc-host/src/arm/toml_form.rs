@@ -6,8 +6,10 @@ use jtc_core::settings;
 use jtc_core::{Config, JOINTS, JointConfig, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{Joint, SettingValue};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
+use super::parameters::check_table;
 use super::source::{ARM_KEYS, JOINT_KEYS};
 use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
@@ -31,7 +33,7 @@ struct Head {
 struct ArmForm {
     format: Option<i64>,
     name: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "exactly_or_none", skip_serializing_if = "Option::is_none")]
     gravity_m_s2: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     proposed: Vec<String>,
@@ -47,7 +49,9 @@ struct ArmForm {
 #[serde(deny_unknown_fields)]
 struct JointForm {
     name: String,
+    #[serde(deserialize_with = "exactly")]
     origin_xyz_m: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
     origin_rpy_rad: [f64; 3],
     position_min_rad: Option<f64>,
     position_max_rad: Option<f64>,
@@ -80,8 +84,11 @@ struct LinkForm {
     #[serde(default)]
     name: String,
     mass_kg: f64,
+    #[serde(deserialize_with = "exactly")]
     com_xyz_m: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
     com_rpy_rad: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
     inertia_kg_m2: [f64; 6],
 }
 
@@ -197,6 +204,20 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         warnings,
         sources,
     })
+}
+
+/// An array of just so many numbers: as an array type of its own it would be read without those that are too many.
+fn exactly<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
+    let numbers = Vec::<f64>::deserialize(from)?;
+    let count = numbers.len();
+    numbers
+        .try_into()
+        .map_err(|_| D::Error::invalid_length(count, &format!("an array of length {N}").as_str()))
+}
+
+/// The same of a number that need not be there.
+fn exactly_or_none<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<Option<[f64; N]>, D::Error> {
+    exactly(from).map(Some)
 }
 
 /// The settings of the controller that a file gives.
@@ -364,12 +385,21 @@ impl LinkForm {
 
 fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, FileError> {
     let tables = forms.iter().enumerate().map(|(i, t)| t.table(i)).collect::<Result<Vec<_>, _>>()?;
-    match tables.len() {
-        0 => Ok(None),
-        1 => Ok(Some(Box::new([tables[0]; JOINTS]))),
-        JOINTS => Ok(Some(Box::new(std::array::from_fn(|i| tables[i])))),
-        n => Err(FileError::form(format!("{n} [[friction_table]] entries, not 1 (for all joints) or 6"))),
+    let all: Box<[TableOf<f32>; JOINTS]> = match tables.len() {
+        0 => return Ok(None),
+        1 => Box::new([tables[0]; JOINTS]),
+        JOINTS => Box::new(std::array::from_fn(|i| tables[i])),
+        n => {
+            return Err(FileError::form(format!(
+                "{n} [[friction_table]] entries, not 1 (for all joints) or 6"
+            )));
+        }
+    };
+    // Also where polynomials are used: who changes over later does not look for it there.
+    for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
+        check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;
     }
+    Ok(Some(all))
 }
 
 impl TableForm {

@@ -4,7 +4,8 @@
 
 PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example
 reference`). Every model has random joint origins, masses, inertias and gravity; a share of them has parallel, nearly
-parallel, antiparallel or crossing axes; angles next to a right angle are taken as J-40 takes them. Each result has to
+parallel, antiparallel or crossing axes, and every other one carries a payload at its flange (J-60); angles next to a right
+angle are taken as J-40 takes them. Each result has to
 agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on failure.
 """
 
@@ -44,7 +45,12 @@ def random_model(rng):
     return joints, links, 9.81 * gravity / np.linalg.norm(gravity)
 
 
-def pinocchio_model(joints, links, gravity):
+def random_payload(rng):
+    """Mass, centre of mass and inertia about it, in the flange frame."""
+    return np.r_[rng.uniform(0.1, 8), rng.uniform(-0.3, 0.3, 3), random_inertia(rng)]
+
+
+def pinocchio_model(joints, links, gravity, payload):
     model = pin.Model()
     joints = np.hstack([joints[:, :3], right_angles(joints[:, 3:])])
     parent = 0
@@ -56,9 +62,14 @@ def pinocchio_model(joints, links, gravity):
         turn = pin.rpy.rpyToMatrix(*rpy)
         about_com = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
         model.appendBodyToJoint(parent, pin.Inertia(mass, com, about_com), pin.SE3.Identity())
+    flange = pin.SE3(pin.rpy.rpyToMatrix(*joints[6, 3:]), joints[6, :3])
+    if len(payload) > 0:
+        xx, xy, xz, yy, yz, zz = payload[4:]
+        about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        model.appendBodyToJoint(parent, pin.Inertia(payload[0], payload[1:4], about_com), flange)
     model.gravity.linear = gravity
     model.gravity.angular = np.zeros(3)
-    return model, model.createData(), pin.SE3(pin.rpy.rpyToMatrix(*joints[6, 3:]), joints[6, :3])
+    return model, model.createData(), flange
 
 
 def expected(model, data, flange, q, qd, qdd, tau, rotor):
@@ -87,10 +98,12 @@ def main():
     rng = np.random.default_rng(seed)
 
     lines, wanted = [], []
-    for _ in range(args.models):
+    for k in range(args.models):
         joints, links, gravity = random_model(rng)
-        lines.append("model " + " ".join(repr(float(v)) for v in np.r_[joints.ravel(), links.ravel(), gravity]))
-        reference = pinocchio_model(joints, links, gravity)
+        payload = random_payload(rng) if k % 2 else np.zeros(0)
+        numbers = np.r_[joints.ravel(), links.ravel(), gravity, payload]
+        lines.append("model " + " ".join(repr(float(v)) for v in numbers))
+        reference = pinocchio_model(joints, links, gravity, payload)
         for _ in range(args.states):
             q, qd, qdd = rng.uniform(-np.pi, np.pi, 6), rng.uniform(-3, 3, 6), rng.uniform(-10, 10, 6)
             tau, rotor = rng.uniform(-100, 100, 6), rng.uniform(0, 1, 6)

@@ -15,9 +15,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut dynamics = None;
     for line in std::io::stdin().lock().lines() {
         match lines::parse(&line?)? {
-            Line::Model(model, gravity) => {
+            Line::Model(model, gravity, payload) => {
                 model.check()?;
-                dynamics = Some(Dynamics::new(&model, gravity));
+                payload.check()?;
+                dynamics = Some(Dynamics::with_payload(&model, gravity, &payload));
             }
             Line::State(state) => {
                 let d = dynamics.as_ref().ok_or("a state before the first model")?;

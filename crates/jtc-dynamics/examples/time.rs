@@ -18,7 +18,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut dynamics, mut states) = (None, Vec::new());
     for line in std::fs::read_to_string(file)?.lines() {
         match lines::parse(line)? {
-            Line::Model(model, gravity) => dynamics = Some(Dynamics::new(&model, gravity)),
+            Line::Model(model, gravity, payload) => {
+                dynamics = Some(Dynamics::with_payload(&model, gravity, &payload));
+            }
             Line::State(state) => states.push(state),
         }
     }

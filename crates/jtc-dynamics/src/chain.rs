@@ -11,7 +11,8 @@
 //!   second moment along the axis) moves in the same way whether it rotates with the link or not. It is regrouped to the link
 //!   before, from the wrist to the base. Each link keeps seven parameters, and none of them is a mass.
 
-use crate::model::{ArmModel, JOINTS, Link, symmetric};
+use crate::model::{ArmModel, JOINTS, Link, Origin, symmetric};
+use crate::payload::Payload;
 use crate::rotation::{
     Mat3, about_x, about_z, apply, congruent, from_rpy, from_sines_cosines, product, unit,
 };
@@ -145,6 +146,21 @@ struct Inertia {
 }
 
 impl Inertia {
+    const NONE: Self = Self { mass: 0.0, h: [0.0; 3], j: [[0.0; 3]; 3] };
+
+    /// Of a link, in its frame.
+    fn of_link(link: &Link) -> Self {
+        let about_com = Self { mass: link.mass, h: [0.0; 3], j: symmetric(&link.inertia) };
+        let Origin { xyz, rpy } = &link.origin;
+        about_com.placed(&from_rpy(rpy), xyz)
+    }
+
+    /// Of a payload, in the frame of the last link, in which the flange is at `flange`.
+    fn of_payload(payload: &Payload, flange: &Placement) -> Self {
+        let about_com = Self { mass: payload.mass, h: [0.0; 3], j: symmetric(&payload.inertia) };
+        about_com.placed(&about_z(0.0, 1.0), &payload.com).placed(&flange.rotation, &flange.xyz)
+    }
+
     /// The same in a frame in which the present one has the origin `p` (m) and the rotation `r`.
     fn placed(&self, r: &Mat3, p: &[f64; 3]) -> Self {
         let h = apply(r, &self.h);
@@ -207,7 +223,7 @@ impl Chain {
         JointTransform { axes: S::AXES[k], ..self.transforms[k] }
     }
 
-    pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
+    pub fn new(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
         let placements = model.joints.map(|o| Placement { rotation: joint_rotation(&o.rpy), xyz: o.xyz });
         let none = JointTransform { sin: 0.0, cos: 1.0, axes: Axes::Any, offset: 0.0, p: [0.0; 2] };
         let mut transforms = [none; JOINTS];
@@ -248,8 +264,15 @@ impl Chain {
             let parallel = transforms[k].axes == Axes::Parallel;
             transforms[k].p = [x, if parallel { 0.0 } else { y - z_shifts[k] * transforms[k].sin }];
         }
-        let base_parameters = regroup(&model.links, &transforms, &z_rotations, &z_shifts);
-        let flange = regroup(&flange_mass(model), &transforms, &z_rotations, &z_shifts).map(|b| [b.hx, b.hy]);
+        let mut bodies: [Inertia; JOINTS] = core::array::from_fn(|k| Inertia::of_link(&model.links[k + 1]));
+        if payload.is_there() {
+            bodies[JOINTS - 1].add(&Inertia::of_payload(payload, &placements[JOINTS]));
+        }
+        let base_parameters = regroup(&bodies, &transforms, &z_rotations, &z_shifts);
+        bodies = [Inertia::NONE; JOINTS];
+        bodies[JOINTS - 1] =
+            Inertia::of_payload(&Payload { mass: 1.0, ..Payload::default() }, &placements[JOINTS]);
+        let flange = regroup(&bodies, &transforms, &z_rotations, &z_shifts).map(|b| [b.hx, b.hy]);
         let shape = KnownShape::of(&transforms.map(|t| t.axes));
         Self { transforms, base_parameters, base_acceleration, placements, flange, shape }
     }
@@ -269,30 +292,19 @@ fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     }))
 }
 
-/// Links without mass, but with 1 kg at the flange.
-fn flange_mass(model: &ArmModel) -> [Link; 7] {
-    let mut links = [Link::default(); 7];
-    (links[JOINTS].mass, links[JOINTS].origin.xyz) = (1.0, model.joints[JOINTS].xyz);
-    links
-}
-
 /// Base inertial parameters: the inertia of the links in the frames of the chain, the part symmetric about each joint axis
 /// regrouped to the link before (Gautier and Khalil 1990).
 fn regroup(
-    links: &[Link; 7],
+    bodies: &[Inertia; JOINTS],
     transforms: &[JointTransform; JOINTS],
     z_rotations: &[(f64, f64); JOINTS],
     z_shifts: &[f64; JOINTS],
 ) -> [BaseInertialParameters; JOINTS] {
-    let none = Inertia { mass: 0.0, h: [0.0; 3], j: [[0.0; 3]; 3] };
-    let mut parameters = [none.split().0; JOINTS];
-    let mut moved = none;
+    let mut parameters = [Inertia::NONE.split().0; JOINTS];
+    let mut moved = Inertia::NONE;
     for k in (0..JOINTS).rev() {
-        let link = &links[k + 1];
-        let about_com = Inertia { mass: link.mass, h: [0.0; 3], j: symmetric(&link.inertia) };
         let (s, c) = z_rotations[k];
-        let in_link = about_com.placed(&from_rpy(&link.origin.rpy), &link.origin.xyz);
-        let mut total = in_link.placed(&about_z(-s, c), &[0.0, 0.0, -z_shifts[k]]);
+        let mut total = bodies[k].placed(&about_z(-s, c), &[0.0, 0.0, -z_shifts[k]]);
         total.add(&moved);
         let (rest, symmetric) = total.split();
         parameters[k] = rest;

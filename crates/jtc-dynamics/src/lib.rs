@@ -10,6 +10,7 @@ mod forward;
 mod inverse;
 mod kinematics;
 mod model;
+mod payload;
 mod rotation;
 mod trig;
 mod unroll;
@@ -18,6 +19,7 @@ use inverse::JointSinesCosines;
 
 pub use kinematics::Pose;
 pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
+pub use payload::{LinkInertias, Payload, PayloadError};
 pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
 /// An arm prepared for kinematics and dynamics: what does not depend on the joint positions is precomputed.
@@ -34,7 +36,24 @@ impl Dynamics {
     ///
     /// The model must have passed [`ArmModel::check`]: the results of one that has not are meaningless.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
-        Self { chain: chain::Chain::new(model, gravity) }
+        Self::with_payload(model, gravity, &Payload::default())
+    }
+
+    /// The same arm with a `payload` at its flange, as if that were a part of the last link (J-60). The payload must have passed
+    /// [`Payload::check`]. [`Dynamics::flange_torque`] remains that of 1 kg alone.
+    pub fn with_payload(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
+        Self { chain: chain::Chain::new(model, gravity, payload) }
+    }
+
+    /// Masses and inertias of the arm and its payload.
+    pub fn inertias(&self) -> LinkInertias {
+        LinkInertias(self.chain.base_parameters)
+    }
+
+    /// Computes with these masses and inertias from now on. They have to be those of an arm with the same joints.
+    #[inline(always)]
+    pub fn set_inertias(&mut self, inertias: &LinkInertias) {
+        self.chain.base_parameters = inertias.0;
     }
 
     /// Joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without

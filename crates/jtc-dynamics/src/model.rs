@@ -226,8 +226,7 @@ impl Link {
         if self.mass == 0.0 {
             return if (1..=5).contains(&link) { Err(ModelError::MassZero { link }) } else { Ok(()) };
         }
-        let [small, middle, large] = principal_moments(&symmetric(&self.inertia));
-        let tolerance = INERTIA_TOLERANCE * large.abs().max(small.abs());
+        let ([small, middle, large], tolerance) = principal_moments_of(&self.inertia);
         if small < -tolerance {
             return Err(ModelError::InertiaNegative { link, moment: small });
         }
@@ -236,6 +235,12 @@ impl Link {
         }
         Ok(())
     }
+}
+
+/// Principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in rising order, and by how much they may miss their limits.
+pub(crate) fn principal_moments_of(inertia: &[f64; 6]) -> ([f64; 3], f64) {
+    let moments = principal_moments(&symmetric(inertia));
+    (moments, INERTIA_TOLERANCE * moments[2].abs().max(moments[0].abs()))
 }
 
 /// The matrix of Ixx, Ixy, Ixz, Iyy, Iyz, Izz.

@@ -1,10 +1,11 @@
 //! Arms and states as lines of text: `model` and 136 numbers (7 joint origins xyz rpy; 7 links: origin, ixx
-//! ixy ixz iyy iyz izz, mass; gravity), `state` and 30 numbers (q, qd, qdd, torque, rotor inertia of six
+//! ixy ixz iyy iyz izz, mass; gravity), with ten more where there is a payload (mass, centre of mass, ixx ixy ixz iyy
+//! iyz izz in the flange frame), `state` and 30 numbers (q, qd, qdd, torque, rotor inertia of six
 //! joints).
-use jtc_dynamics::{ArmModel, JointVec, Link, Origin};
+use jtc_dynamics::{ArmModel, JointVec, Link, Origin, Payload};
 
 pub enum Line {
-    Model(Box<ArmModel>, [f64; 3]),
+    Model(Box<ArmModel>, [f64; 3], Payload),
     State(Box<[JointVec; 5]>),
 }
 
@@ -32,7 +33,12 @@ fn model(numbers: &mut impl Iterator<Item = f64>) -> Option<Line> {
     for link in &mut model.links {
         *link = Link { origin: origin(numbers)?, inertia: take(numbers)?, mass: numbers.next()? };
     }
-    Some(Line::Model(Box::new(model), take(numbers)?))
+    let gravity = take(numbers)?;
+    let payload = match numbers.next() {
+        Some(mass) => Payload { mass, com: take(numbers)?, inertia: take(numbers)? },
+        None => Payload::default(),
+    };
+    Some(Line::Model(Box::new(model), gravity, payload))
 }
 
 fn state(numbers: &mut impl Iterator<Item = f64>) -> Option<Line> {

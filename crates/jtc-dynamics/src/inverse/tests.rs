@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::model::{ArmModel, Link, Origin};
+use crate::payload::Payload;
 
 /// An arm whose axes are a shape's, whatever rolls and yaws lead there, with joints that are also on one axis.
 fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
@@ -32,7 +33,7 @@ fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
 
 /// Known zeros and ones are left out, and nothing else is done differently: the values are the same.
 fn same<S: Shape>(model: &ArmModel, shape: KnownShape, q: &JointVec, qd: &JointVec, qdd: &JointVec) {
-    let chain = Chain::new(model, [0.3, -0.2, -9.81]);
+    let chain = Chain::new(model, [0.3, -0.2, -9.81], &Payload::default());
     assert_eq!(chain.shape, shape);
     let any = inverse_of::<AnyShape>(&chain, q, qd, qdd);
     assert_eq!(inverse_of::<S>(&chain, q, qd, qdd), any);
@@ -64,7 +65,7 @@ fn j40_an_arm_of_another_shape_is_any() {
         for k in [1, 4, 5] {
             model.joints[k].rpy = [FRAC_PI_2, 0.0, 0.7];
         }
-        let shape = |model: &ArmModel| Chain::new(model, [0.0; 3]).shape;
+        let shape = |model: &ArmModel| Chain::new(model, [0.0; 3], &Payload::default()).shape;
         assert_eq!(shape(&model), KnownShape::ThreeParallel);
         for k in 1..JOINTS {
             let mut bent = model;

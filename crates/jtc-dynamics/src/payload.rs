@@ -1,0 +1,132 @@
+//! A body carried at the flange, and the arm with it (J-60).
+
+use core::fmt;
+
+use crate::chain::BaseInertialParameters;
+use crate::model::{JOINTS, principal_moments_of};
+
+/// A rigid body fixed to the flange.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Payload {
+    /// Mass, kg; 0: there is none.
+    pub mass: f64,
+    /// Centre of mass in the flange frame, m.
+    pub com: [f64; 3],
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, along the axes of the flange frame, kg·m². Zeros: a point mass.
+    pub inertia: [f64; 6],
+}
+
+/// Why a payload is no body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PayloadError {
+    /// A number is NaN or infinite.
+    NotFinite,
+    /// The mass is negative.
+    MassNegative {
+        /// Mass, kg.
+        mass: f64,
+    },
+    /// It has an inertia, and no mass.
+    MassZero,
+    /// The smallest principal moment of inertia is negative.
+    InertiaNegative {
+        /// That moment, kg·m².
+        moment: f64,
+    },
+    /// The largest principal moment of inertia is more than the two others together.
+    InertiaTriangle {
+        /// That moment, kg·m².
+        moment: f64,
+        /// The sum of the others, kg·m², which is the limit.
+        limit: f64,
+    },
+}
+
+impl fmt::Display for PayloadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NotFinite => f.write_str("payload: a number is not finite"),
+            Self::MassNegative { mass } => {
+                write!(f, "payload: mass is {mass} kg, must not be negative; 0 is no payload")
+            }
+            Self::MassZero => f.write_str("payload: an inertia without a mass; give the mass in kg"),
+            Self::InertiaNegative { moment } => write!(
+                f,
+                "payload: smallest principal moment of inertia is {moment} kg m2, must not be negative; sign of the \
+                 products of inertia?"
+            ),
+            Self::InertiaTriangle { moment, limit } => write!(
+                f,
+                "payload: largest principal moment of inertia is {moment} kg m2, more than the sum of the others, {limit} \
+                 kg m2; wrong unit, or not about the centre of mass?"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for PayloadError {}
+
+impl Payload {
+    /// Whether it is a body that there can be (J-60): what [`crate::ArmModel::check`] asks of a link.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that is wrong.
+    pub fn check(&self) -> Result<(), PayloadError> {
+        let numbers = core::iter::once(&self.mass).chain(&self.com).chain(&self.inertia);
+        if numbers.into_iter().any(|number| !number.is_finite()) {
+            return Err(PayloadError::NotFinite);
+        }
+        if self.mass < 0.0 {
+            return Err(PayloadError::MassNegative { mass: self.mass });
+        }
+        if self.mass == 0.0 {
+            return if self.inertia == [0.0; 6] { Ok(()) } else { Err(PayloadError::MassZero) };
+        }
+        let ([small, middle, large], tolerance) = principal_moments_of(&self.inertia);
+        if small < -tolerance {
+            return Err(PayloadError::InertiaNegative { moment: small });
+        }
+        if large > small + middle + tolerance {
+            return Err(PayloadError::InertiaTriangle { moment: large, limit: small + middle });
+        }
+        Ok(())
+    }
+
+    /// There is one.
+    pub fn is_there(&self) -> bool {
+        self.mass > 0.0
+    }
+}
+
+/// All of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the
+/// payload. They are linear in the masses, first and second moments of the bodies, so that an arm between two others with the
+/// same joints is the sum of shares of both, and as physical as they are.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
+
+impl LinkInertias {
+    /// `share` of the way from these to `other`: 0 are these, 1 the other.
+    #[inline(always)]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let mut between = *self;
+        for (to, other) in between.0.iter_mut().zip(&other.0) {
+            to.blend(other, share);
+        }
+        between
+    }
+}
+
+impl BaseInertialParameters {
+    #[inline(always)]
+    fn blend(&mut self, other: &Self, share: f64) {
+        let Self { hx, hy, xx, yy, xy, xz, yz } = self;
+        for (mine, other) in [hx, hy, xx, yy, xy, xz, yz]
+            .into_iter()
+            .zip([other.hx, other.hy, other.xx, other.yy, other.xy, other.xz, other.yz])
+        {
+            *mine += share * (other - *mine);
+        }
+    }
+}

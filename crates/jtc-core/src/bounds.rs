@@ -1,5 +1,5 @@
 //! Bounds of the parameters that a host may send (J-06).
-use jtc_dynamics::ArmModel;
+use jtc_dynamics::{ArmModel, Payload};
 use jtc_wire::DataStatus;
 
 use crate::friction;
@@ -120,6 +120,16 @@ impl ParameterBounds {
             }
         }
         Ok(())
+    }
+
+    /// Mass and inertia of a payload, which are those of a link.
+    pub fn check_payload(&self, payload: &Payload) -> Result<(), OutOfBounds> {
+        OutOfBounds::unless_within("mass of the payload (kg)", payload.mass, 0.0, self.link_mass_max)?;
+        let most = self.link_inertia_max;
+        payload
+            .inertia
+            .iter()
+            .try_for_each(|&i| OutOfBounds::unless_within("inertia of the payload (kg·m²)", i, -most, most))
     }
 
     /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s).

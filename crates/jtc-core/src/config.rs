@@ -1,5 +1,6 @@
 //! Settings of the controller.
 use jtc_bus::{TORQUE_FULL_SCALE, config};
+use jtc_dynamics::Payload;
 
 use crate::JOINTS;
 use crate::bounds::ParameterBounds;
@@ -90,6 +91,8 @@ pub struct Config {
     pub host_timeout_ms: u16,
     /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is no part of an arm.
     pub speed: f64,
+    /// What the arm carries at its flange (J-60). It is no part of an arm, and none at the start of the device.
+    pub payload: Payload,
     /// Bounds of the gains and masses that a host may give (J-06).
     pub parameter_bounds: ParameterBounds,
 }

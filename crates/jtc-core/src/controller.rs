@@ -150,7 +150,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            teachable: self.teaching && self.motion.may_be_taught(&self.config),
+            // J-60: what HoldPos finds missing is known when the payload is in the model.
+            teachable: self.teaching
+                && self.parameters.blend_left_ms() == 0
+                && self.motion.may_be_taught(&self.config),
             execute: self.trajectory == TrajectoryState::Execute,
         }
     }

@@ -1,5 +1,5 @@
 //! What the device starts with (rules, section 7): made from `arms/avena.toml` at build time.
-use jtc_dynamics::{ArmModel, Link, Origin};
+use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
 use crate::bounds::ParameterBounds;
 use crate::config::Config;
@@ -59,6 +59,7 @@ impl Config {
             friction_sign_width: 0.02,
             host_timeout_ms: 0,
             speed: 1.0,
+            payload: Payload::NONE,
             parameter_bounds: ParameterBounds::known_drives(),
         }
     }

@@ -46,7 +46,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.motion.begin_at(self.nodes.positions());
             self.motion.law.stand_firm();
         }
-        self.phase = if self.clock.time == 0.0 {
+        self.phase = if self.clock.time == 0.0 || self.parameters.blend_left_ms() > 0 {
             Phase::BEGIN
         } else if self.motion.set.point.position == paused {
             self.go_on();
@@ -95,7 +95,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Phase::Waiting { elapsed_ms } => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.set.hold(&self.config);
-                if !self.motion.set.all_holding() {
+                self.parameters.blend_payload();
+                // On the path the model does not change (J-60).
+                if !self.motion.set.all_holding() || self.parameters.blend_left_ms() > 0 {
                     // The wait ends: the operator no longer expects a motion then (J-16).
                     self.phase = Phase::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {

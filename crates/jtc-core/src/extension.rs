@@ -4,7 +4,7 @@ mod image;
 
 use jtc_wire::{
     Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, Name, PAGE_BYTES,
-    PAGE_VALUES, RawPoint, SettingValue, StoreState, VALUE_LEN, Values, capability,
+    PAGE_VALUES, RawPoint, StoreState, VALUE_LEN, Values, capability,
 };
 
 use crate::controller::Controller;
@@ -19,8 +19,11 @@ use image::{ImageSource, StoredArm};
 /// Bytes of an arm image that are hashed or written in one tick.
 const IMAGE_PER_TICK: usize = 256;
 
-/// Most values of a SetSettings frame in a state with torque.
+/// Most values of a SetSettings frame in motion.
 const LIVE_MAX: usize = 4;
+
+/// Most values of a SetSettings frame under an arm that is held or taught: a payload has ten.
+const STANDING_MAX: usize = 16;
 
 /// Who the device is, as its board knows it (J-52).
 #[derive(Clone, Copy, Debug, Default)]
@@ -163,6 +166,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.teaching
             && self.trajectory != TrajectoryState::Pause
             && self.trajectory != TrajectoryState::Execute
+            && self.parameters.blend_left_ms() == 0
             && !self.store.receiving()
             && (set.jogging() || set.all_holding());
         if !free {
@@ -201,6 +205,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         matches!(self.state, ControllerState::Init | ControllerState::Error)
     }
 
+    /// The arm is held or taught, and no motion is commanded: live settings that bear on the torque may change.
+    fn stands(&self) -> bool {
+        match self.state {
+            ControllerState::Teaching => true,
+            ControllerState::HoldPos => {
+                self.trajectory != TrajectoryState::Execute && !self.motion.set.jogging()
+            }
+            _ => false,
+        }
+    }
+
     fn image(&self) -> ImageSource<'_> {
         ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
     }
@@ -235,7 +250,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn info(&self, hash: u64) -> Info {
         let Extensions { identity, name, store, sequence, .. } = &self.extensions;
-        let mut capabilities = capability::SETTINGS | capability::SPEED | capability::JOG;
+        let mut capabilities =
+            capability::SETTINGS | capability::SPEED | capability::JOG | capability::PAYLOAD;
         if *store != StoreState::Absent {
             capabilities |= capability::STORE;
         }
@@ -281,18 +297,31 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// All values or none (J-53). Where friction tables are in use, one is checked a tick.
     fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
-        let live = |value: SettingValue| {
-            settings::setting(value.setting).is_some_and(|setting| setting.live == Live::Always)
+        let all = |taken: fn(Live) -> bool| {
+            values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
         // A few only: they are taken beside the work of every state.
-        let all_live = values.len() <= LIVE_MAX && values.iter().all(live);
-        if !all_live && !self.settable() {
+        let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
+        let standing = self.stands() && values.len() <= STANDING_MAX && all(|live| live != Live::No);
+        if !all_live && !standing && !self.settable() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
         let Ok(config) = settings::with_values(&self.config, values.iter()) else {
             return SliceOutcome::Refused(DataStatus::IncorrectValue);
         };
         if all_live {
+            self.set_speed(config.speed);
+            return SliceOutcome::Done;
+        }
+        let reloaded = config.payload != self.config.payload;
+        if reloaded && !self.parameters.carries(self.nodes.known_positions(), &config) {
+            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        }
+        if standing {
+            if reloaded {
+                self.parameters.change_payload(&config);
+                self.config.payload = config.payload;
+            }
             self.set_speed(config.speed);
             return SliceOutcome::Done;
         }

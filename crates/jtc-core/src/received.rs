@@ -11,6 +11,7 @@ use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::limits::JointConfig;
 use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
+use crate::payload::PayloadBlend;
 
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
@@ -29,6 +30,7 @@ pub(crate) struct ReceivedParameters {
     /// What `dynamics` was made of.
     model: ArmModel,
     pub dynamics: Dynamics,
+    payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
     polynomial: [[f64; 6]; JOINTS],
     /// Zeros until they are received.
@@ -41,11 +43,13 @@ pub(crate) struct ReceivedParameters {
 impl ReceivedParameters {
     /// Nothing was received yet.
     pub fn new(config: &Config) -> Self {
+        let dynamics = dynamics(&defaults::MODEL, config);
         Self {
             received: 0,
             given: 0,
             model: defaults::MODEL,
-            dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
+            payload: PayloadBlend::none(&dynamics),
+            dynamics,
             pid: defaults::PID,
             polynomial: defaults::POLYNOMIAL,
             tables: [NO_TABLE; JOINTS],
@@ -111,9 +115,41 @@ impl ReceivedParameters {
         self.received = 0;
     }
 
-    /// Computes with the gravity of these settings from now on.
+    /// Computes with the gravity and the payload of these settings from now on.
     pub fn set_gravity(&mut self, config: &Config) {
-        self.dynamics = Dynamics::new(&self.model, config.gravity);
+        self.dynamics = dynamics(&self.model, config);
+        self.payload.forget();
+    }
+
+    /// Every joint can hold the payload of these settings at `at` (rad), or holds less of it than now (J-60). Undecided before every
+    /// position is known and the model given; it is checked again when Init ends.
+    pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
+        let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
+        let next = dynamics(&self.model, config).gravity_torque(at);
+        let now = self.dynamics.gravity_torque(at);
+        // Written so that NaN is too much.
+        let held = |j: usize| next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
+        (0..JOINTS).all(held)
+    }
+
+    /// The payload of these settings comes into the model, over half a second (J-60).
+    pub fn change_payload(&mut self, config: &Config) {
+        self.payload.begin(&self.dynamics, &dynamics(&self.model, config));
+    }
+
+    /// A tick in which the arm is held or taught: the payload comes on.
+    pub fn blend_payload(&mut self) {
+        self.payload.step(&mut self.dynamics);
+    }
+
+    /// A tick without torque: the payload is there.
+    pub fn end_blend(&mut self) {
+        self.payload.end(&mut self.dynamics);
+    }
+
+    /// Milliseconds until the payload is in the model; 0: it is.
+    pub fn blend_left_ms(&self) -> u16 {
+        self.payload.left_ms()
     }
 
     /// What was given since the start is within the bounds of these settings, too (J-06); but for friction tables, see
@@ -180,12 +216,13 @@ impl ReceivedParameters {
     ) -> Result<(), DataStatus> {
         model.check().map_err(|_| DataStatus::IncorrectValue)?;
         config.parameter_bounds.check_masses(model)?;
-        let dynamics = Dynamics::new(model, config.gravity);
+        let dynamics = dynamics(model, config);
         // Undecided before every position is known; it is checked again when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }
         (self.model, self.dynamics) = (*model, dynamics);
+        self.payload.forget();
         self.receive(missing_parameter::MODEL);
         Ok(())
     }
@@ -273,6 +310,12 @@ fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result
         config.parameter_bounds.check_polynomial(coefficients, joint)?;
     }
     Ok(())
+}
+
+/// The dynamics of a model with the gravity and the payload of these settings.
+#[inline(never)]
+fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
+    Dynamics::with_payload(model, config.gravity, &config.payload)
 }
 
 /// An arm like this can be held at `position` (rad), by the torque limits (J-06).

@@ -1,7 +1,9 @@
 //! Settings that a host reads and changes (J-53): a table, and how a list of values is applied whole or not at all.
+use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
 
 use crate::JOINTS;
+use crate::bounds::OutOfBounds;
 use crate::config::{Config, ConfigError};
 
 mod table;
@@ -11,11 +13,16 @@ pub use table::TABLE;
 /// Number of the speed override (J-57).
 pub const SPEED: u8 = 128;
 
+/// Numbers of the payload (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
+pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
+
 /// When a setting may be changed beside Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {
     /// Never. It is part of the arm: stored, and in its hash.
     No,
+    /// In HoldPos, Teaching and Pause, but not while a motion runs. It is no part of the arm.
+    Standing,
     /// In every state, also while the arm moves. It is no part of the arm.
     Always,
 }
@@ -80,6 +87,10 @@ pub enum SettingError {
     },
     /// The settings together are those of no arm.
     Config(ConfigError),
+    /// The payload is no body (J-60).
+    Payload(PayloadError),
+    /// The payload is beyond the bounds of masses and inertias (J-06).
+    Bounds(OutOfBounds),
 }
 
 impl core::fmt::Display for SettingError {
@@ -94,6 +105,10 @@ impl core::fmt::Display for SettingError {
                 write!(f, "{name}: {value} is none of its values, {low} to {high}")
             }
             Self::Config(error) => error.fmt(f),
+            Self::Payload(error) => error.fmt(f),
+            Self::Bounds(OutOfBounds { what, value, low, high, .. }) => {
+                write!(f, "{what} is {value}, outside {low} to {high}")
+            }
         }
     }
 }
@@ -187,6 +202,16 @@ pub fn apply(config: &mut Config, value: SettingValue) -> Result<(), SettingErro
     setting(number).ok_or(SettingError::Unknown { setting: number, joint })?.set(config, joint, value)
 }
 
+/// The values of a payload, to be set together (J-60).
+pub fn payload_values(payload: &Payload) -> impl Iterator<Item = SettingValue> {
+    let Payload { mass, com: [x, y, z], inertia: [xx, xy, xz, yy, yz, zz] } = *payload;
+    PAYLOAD.zip([mass, x, y, z, xx, xy, xz, yy, yz, zz]).map(|(setting, value)| SettingValue {
+        setting,
+        joint: 0,
+        value,
+    })
+}
+
 /// The configuration with these values in it.
 ///
 /// # Errors
@@ -201,6 +226,8 @@ pub fn with_values(
         apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
+    next.payload.check().map_err(SettingError::Payload)?;
+    next.parameter_bounds.check_payload(&next.payload).map_err(SettingError::Bounds)?;
     Ok(next)
 }
 

@@ -76,6 +76,15 @@ impl Payload {
         self.elapsed_ms = 0;
     }
 
+    /// The payload of the arm was given, and comes into the model in so many more ticks (J-60): what had been fitted goes as it
+    /// comes.
+    pub fn give_way(&mut self, left_ms: u16) {
+        let left = f64::from(left_ms.max(1));
+        let kept = (left - 1.0) / left;
+        self.mass *= kept;
+        self.rest = self.rest.map(|rest| rest * kept);
+    }
+
     /// A tick of Teaching at `q` (rad) and `v` (rad/s): the torque that carries the mass, and what is left of the rest, N·m.
     pub fn torque(
         &mut self,

@@ -74,6 +74,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
                 self.motion.release(&self.nodes);
+                self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])
             }
             ControllerState::Teaching => self.teach(),
@@ -86,6 +87,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // The wait ends: the operator no longer expects the arm to go soft then.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
+        self.parameters.blend_payload();
         self.motion.latch(&self.nodes, &self.config);
         let jogged = self.motion.set.jogging();
         self.motion.set.hold(&self.config);
@@ -101,6 +103,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.set.point = SetPoint::still(*self.nodes.positions());
+        let left_ms = self.parameters.blend_left_ms();
+        if left_ms > 0 {
+            // What Teaching had found missing is now given.
+            self.motion.law.give_way_to_payload(left_ms);
+            self.parameters.blend_payload();
+        }
         self.control(ControlMode::Teach)
     }
 

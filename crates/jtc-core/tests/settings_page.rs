@@ -30,6 +30,7 @@ fn page() -> String {
         let kind = match (row.of_joint(), live) {
             (true, _) => "; one a joint",
             (false, Live::Always) => "; *live*: in every state, also in motion",
+            (false, Live::Standing) => "; *live*: also in HoldPos, Teaching and Pause",
             (false, Live::No) => "",
         };
         let _ =

@@ -68,6 +68,9 @@ impl fmt::Display for PayloadError {
 impl core::error::Error for PayloadError {}
 
 impl Payload {
+    /// None.
+    pub const NONE: Self = Self { mass: 0.0, com: [0.0; 3], inertia: [0.0; 6] };
+
     /// Whether it is a body that there can be (J-60): what [`crate::ArmModel::check`] asks of a link.
     ///
     /// # Errors

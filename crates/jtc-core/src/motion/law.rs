@@ -130,6 +130,11 @@ impl ControlLaw {
         self.payload.fit(dynamics, nodes.positions(), config);
     }
 
+    /// The payload of the arm was given in Teaching, and comes into the model in so many more ticks (J-60).
+    pub fn give_way_to_payload(&mut self, left_ms: u16) {
+        self.payload.give_way(left_ms);
+    }
+
     /// Teaching ends: the integral takes over what teaching carried.
     pub fn end_teaching(&mut self, gains: &[PidGains; JOINTS]) {
         for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {

@@ -103,4 +103,14 @@ settings! {
     Number 105 "friction_reversed_max" [""] 0.0..=1.0 No "largest friction along a motion that is taken" (parameter_bounds.friction_reversed_max);
     Number 106 "rest_friction_max" [""] 0.0..=1.0 No "largest friction at standstill that is taken" (parameter_bounds.rest_friction_max);
     Number 128 "speed" [""] 0.05..=1.0 Always "speed override: path seconds per second" (speed);
+    Number 144 "payload_mass_kg" ["kg"] 0.0..=100.0 Standing "mass at the flange; 0: none" (payload.mass);
+    Number 145 "payload_x_m" ["m"] -5.0..=5.0 Standing "its centre of mass along x of the flange" (payload.com[0]);
+    Number 146 "payload_y_m" ["m"] -5.0..=5.0 Standing "its centre of mass along y of the flange" (payload.com[1]);
+    Number 147 "payload_z_m" ["m"] -5.0..=5.0 Standing "its centre of mass along z of the flange" (payload.com[2]);
+    Number 148 "payload_ixx_kg_m2" ["kg·m²"] 0.0..=100.0 Standing "its inertia about its centre of mass, along the axes of the flange" (payload.inertia[0]);
+    Number 149 "payload_ixy_kg_m2" ["kg·m²"] -100.0..=100.0 Standing "the same" (payload.inertia[1]);
+    Number 150 "payload_ixz_kg_m2" ["kg·m²"] -100.0..=100.0 Standing "the same" (payload.inertia[2]);
+    Number 151 "payload_iyy_kg_m2" ["kg·m²"] 0.0..=100.0 Standing "the same" (payload.inertia[3]);
+    Number 152 "payload_iyz_kg_m2" ["kg·m²"] -100.0..=100.0 Standing "the same" (payload.inertia[4]);
+    Number 153 "payload_izz_kg_m2" ["kg·m²"] 0.0..=100.0 Standing "the same" (payload.inertia[5]);
 }

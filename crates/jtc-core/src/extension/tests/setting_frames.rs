@@ -109,6 +109,41 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
+/// Beside a payload a setting of the arm is as it is alone; the speed override may change with it.
+#[test]
+fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
+    for (state, stands, bare) in [
+        (ControllerState::Init, true, true),
+        (ControllerState::Error, true, true),
+        (ControllerState::HoldPos, true, false),
+        (ControllerState::Teaching, true, false),
+        (ControllerState::Operate, false, false),
+    ] {
+        let mut bench = Bench::new();
+        bench.controller.state = state;
+        let taken = |yes| if yes { DataStatus::NoError } else { DataStatus::NotAllowed };
+        let mut set = |more: &[(u8, f64)]| {
+            let payload =
+                crate::Payload { mass: 1.5, com: [0.0, 0.1, 0.2], inertia: [0.1, 0.0, 0.0, 0.1, 0.0, 0.1] };
+            let more = more.iter().map(|&(setting, value)| SettingValue { setting, joint: 0, value });
+            let list: Vec<_> = settings::payload_values(&payload).chain(more).collect();
+            let frame = settings_frame(&list).expect("it fits");
+            let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
+            let status = bench.at_once(Command::SetSettings(values));
+            let config = bench.controller.config();
+            assert_eq!(config.payload == payload, status == DataStatus::NoError, "{state:?}");
+            (status, config.speed, config.gravity[2])
+        };
+        assert_eq!(set(&[(34, 9.0)]), (taken(bare), 1.0, if bare { 9.0 } else { -9.81 }), "{state:?}");
+        let gravity = if bare { 9.0 } else { -9.81 };
+        if stands {
+            assert_eq!(set(&[(settings::SPEED, 0.5)]), (taken(true), 0.5, gravity), "{state:?}");
+        } else {
+            assert_eq!(set(&[]), (taken(false), 1.0, gravity), "{state:?}");
+        }
+    }
+}
+
 #[test]
 fn j33_settings_under_which_stops_fail_are_refused() {
     let mut bench = Bench::new();

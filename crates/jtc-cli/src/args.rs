@@ -6,6 +6,7 @@ mod maintain;
 mod motion;
 mod offline;
 mod params;
+mod payload;
 mod sim;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, Re
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
+pub use payload::PayloadCommand;
 pub use sim::{DemoArgs, SimArgs, SimSpeed};
 
 /// The joint trajectory controller from your terminal.
@@ -121,6 +123,9 @@ pub enum Command {
     /// Friction, gains and arm model
     #[command(subcommand)]
     Params(ParamsCommand),
+    /// What the arm carries at its flange
+    #[command(subcommand)]
+    Payload(PayloadCommand),
     /// Trajectories: check, run, pause, resume, stop
     #[command(subcommand)]
     Traj(TrajCommand),

@@ -3,7 +3,7 @@
 //!
 //! It is deliberately not the arm that the controller believes in: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
-use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec};
+use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, Payload};
 
 use crate::friction::{FrictionModel, FrictionTorques, SimFriction};
 
@@ -33,6 +33,8 @@ const HEAT_FLOW: f64 = 1.2;
 pub struct SimArm {
     /// Kinematics and masses.
     pub model: ArmModel,
+    /// What it carries at its flange.
+    pub payload: Payload,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
     /// Inertia of the drives' rotors at the joints, kg·m²; less than 0.02 counts as 0.02.
@@ -61,6 +63,7 @@ impl SimArm {
         let rotor = |j: usize| config.joints[j].rotor_inertia;
         Self {
             model: parameters.model,
+            payload: config.payload,
             gravity: config.gravity,
             // A drive has a rotor also where the file of the arm gives no inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
@@ -108,7 +111,7 @@ pub struct Arm {
 impl Arm {
     /// An arm at rest at `q`; its friction is that of `parts` times `friction_scale`.
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
-        let dynamics = Dynamics::new(&parts.model, parts.gravity);
+        let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let mut arm = Self {
             dynamics,
             temperature: [parts.ambient; JOINTS],

@@ -38,6 +38,9 @@ pub struct SimArgs {
     /// Arm to simulate, TOML or URDF, which the controller has stored where the file is complete; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
+    /// What the simulated arm carries at its flange, and the controller is not given: kg, or kg and its place in the flange frame in m
+    #[arg(long, env = "JTC_SIM_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried)]
+    pub payload: Option<jtc_core::Payload>,
     /// File that keeps a stored arm, as the flash of a board does: read at the start, written by `jtc arm push --store`
     #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
     pub store: Option<PathBuf>,

@@ -19,7 +19,14 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let info = session.info()?;
     let status = session.fresh_status()?;
     match info {
-        Some(info) => out.result(&as_json(&info), || as_text(&info)),
+        Some(info) => {
+            let payload = session.payload()?;
+            let mut value = as_json(&info);
+            value["payload"] = super::payload::as_json(&payload);
+            out.result(&value, || {
+                format!("{}\npayload:   {}", as_text(&info), super::payload::words(&payload))
+            });
+        }
         None => out.result(&without_extensions_json(&status), || without_extensions(&status)),
     }
     Ok(())

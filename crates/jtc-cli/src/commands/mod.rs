@@ -14,6 +14,7 @@ mod jog;
 mod maintain;
 mod monitor;
 mod params;
+mod payload;
 mod ports;
 mod report;
 mod reset;
@@ -42,6 +43,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::monitor(&args, out),
         Command::Arm(command) => arm::arm(&command, out),
         Command::Params(command) => params::params(&command, out),
+        Command::Payload(command) => payload::payload(&command, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),
         Command::Clear(args) => maintain::clear(&args, out),

@@ -67,6 +67,12 @@ fn match_device(
     }
     // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device(&job.device);
+    if job.device.payload.is_there() {
+        out.note(format!(
+            "note: checked with the payload of the controller, {}",
+            super::payload::words(&job.device.payload)
+        ));
+    }
     job.note_what_is_left_out(out);
     Ok(())
 }

@@ -57,6 +57,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         // What the controller knows of the arm it has as a board has it: from its memory, and from frames.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
+    config.arm.payload = args.payload.unwrap_or_default();
     let support = config.support;
     let world = World::new(config);
     let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;

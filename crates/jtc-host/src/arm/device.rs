@@ -89,10 +89,11 @@ impl Arm {
     }
 
     /// Settings to check a motion against that a controller with the settings `device` is to execute: of each limit the tighter
-    /// one, and the gravity and rotor inertia that the controller computes with.
+    /// one, and the gravity, payload and rotor inertia that the controller computes with.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
+        config.payload = device.payload;
         for (own, device) in config.joints.iter_mut().zip(&device.joints) {
             *own = JointConfig {
                 position_min: own.position_min.max(device.position_min),

@@ -73,11 +73,11 @@ impl Verdict {
             "positions do not change with the speed: correct the path (are all numbers in rad?)".into()
         } else if has(ProblemKind::HoldTorque) {
             "the speed does not change what standing still takes: begin, rest and end in poses that take less (less stretched out), \
-             or with a lighter payload in the arm model"
+             or with a lighter payload"
                 .into()
         } else if let Some(percent) = passes {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
-                ", or with a lighter payload in the arm model"
+                ", or with a lighter payload"
             } else {
                 ""
             };

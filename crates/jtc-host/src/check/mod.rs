@@ -33,7 +33,7 @@ use crate::trajectory::{Trajectory, UploadOptions};
 /// What a trajectory is checked against.
 #[derive(Clone, Debug)]
 pub struct Checker<'a> {
-    /// Limits, rotor inertia, gravity, start tolerance.
+    /// Limits, rotor inertia, gravity, payload, start tolerance.
     pub config: &'a Config,
     /// Model for the torque along the path; `None`: torque is not checked.
     pub model: Option<&'a ArmModel>,
@@ -79,7 +79,8 @@ impl<'a> Checker<'a> {
         let Some(first) = points.first() else { return verdict.done() };
         self.start_pose(first, &mut verdict);
         self.ends(&points, &mut verdict);
-        let dynamics = self.model.map(|m| Dynamics::new(m, self.config.gravity));
+        let dynamics =
+            self.model.map(|m| Dynamics::with_payload(m, self.config.gravity, &self.config.payload));
         self.path(trajectory.step_ms, &points, dynamics.as_ref(), &mut verdict);
         self.controller(trajectory, &mut verdict);
         if let Some(dynamics) = &dynamics {

@@ -1,7 +1,7 @@
 //! Errors of reading, giving and keeping an arm as one thing.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::{Code, ControllerState, StoreState};
+use jtc_wire::{Code, ControllerState, Joint, StoreState, TrajectoryState};
 
 use crate::arm::Difference;
 
@@ -39,6 +39,36 @@ pub enum ExtensionError {
     Powered {
         /// What the device is in.
         state: Code<ControllerState>,
+    },
+    /// A payload that is no body, or none that a controller takes (J-60).
+    #[error("{why}")]
+    NoBody {
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A payload that a joint cannot hold where the arm stands (J-60).
+    #[error(
+        "a payload of {mass} kg takes {torque:.1} N·m of {joint} where the arm stands, and its limit is {limit} N·m"
+    )]
+    TooHeavy {
+        /// Mass of the payload, kg.
+        mass: f64,
+        /// The joint that lacks most.
+        joint: Joint,
+        /// What it would have to hold, N·m.
+        torque: f64,
+        /// Its limit, N·m.
+        limit: f64,
+    },
+    /// A payload is not changed while a motion runs (J-60).
+    #[error(
+        "the payload is not changed while the arm moves by command (state {state}, trajectory {trajectory})"
+    )]
+    PayloadInMotion {
+        /// State of the controller then.
+        state: Code<ControllerState>,
+        /// Trajectory execution state then.
+        trajectory: Code<TrajectoryState>,
     },
     /// The memory of the device does not have it.
     #[error("the arm was not stored: {state}")]
@@ -84,6 +114,22 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "powered",
                 "an arm is stored while it has no torque: `jtc disable` (an arm without brakes falls), then push again",
+            ),
+            Self::NoBody { .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "no-body",
+                "mass in kg, centre of mass in m from the flange, inertia in kg·m² about that centre; nothing was changed",
+            ),
+            Self::TooHeavy { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "too-heavy",
+                "nothing was changed. Is the mass in kg and the centre of mass in m, along the axes of the flange? Else move the \
+                 arm to a pose that takes less (`jtc jog`), or take less on",
+            ),
+            Self::PayloadInMotion { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "in-motion",
+                "nothing was changed; `jtc traj pause` brings a motion to rest, `jtc status` shows what goes on",
             ),
             Self::NotStored { .. } => Diagnosis::new(
                 ErrorKind::Device,

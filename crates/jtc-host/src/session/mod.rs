@@ -7,6 +7,7 @@ mod commands;
 mod extension;
 mod follow;
 mod params;
+mod payload;
 mod recover;
 mod run;
 mod statistics;

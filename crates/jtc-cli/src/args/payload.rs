@@ -1,0 +1,115 @@
+//! `jtc payload`: what the arm carries at its flange.
+
+use clap::{Args, Subcommand};
+use jtc_core::Payload;
+
+use super::LinkArgs;
+
+/// `jtc payload …`
+#[derive(Debug, Subcommand)]
+pub enum PayloadCommand {
+    /// Give the payload: from now on the arm is held and moved with it
+    #[command(
+        after_help = "The flange is the last frame of the arm file. The payload comes into the torque over half a second, in HoldPos,\n\
+                            Teaching and Pause without a step; a motion that is started meanwhile waits for it. It is not stored: after\n\
+                            the controller was switched off there is none.\n\nExamples:\n  \
+                            jtc payload set --mass 2 --com 0,0,0.08\n  \
+                            jtc payload set --mass 2 --com 0,0,0.08 --inertia 0.01,0.01,0.004\n  \
+                            jtc payload set --mass 2 --com 0.02,0,0.08 --inertia 0.01,0.01,0.004,0,-0.001,0"
+    )]
+    Set {
+        #[command(flatten)]
+        body: PayloadArgs,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// The arm carries nothing
+    #[command(after_help = "Examples:\n  jtc payload clear")]
+    Clear {
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// What the controller computes with
+    #[command(after_help = "Examples:\n  jtc payload show\n  jtc --json payload show | jq .mass_kg")]
+    Show {
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+}
+
+/// A body at the flange.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct PayloadArgs {
+    /// Mass, kg
+    #[arg(long, env = "JTC_MASS", value_name = "KG", allow_hyphen_values = true)]
+    pub mass: f64,
+    /// Centre of mass in the flange frame, m
+    #[arg(long, env = "JTC_COM", value_name = "X,Y,Z", value_parser = com, allow_hyphen_values = true)]
+    pub com: [f64; 3],
+    /// Inertia about the centre of mass along the axes of the flange, kg·m²: Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz; default: a point mass
+    #[arg(long, env = "JTC_INERTIA", value_name = "IXX,IYY,IZZ[,IXY,IXZ,IYZ]", value_parser = inertia, allow_hyphen_values = true)]
+    pub inertia: Option<[f64; 6]>,
+}
+
+impl PayloadArgs {
+    /// The body.
+    pub fn payload(&self) -> Payload {
+        let Self { mass, com, inertia } = *self;
+        let [xx, yy, zz, xy, xz, yz] = inertia.unwrap_or_default();
+        Payload { mass, com, inertia: [xx, xy, xz, yy, yz, zz] }
+    }
+}
+
+/// Numbers between commas.
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    let number = |word: &str| {
+        let number = word.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        number.ok_or_else(|| format!("'{word}' is no number"))
+    };
+    text.split(',').map(number).collect()
+}
+
+fn com(text: &str) -> Result<[f64; 3], String> {
+    let all = numbers(text)?;
+    <[f64; 3]>::try_from(all).map_err(|all| format!("{} numbers instead of x,y,z", all.len()))
+}
+
+fn inertia(text: &str) -> Result<[f64; 6], String> {
+    let mut all = numbers(text)?;
+    if all.len() == 3 {
+        all.resize(6, 0.0);
+    }
+    <[f64; 6]>::try_from(all).map_err(|all| {
+        format!("{} numbers instead of three (ixx,iyy,izz) or six (ixx,iyy,izz,ixy,ixz,iyz)", all.len())
+    })
+}
+
+/// A point mass for the simulator: `KG` or `KG,X,Y,Z`.
+pub fn carried(text: &str) -> Result<Payload, String> {
+    let payload = match numbers(text)?[..] {
+        [mass] => Payload { mass, ..Payload::NONE },
+        [mass, x, y, z] => Payload { mass, com: [x, y, z], ..Payload::NONE },
+        ref all => return Err(format!("{} numbers instead of KG or KG,X,Y,Z", all.len())),
+    };
+    payload.check().map_err(|e| e.to_string())?;
+    Ok(payload)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j60_an_inertia_is_written_with_its_moments_first() {
+        let args = |text| PayloadArgs { mass: 2.0, com: [0.0; 3], inertia: Some(inertia(text).unwrap()) };
+        assert_eq!(args("1,2,3").payload().inertia, [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]);
+        assert_eq!(args("1, 2, 3, 4, 5, -6").payload().inertia, [1.0, 4.0, 5.0, 2.0, -6.0, 3.0]);
+        assert!(inertia("1,2").is_err() && inertia("1,2,3,4").is_err() && inertia("1,2,x").is_err());
+        assert!(
+            com("0,0").is_err() && com("0,0,nan").is_err() && com("0,0,inf").is_err() && com("").is_err()
+        );
+        assert_eq!(carried("2").unwrap().mass, 2.0);
+        assert_eq!(carried("2,0,0.1,-0.2").unwrap().com, [0.0, 0.1, -0.2]);
+        assert!(carried("-2").is_err() && carried("2,1").is_err());
+    }
+}

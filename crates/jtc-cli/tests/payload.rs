@@ -1,0 +1,117 @@
+//! `jtc payload`: what the arm carries (J-60).
+
+mod common;
+
+use common::{Sim, jtc};
+use serde_json::Value;
+
+/// Bent, so that the shoulder and the elbow carry what is at the flange.
+const BENT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1.5,0,0.35,0.3,0,0.3,0\n3,0,0.7,0.6,0,0.6,0\n";
+
+fn mass(value: &Value) -> f64 {
+    value["mass_kg"].as_f64().unwrap()
+}
+
+/// What the control law has to add to the torque of the model at joint 2 (N·m), the magnitude: before the model of the arm that
+/// is held changed by more than 2 N·m, and at the end of a recording of the simulator.
+fn missing(recording: &str) -> (f64, f64) {
+    let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
+    let (tes, model, whole) = (column("tes"), column("q2_torque_model_nm"), column("q2_torque_nm"));
+    let rows: Vec<[f64; 3]> = lines
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            [tes, model, whole].map(|i| cells[i].parse().unwrap_or(f64::NAN))
+        })
+        .collect();
+    let done = rows.iter().rposition(|row| row[0] == 3.0).expect("a run");
+    let held = rows[done + 100];
+    let changed =
+        done + 100 + rows[done + 100..].iter().position(|row| (row[1] - held[1]).abs() > 2.0).unwrap();
+    let last = rows[rows.len() - 1];
+    ((rows[changed - 300][2] - rows[changed - 300][1]).abs(), (last[2] - last[1]).abs())
+}
+
+/// 3 kg that the controller does not know are held by its integral; given, by its model.
+#[test]
+fn j60_a_payload_that_is_given_is_carried() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = dir.path().join("sim.csv");
+    let sim = Sim::start(&["--no-throttle", "--payload", "3,0,0,0.05", "--record", record.to_str().unwrap()])
+        .held();
+    let file = sim.file("bent.csv", BENT);
+    sim.jtc(&["traj", "run", &file]).ends(0);
+    assert_eq!(mass(&sim.json(&["payload", "show"], 0)), 0.0);
+    let hash = sim.json(&["info"], 0)["hash"].clone();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+
+    let set = sim.json(&["payload", "set", "--mass", "3", "--com", "0,0,0.05"], 0);
+    assert_eq!((mass(&set), mass(&set["before"])), (3.0, 0.0));
+    let info = sim.json(&["info"], 0);
+    assert_eq!((mass(&info["payload"]), &info["hash"]), (3.0, &hash), "it is no part of the arm");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert_eq!(sim.end("-TERM").0, 0);
+    let (before, after) = missing(&std::fs::read_to_string(record).unwrap());
+    assert!(before > 8.0 && after < 0.5 * before, "{before} N·m became {after} N·m");
+}
+
+/// What is refused is named with the joint and its torque, and nothing is changed.
+#[test]
+fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
+    let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
+    let file = sim.file("bent.csv", BENT);
+    sim.jtc(&["traj", "run", &file]).ends(0);
+    let set = |words: &[&str], code: i32| {
+        let all = [&["payload", "set"], words].concat();
+        let output = sim.jtc(&all).ends(code);
+        assert_eq!(mass(&sim.json(&["payload", "show"], 0)), 1.0, "{words:?}");
+        output.err
+    };
+    sim.jtc(&["payload", "set", "--mass", "1", "--com", "0,0,0"]).ends(0);
+    let heavy = set(&["--mass", "49", "--com", "0,0,0.5"], 4);
+    assert!(
+        heavy.contains("N·m of joint 4") && heavy.contains("limit is 60 N·m") && heavy.contains("jtc jog"),
+        "{heavy}"
+    );
+    let bounds = set(&["--mass", "51", "--com", "0,0,0"], 2);
+    assert!(bounds.contains("mass of the payload (kg) is 51") && bounds.contains("0 to 50"), "{bounds}");
+    let far = set(&["--mass", "2", "--com", "0,0,80"], 2);
+    assert!(far.contains("payload_z_m: 80") && far.contains("-5 to 5"), "{far}");
+    for (words, what) in [
+        (&["--mass", "-2", "--com", "0,0,0"][..], "must not be negative"),
+        (&["--mass", "2", "--com", "0,0,0", "--inertia", "0.1,0.1,0.9"], "more than the sum of the others"),
+        (&["--mass", "2", "--com", "0,0,0", "--inertia", "0.1,0.1,0.1,0.5,0,0"], "must not be negative"),
+        (&["--mass", "2", "--com", "0,0"], "2 numbers instead of x,y,z"),
+        (&["--mass", "2"], "--com"),
+    ] {
+        let refused = set(words, 2);
+        assert!(refused.contains(what), "{words:?}: {refused}");
+    }
+    // Without a port nothing is looked for.
+    let none = jtc(&["payload", "set", "--mass", "-2", "--com", "0,0,0", "--port", "/nowhere/tty"]).ends(2);
+    assert!(none.err.contains("nothing was sent"), "{}", none.err);
+}
+
+/// A path that the arm cannot run with what it carries is refused before anything is sent.
+#[test]
+fn j60_a_run_is_checked_with_the_payload() {
+    let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
+    let file = sim.file("bent.csv", BENT);
+    let stretched =
+        BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05");
+    let far = sim.file("far.csv", &stretched);
+    sim.json(&["traj", "run", &far], 0);
+    sim.json(&["traj", "run", &file, "--approach"], 0);
+    sim.jtc(&["payload", "set", "--mass", "6", "--com", "0,0,0.1"]).ends(0);
+    let run = sim.jtc(&["traj", "run", &file, "--approach"]).ends(0);
+    assert!(run.err.contains("payload of the controller, 6 kg at (0, 0, 0.1) m"), "{}", run.err);
+    let refused = sim.json(&["traj", "run", &far, "--approach"], 4);
+    let kinds: Vec<_> =
+        refused["verdict"]["problems"].as_array().unwrap().iter().map(|p| p["kind"].to_string()).collect();
+    assert!(kinds.iter().any(|kind| kind.contains("torque")), "{kinds:?}");
+    assert_eq!(mass(&sim.json(&["payload", "clear"], 0)["before"]), 6.0);
+    let text = sim.jtc(&["payload", "show"]).ends(0).out;
+    assert!(text.contains("payload: none"), "{text}");
+    sim.json(&["traj", "run", &far, "--approach"], 0);
+}

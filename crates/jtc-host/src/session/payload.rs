@@ -1,0 +1,71 @@
+//! What the arm carries at its flange (J-60).
+
+use jtc_core::{Config, Payload, settings};
+use jtc_dynamics::Dynamics;
+use jtc_wire::{ControllerState, DataStatus, Joint};
+
+use super::Session;
+use crate::error::{Error, ExtensionError, LinkError};
+use crate::port::Port;
+
+impl<P: Port> Session<P> {
+    /// What the controller computes with at the flange; [`Payload::NONE`] where it has no extensions.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::device_config`].
+    pub fn payload(&mut self) -> Result<Payload, Error> {
+        Ok(self.device_config()?.payload)
+    }
+
+    /// Gives the payload, which comes into the torque over half a second. An Execute, Teaching and jogging wait for that.
+    ///
+    /// # Errors
+    ///
+    /// [`ExtensionError::NoBody`] for what is none, and nothing is sent; [`ExtensionError::TooHeavy`] where a joint could not hold it in
+    /// the pose of the arm; [`ExtensionError::PayloadInMotion`] while the arm moves by command; those of
+    /// [`Session::set_settings`]. The controller keeps the payload that it has.
+    pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
+        payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
+        let values: Vec<_> = settings::payload_values(payload).collect();
+        // Such as no controller takes.
+        let alone = settings::with_values(&Config::avena(), values.iter().copied());
+        if let Err(settings::SettingError::Value { .. }) = alone.as_ref() {
+            return Err(
+                ExtensionError::NoBody { why: alone.err().map_or(String::new(), |e| e.to_string()) }.into()
+            );
+        }
+        match self.set_settings(&values) {
+            Err(Error::Link(LinkError::Refused {
+                code: DataStatus::NotAllowed, state, trajectory, ..
+            })) => Err(ExtensionError::PayloadInMotion { state, trajectory }.into()),
+            Err(Error::Link(refused @ LinkError::Refused { code: DataStatus::IncorrectValue, .. })) => {
+                Err(self.why_refused(payload)?.map_or(Error::Link(refused), Error::Extension))
+            }
+            done => done,
+        }
+    }
+
+    /// Why a payload that is a body was refused, as far as that can be found out.
+    fn why_refused(&mut self, payload: &Payload) -> Result<Option<ExtensionError>, Error> {
+        let config = self.device_config()?;
+        if let Err(e) = config.parameter_bounds.check_payload(payload) {
+            let why = format!("{} is {}, and the controller takes {} to {}", e.what, e.value, e.low, e.high);
+            return Ok(Some(ExtensionError::NoBody { why }));
+        }
+        let (arm, status) = (self.device_arm()?, self.fresh_status()?);
+        if status.state == ControllerState::Start {
+            return Ok(None);
+        }
+        let torque =
+            Dynamics::with_payload(&arm.model, config.gravity, payload).gravity_torque(&status.positions());
+        let share = |joint: &Joint| torque[joint.index()].abs() / config.joints[joint.index()].torque_max;
+        let worst = Joint::ALL.into_iter().max_by(|a, b| share(a).total_cmp(&share(b)));
+        Ok(worst.filter(|joint| share(joint) > 0.99).map(|joint| ExtensionError::TooHeavy {
+            mass: payload.mass,
+            joint,
+            torque: torque[joint.index()],
+            limit: config.joints[joint.index()].torque_max,
+        }))
+    }
+}

@@ -91,6 +91,11 @@ pub struct Config {
     pub host_timeout_ms: u16,
     /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is no part of an arm.
     pub speed: f64,
+    /// Joints that are not there, for work on a bench (J-53): no node is expected for them, and no motion is executed. They are no
+    /// part of an arm, and all there at the start of the device.
+    pub absent: [bool; JOINTS],
+    /// Where the model has each of them, rad.
+    pub absent_position: [f64; JOINTS],
     /// What the arm carries at its flange (J-60). It is no part of an arm, and none at the start of the device.
     pub payload: Payload,
     /// Bounds of the gains and masses that a host may give (J-06).

@@ -59,6 +59,8 @@ impl Config {
             friction_sign_width: 0.02,
             host_timeout_ms: 0,
             speed: 1.0,
+            absent: [false; crate::JOINTS],
+            absent_position: [0.0; crate::JOINTS],
             payload: Payload::NONE,
             parameter_bounds: ParameterBounds::known_drives(),
         }

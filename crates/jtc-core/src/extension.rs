@@ -178,6 +178,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // Written so that NaN is refused.
             let taken = velocity.abs() <= joint.velocity_max;
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
+            if velocity != 0.0 && self.config.absent.get(j) == Some(&true) {
+                // J-53: there is no such joint.
+                return Err(DataStatus::NotAllowed);
+            }
         }
         if !set.jogging() {
             if self.motion.law.yielding() {
@@ -302,7 +306,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
         // A few only: they are taken beside the work of every state.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
-        let standing = self.stands() && values.len() <= STANDING_MAX && all(|live| live != Live::No);
+        let standing = self.stands()
+            && values.len() <= STANDING_MAX
+            && all(|live| matches!(live, Live::Standing | Live::Always));
         if !all_live && !standing && !self.settable() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }

@@ -153,7 +153,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            Command::TeachingModeEnable if self.state == ControllerState::HoldPos => {
+            // J-53: a drive on a bench does not bear the load that the model has.
+            Command::TeachingModeEnable
+                if self.state == ControllerState::HoldPos && !self.joints_absent() =>
+            {
                 self.teaching = true;
                 SliceOutcome::Done
             }
@@ -320,6 +323,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Refused(DataStatus::IncorrectValue)
     }
 
+    /// J-53: joints are set absent.
+    fn joints_absent(&self) -> bool {
+        self.config.absent.contains(&true)
+    }
+
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.trajectory, command) {
@@ -327,8 +335,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.set.end_jog();
                 Ok(())
             }
-            // Teaching was accepted, and begins as soon as the arm is held.
-            (_, ExecCommand::Execute) if self.teaching || self.motion.set.jogging() => {
+            // Teaching was accepted, and begins as soon as the arm is held; or joints are absent (J-53).
+            (_, ExecCommand::Execute)
+                if self.teaching || self.motion.set.jogging() || self.joints_absent() =>
+            {
                 Err(DataStatus::NotAllowed)
             }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {

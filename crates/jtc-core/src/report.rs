@@ -49,7 +49,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             torque_friction: parts.friction,
             torque_other: parts.payload + parts.brake + parts.blend,
             torque: self.observed.torque[j],
-            state: node.report.state,
+            state: node.state(),
             internal: self.errors.joint(j).0,
         }
     }
@@ -70,10 +70,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let (can_current, can_occurred) = self.errors.can();
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());
         let joints = core::array::from_fn(|j| {
-            let report = &self.nodes.node(j).report;
+            let (report, state) = (&self.nodes.node(j).report, self.nodes.node(j).state());
             let (internal, internal_occurred) = self.errors.joint(j);
             JointStatus {
-                state: report.state,
+                state,
                 mc_current: report.mc_current,
                 mc_occurred: report.mc_occurred,
                 errors: report.errors,

@@ -13,6 +13,11 @@ pub use table::TABLE;
 /// Number of the speed override (J-57).
 pub const SPEED: u8 = 128;
 
+/// Number of the switch of an absent joint, and of where the model has that joint (J-53).
+pub const ABSENT: u8 = 16;
+/// See [`ABSENT`].
+pub const ABSENT_POSITION: u8 = 17;
+
 /// Numbers of the payload (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
 pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 
@@ -21,6 +26,8 @@ pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 pub enum Live {
     /// Never. It is part of the arm: stored, and in its hash.
     No,
+    /// Never, as `No`, but it is no part of the arm.
+    Unpowered,
     /// In HoldPos, Teaching and Pause, but not while a motion runs. It is no part of the arm.
     Standing,
     /// In every state, also while the arm moves. It is no part of the arm.
@@ -32,6 +39,10 @@ pub enum Live {
 pub(crate) enum Kind {
     /// A number of each joint.
     Joint,
+    /// A number of each joint that is no limit of it.
+    Each,
+    /// A switch of each joint, 0 or 1.
+    EachSwitch,
     /// A number of the arm.
     Number,
     /// A whole number of the arm.
@@ -118,7 +129,7 @@ impl core::error::Error for SettingError {}
 impl Setting {
     /// Each joint has one.
     pub const fn of_joint(&self) -> bool {
-        matches!(self.kind, Kind::Joint)
+        matches!(self.kind, Kind::Joint | Kind::Each | Kind::EachSwitch)
     }
 
     /// It belongs to the arm: it is stored with it, and in its hash.

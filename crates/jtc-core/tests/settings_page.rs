@@ -9,8 +9,8 @@ fn page() -> String {
     let mut page = String::from(
         "# Settings of the controller\n\n\
          What a host can read and change beside friction, gains and arm model (J-53), with [SetSettings](protocol-jtc.md#11-extensions)\n\
-         or in an arm file. The table is made from the controller's own. All but those that are *live* belong to the arm: they\n\
-         change in Init or Error only, are stored with it, and count for its hash. Defaults are those of the built-in arm.\n\n\
+         or in an arm file. The table is made from the controller's own. All but those that are *live*, and\n\
+         those that say so, belong to the arm: they change in Init or Error only, are stored with it, and count for its hash. Defaults are those of the built-in arm.\n\n\
          | number | name | range | default | meaning |\n|---|---|---|---|---|\n",
     );
     let config = Config::avena();
@@ -28,10 +28,11 @@ fn page() -> String {
         };
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let kind = match (row.of_joint(), live) {
+            (true, Live::Unpowered) => "; one a joint; no part of the arm",
             (true, _) => "; one a joint",
             (false, Live::Always) => "; *live*: in every state, also in motion",
             (false, Live::Standing) => "; *live*: also in HoldPos, Teaching and Pause",
-            (false, Live::No) => "",
+            (false, Live::No | Live::Unpowered) => "",
         };
         let _ =
             writeln!(page, "| {number} | `{name}` | {low} to {high}{unit} | {default} | {meaning}{kind} |");

@@ -16,6 +16,8 @@ pub(crate) struct SetValues {
     pub point: SetPoint,
     /// The joint is enabled and its set position latched.
     pub(super) holding: [bool; JOINTS],
+    /// The joint is set absent (J-53): there is nothing to hold.
+    absent: [bool; JOINTS],
     /// Joints whose load is being caught.
     pub(super) catch: [Catch; JOINTS],
     /// Joints that decelerate to rest.
@@ -27,9 +29,10 @@ pub(crate) struct SetValues {
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { point, holding, catch, deceleration, jog } = self;
+        let Self { point, holding, absent, catch, deceleration, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         *holding = [false; JOINTS];
+        *absent = [false; JOINTS];
         *catch = [Catch::default(); JOINTS];
         *deceleration = [None; JOINTS];
         *jog = None;
@@ -95,11 +98,11 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
-    /// Every joint is enabled and held at rest.
+    /// Every joint that is there is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
         self.jog.is_none()
             && self.deceleration.iter().all(Option::is_none)
-            && self.holding.iter().all(|&h| h)
+            && self.holding.iter().zip(&self.absent).all(|(&holding, &absent)| holding | absent)
             && !self.catch.iter().any(Catch::busy)
     }
 
@@ -111,6 +114,7 @@ impl SetValues {
         if self.holding == [true; JOINTS] && enabled == self.holding {
             return Latched { held: enabled, just_enabled: [false; JOINTS] };
         }
+        self.absent = core::array::from_fn(|j| nodes.node(j).absent());
         let held = core::array::from_fn(|j| enabled[j] && self.holding[j]);
         let just_enabled: [bool; JOINTS] = core::array::from_fn(|j| enabled[j] && !self.holding[j]);
         let another = just_enabled.contains(&true);

@@ -31,6 +31,8 @@ pub(crate) struct Nodes {
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
+    /// A joint is set absent (J-53).
+    some_absent: bool,
     gripper_lost: bool,
     /// Ticks for which every joint has been slow enough to be enabled (J-16).
     still_ms: u16,
@@ -62,6 +64,7 @@ impl Nodes {
             position: [0.0; JOINTS],
             velocity: [0.0; JOINTS],
             gripper: config.gripper,
+            some_absent: config.absent.contains(&true),
             gripper_lost: false,
             still_ms: 0,
             rest_ms: 0,
@@ -162,6 +165,9 @@ impl Nodes {
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &[f64; JOINTS]) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
+        if self.some_absent {
+            self.nodes.iter_mut().for_each(|node| node.unasked = None);
+        }
         let gripper = &self.nodes[GRIPPER];
         let (gripper_state, gripper_configured) = (gripper.report.state, gripper.configured);
         for (n, node) in self.nodes.iter_mut().enumerate() {
@@ -207,10 +213,28 @@ impl Nodes {
             && gripper.report.state != NodeState::ENABLED)
             || (gripper_configured && !gripper.configured);
         self.watch(config, goal);
+        if self.some_absent {
+            self.stand_in(config);
+        }
+    }
+
+    /// J-53: what stands for the joints that are set absent, and whether their drives answer all the same.
+    #[inline(never)]
+    fn stand_in(&mut self, config: &Config) {
+        for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
+            if config.absent[j] {
+                node.stand_in();
+                (self.position[j], self.velocity[j]) = (config.absent_position[j], 0.0);
+            }
+        }
     }
 
     fn report(&mut self, n: usize, report: &JointReport, configured_before: u8, answered: &mut u8) {
-        let Some(node) = self.nodes.get_mut(n).filter(|node| node.deaf_left == 0) else { return };
+        let Some(node) = self.nodes.get_mut(n) else { return };
+        if node.deaf_left > 0 {
+            node.unasked = Some(report.state);
+            return;
+        }
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
@@ -266,7 +290,7 @@ impl Nodes {
     fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
         // While every node boots, no node acknowledges.
-        let any_booted = self.all().iter().any(|node| node.boot_left == 0);
+        let any_booted = self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
         if on_the_bus {
             self.unacknowledged = 0;
         } else if self.sent_move && any_booted {
@@ -394,7 +418,7 @@ impl Nodes {
     pub fn reset(&mut self, mask: u8) {
         let present = self.present();
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
-            node.reset |= mask & (1 << n) != 0;
+            node.reset |= mask & (1 << n) != 0 && !node.absent;
         }
     }
 }
@@ -404,6 +428,19 @@ impl Nodes {
     /// it returns true.
     pub fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
+        self.some_absent = config.absent.contains(&true);
+        for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
+            if config.absent[j] {
+                if !before.absent[j] {
+                    *node = Node::default();
+                }
+                node.stand_in();
+                (self.position[j], self.velocity[j]) = (config.absent_position[j], 0.0);
+            } else if before.absent[j] {
+                // It is brought up like any other.
+                node.restart(config);
+            }
+        }
         let bits = |config: &Config| (config.joint_config_bits, config.gripper_config_bits, config.gripper);
         let changed = bits(config) != bits(before);
         if changed {

@@ -48,6 +48,10 @@ pub(crate) struct Node {
     pub(super) enable_wait: u32,
     /// A usable answer came in since the last tick: the measurement is no prediction.
     pub(super) fresh: bool,
+    /// Its joint is set absent (J-53).
+    pub(super) absent: bool,
+    /// State that it reported while it was not listened to.
+    pub(super) unasked: Option<NodeState>,
     /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
@@ -56,6 +60,16 @@ impl Node {
     /// Its measurement came in since the last tick.
     pub fn fresh(&self) -> bool {
         self.fresh
+    }
+
+    /// Its joint is set absent (J-53).
+    pub fn absent(&self) -> bool {
+        self.absent
+    }
+
+    /// State that it reports; Start where its joint is absent, unless it reports all the same.
+    pub fn state(&self) -> NodeState {
+        if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }
 
     pub fn enabled(&self) -> bool {
@@ -84,6 +98,22 @@ impl Node {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
+    /// The node of an absent joint (J-53), as it is in every tick: configured, ready and silent. So nothing is asked of it, and nothing
+    /// waits for it. A drive that answers is an error: either it or the setting is wrong.
+    pub fn stand_in(&mut self) {
+        let unasked = self.unasked;
+        *self = Self {
+            absent: true,
+            configured: true,
+            valid: true,
+            deaf_left: DEAF_AFTER_RESET,
+            unasked,
+            misbehaved: unasked.is_some(),
+            ..Self::default()
+        };
+        self.report.state = NodeState::READY;
+    }
+
     /// The configuration has to be accepted again, and until then position and velocity do not count.
     pub fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
@@ -94,7 +124,9 @@ impl Node {
     pub fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {
-            return Target::NoChange;
+            // J-53: an absent joint has no torque, even where it is there.
+            let powered = self.absent && self.unasked == Some(NodeState::ENABLED);
+            return if powered { Target::Ready } else { Target::NoChange };
         }
         if self.clear {
             // A drive ignores Init while it is enabled.

@@ -14,7 +14,7 @@ macro_rules! settings {
             unit: $unit,
             low: $low,
             high: $high,
-            whole: matches!(Kind::$kind, Kind::Whole | Kind::Switch),
+            whole: matches!(Kind::$kind, Kind::Whole | Kind::Switch | Kind::EachSwitch),
             live: Live::$live,
             meaning: $meaning,
             kind: Kind::$kind,
@@ -37,11 +37,21 @@ macro_rules! settings {
         }
     };
     (@get Joint $config:ident $joint:ident $field:ident) => { $config.joints.get($joint).map(|joint| joint.$field) };
+    (@get Each $config:ident $joint:ident $field:ident) => { $config.$field.get($joint).copied() };
+    (@get EachSwitch $config:ident $joint:ident $field:ident) => {
+        $config.$field.get($joint).map(|&switch| f64::from(u8::from(switch)))
+    };
     (@get Number $config:ident $joint:ident $($field:tt)+) => { Some($config.$($field)+) };
     (@get Whole $config:ident $joint:ident $field:ident: $type:ty) => { Some(f64::from($config.$field)) };
     (@get Switch $config:ident $joint:ident $field:ident) => { Some(f64::from(u8::from($config.$field))) };
     (@set Joint $config:ident $joint:ident $value:ident $field:ident) => {
         $config.joints.get_mut($joint).map(|joint| joint.$field = $value).is_some()
+    };
+    (@set Each $config:ident $joint:ident $value:ident $field:ident) => {
+        $config.$field.get_mut($joint).map(|each| *each = $value).is_some()
+    };
+    (@set EachSwitch $config:ident $joint:ident $value:ident $field:ident) => {
+        $config.$field.get_mut($joint).map(|each| *each = $value != 0.0).is_some()
     };
     (@set Number $config:ident $joint:ident $value:ident $($field:tt)+) => {{ $config.$($field)+ = $value; true }};
     (@set Whole $config:ident $joint:ident $value:ident $field:ident: $type:ty) => {{ $config.$field = $value as $type; true }};
@@ -57,6 +67,8 @@ settings! {
     Joint 6 "position_error_max_rad" ["rad"] 0.0001..=1.0 No "largest difference of commanded and measured position" (position_error_max);
     Joint 7 "rotor_inertia_kg_m2" ["kg·m²"] 0.0..=100.0 No "inertia of the drive's rotor at the joint" (rotor_inertia);
     Joint 8 "torque_gain" [""] 0.1..=10.0 No "what the drive is asked for, as a multiple of the joint's torque" (torque_gain);
+    EachSwitch 16 "absent" [""] 0.0..=1.0 Unpowered "the joint is not there, for work on a bench: no motion is executed" (absent);
+    Each 17 "absent_position_rad" ["rad"] -6.2832..=6.2832 Unpowered "where the model has a joint that is not there" (absent_position);
     Number 32 "gravity_x_m_s2" ["m/s²"] -30.0..=30.0 No "gravity along x of the base frame" (gravity[0]);
     Number 33 "gravity_y_m_s2" ["m/s²"] -30.0..=30.0 No "gravity along y of the base frame" (gravity[1]);
     Number 34 "gravity_z_m_s2" ["m/s²"] -30.0..=30.0 No "gravity along z of the base frame" (gravity[2]);

@@ -1,0 +1,239 @@
+//! Joints that are not there (J-53): what stands for them, what is refused, and a drive that answers all the same.
+mod plant;
+mod rig;
+
+use jtc_bus::{NodeState, Request, Target};
+use jtc_core::{Config, ControllerState, Payload, error, settings};
+use jtc_dynamics::Dynamics;
+use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
+use proptest::prelude::*;
+use rig::{Rig, floats, pieces};
+
+const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
+
+fn set(rig: &mut Rig, values: &[(u8, usize, f64)]) -> DataStatus {
+    let body: Vec<u8> = values
+        .iter()
+        .flat_map(|&(setting, j, value)| SettingValue { setting, joint: j as u8 + 1, value }.emit())
+        .collect();
+    rig.ask(FrameType::SetSettings, &body)
+}
+
+/// Flag and angle of each joint that is absent.
+fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
+    joints
+        .iter()
+        .flat_map(|&(j, q)| [(settings::ABSENT, j, 1.0), (settings::ABSENT_POSITION, j, q)])
+        .collect()
+}
+
+/// A bench on which these joints are not: their nodes never answer.
+fn bench(joints: &[(usize, f64)]) -> Rig {
+    bench_with(Config::avena(), joints)
+}
+
+fn bench_with(config: Config, joints: &[(usize, f64)]) -> Rig {
+    let mut rig = Rig::new(config);
+    for &(j, _) in joints {
+        rig.nodes[j].silent = true;
+    }
+    rig.tick();
+    rig.tick();
+    assert_eq!(set(&mut rig, &absent(joints)), DataStatus::NoError);
+    rig.defaults();
+    rig.run(3_500);
+    rig
+}
+
+fn is_absent(rig: &Rig, j: usize) -> bool {
+    rig.controller.config().absent[j]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
+
+    /// Whichever joints are not there: the others are brought up and held, with the torque that the model has for the whole arm.
+    #[test]
+    fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
+        let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
+        let mut rig = bench(&joints);
+        prop_assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{:?}", rig.controller.telemetry());
+        let q: [f64; 6] = core::array::from_fn(|j| if is_absent(&rig, j) { angles[j] } else { rig.nodes[j].report.position });
+        let model = jtc_core::Parameters::avena().model;
+        let gravity = Dynamics::new(&model, Config::avena().gravity).gravity_torque(&q);
+        let (status, telemetry) = (rig.status(), rig.controller.telemetry());
+        prop_assert_eq!((status.node_init, status.can_current, status.can_occurred), (0, 0, 0));
+        for j in ALL {
+            let joint = &status.joints[j];
+            if is_absent(&rig, j) {
+                prop_assert_eq!((joint.state, joint.position, joint.velocity), (NodeState::START, angles[j] as f32, 0.0));
+                prop_assert_eq!((telemetry.joints[j].torque, telemetry.joints[j].torque_model, rig.torque[j]), (0.0, 0.0, 0.0));
+            } else {
+                prop_assert_eq!(joint.state, NodeState::ENABLED);
+                prop_assert!((telemetry.joints[j].torque_model - gravity[j]).abs() < 1e-3, "joint {}", j + 1);
+            }
+        }
+        // Nothing was ever asked of their nodes.
+        for request in &rig.sent {
+            match request {
+                Request::Move { torque, .. } => {
+                    prop_assert!(joints.iter().all(|&(j, _)| torque[j] == 0.0));
+                }
+                Request::ChangeFsm { target } => {
+                    prop_assert!(joints.iter().all(|&(j, _)| target[j] == Target::NoChange));
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn j53_absent_is_set_in_init_and_error_only() {
+    for j in ALL {
+        let mut rig = Rig::holding();
+        let all = absent(&[(j, 0.4)]);
+        assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "HoldPos");
+        rig.send(FrameType::TeachingModeEnable, &[]);
+        rig.until(1_000, |r| r.state() == ControllerState::Teaching);
+        assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Teaching");
+        rig.send(FrameType::TeachingModeDisable, &[]);
+        rig.run(700);
+        rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
+        assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
+        assert!(!is_absent(&rig, j));
+        // In Error, for a drive that went silent.
+        rig.nodes[j].silent = true;
+        rig.until(50, |r| r.state() == ControllerState::Error);
+        assert_eq!(set(&mut rig, &all), DataStatus::NoError);
+        rig.clear(true, 0x7F);
+        rig.until(5_000, |r| r.state() == ControllerState::HoldPos);
+        rig.run(1_500);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+        assert_eq!(rig.controller.telemetry().joints[j].position, 0.4);
+    }
+}
+
+#[test]
+fn j53_absent_joints_forbid_motion_and_teaching_and_are_not_jogged() {
+    for j in ALL {
+        let mut rig = bench(&[(j, 0.0)]);
+        rig.upload(&pieces((j + 1) % 6, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 10);
+        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
+        assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NotAllowed);
+        let jog = |k: usize| {
+            let mut velocity = [0.0f32; 6];
+            velocity[k] = 0.1;
+            floats(velocity)
+        };
+        for k in ALL {
+            let expected = if k == j { DataStatus::NotAllowed } else { DataStatus::NoError };
+            assert_eq!(rig.ask(FrameType::Jog, &jog(k)), expected, "joint {}", k + 1);
+            let before = rig.controller.telemetry().joints[k].position;
+            rig.run(150);
+            let moved = rig.controller.telemetry().joints[k].position - before;
+            assert_eq!(moved > 0.001, k != j, "joint {}: {moved} rad", k + 1);
+            rig.run(1_500);
+        }
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+    }
+}
+
+/// Either the drive or the setting is wrong: the arm has no torque until that is mended.
+#[test]
+fn j53_absent_joints_whose_drives_answer_are_an_error() {
+    for j in ALL {
+        // From the start, and when the drive is connected later.
+        for later in [false, true] {
+            let mut rig = if later {
+                let mut rig = bench(&[(j, 0.3)]);
+                assert_eq!(rig.state(), ControllerState::HoldPos);
+                rig.nodes[j].silent = false;
+                rig
+            } else {
+                let mut rig = Rig::new(Config::avena());
+                rig.run(300);
+                assert_eq!(set(&mut rig, &absent(&[(j, 0.3)])), DataStatus::NoError);
+                rig
+            };
+            rig.until(10, |r| r.state() == ControllerState::Error);
+            assert_ne!(rig.errors() & error::EXTERNAL_JOINTS, 0);
+            // Its state is shown, so that one sees which it is.
+            let shown = rig.status().joints.map(|joint| joint.state);
+            assert_eq!(shown[j], rig.nodes[j].report.state);
+            rig.clear(true, 0x7F);
+            rig.run(500);
+            assert_eq!(rig.state(), ControllerState::Error, "it answers still");
+            assert!(rig.torque == [0.0; 6]);
+            // It is there after all.
+            assert_eq!(set(&mut rig, &[(settings::ABSENT, j, 0.0)]), DataStatus::NoError);
+            rig.run(50);
+            rig.clear(true, 0x7F);
+            rig.defaults();
+            rig.until(8_000, |r| r.nodes[..6].iter().all(|node| node.report.state == NodeState::ENABLED));
+            rig.run(50);
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+        }
+    }
+}
+
+/// One that is enabled is not left so, whatever has enabled it.
+#[test]
+fn j53_absent_joints_are_disabled_where_they_are_enabled() {
+    let mut rig = bench(&[(2, 0.0)]);
+    rig.nodes[2].silent = false;
+    rig.nodes[2].configured = true;
+    rig.nodes[2].report.state = NodeState::ENABLED;
+    rig.until(50, |r| r.nodes[2].report.state == NodeState::READY);
+    assert_eq!(rig.state(), ControllerState::Error);
+}
+
+/// What is left on the bus is watched as ever.
+#[test]
+fn j53_absent_joints_hide_no_error_of_the_others() {
+    for j in ALL {
+        let mut rig = bench(&[(j, 0.0)]);
+        let other = (j + 2) % 6;
+        rig.nodes[other].silent = true;
+        rig.until(10, |r| r.state() == ControllerState::Error);
+        assert_eq!(rig.status().can_current & !(1 << 14), 1 << (8 + other));
+    }
+}
+
+/// While the only node that is there boots, nobody acknowledges.
+#[test]
+fn j53_absent_joints_acknowledge_nothing() {
+    let five: Vec<_> = (1..6).map(|j| (j, 0.0)).collect();
+    let mut rig = bench_with(Config { gripper: false, ..Config::avena() }, &five);
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+    for nodes in [0x3E, 0x3F] {
+        assert_eq!(rig.ask(FrameType::ResetCanDevices, &[nodes, 0, 0, 0]), DataStatus::NoError);
+    }
+    rig.acknowledged = false;
+    rig.nodes[0].silent = true;
+    rig.run(200);
+    rig.acknowledged = true;
+    rig.nodes[0].silent = false;
+    rig.run(3_000);
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+    let resets = rig.sent.iter().filter(|request| matches!(request, Request::Reset(n) if *n > 0));
+    assert_eq!(resets.count(), 0, "what is not there is not reset");
+}
+
+/// They are no part of the arm, and a payload is carried with them as without.
+#[test]
+fn j53_j60_absent_joints_are_no_part_of_the_arm() {
+    let mut rig = bench(&[(1, 0.9), (4, -0.3)]);
+    let arm = |config: &Config| settings::values(config, 0, true).collect::<Vec<_>>();
+    assert_eq!(arm(rig.controller.config()), arm(&Config::avena()));
+    let payload = Payload { mass: 1.0, ..Payload::NONE };
+    let body: Vec<u8> = settings::payload_values(&payload).flat_map(|value| value.emit()).collect();
+    assert_eq!(rig.ask(FrameType::SetSettings, &body), DataStatus::NoError);
+    rig.run(600);
+    let telemetry = rig.controller.telemetry();
+    let q = telemetry.joints.map(|joint| joint.position);
+    let model = jtc_core::Parameters::avena().model;
+    let wanted = Dynamics::with_payload(&model, Config::avena().gravity, &payload).gravity_torque(&q);
+    assert!((telemetry.joints[2].torque_model - wanted[2]).abs() < 1e-3);
+    assert_eq!((q[1], q[4]), (0.9, -0.3));
+}

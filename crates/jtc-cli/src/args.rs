@@ -2,6 +2,7 @@
 //! file of their own.
 
 mod arm;
+mod bench;
 mod maintain;
 mod motion;
 mod offline;
@@ -15,6 +16,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand};
 
 pub use arm::{ArmCommand, ImportArgs};
+pub use bench::BenchCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
@@ -123,6 +125,9 @@ pub enum Command {
     /// Friction, gains and arm model
     #[command(subcommand)]
     Params(ParamsCommand),
+    /// Work on a bench: joints that are not there
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// What the arm carries at its flange
     #[command(subcommand)]
     Payload(PayloadCommand),

@@ -5,7 +5,7 @@ use std::time::Duration;
 use host_kit::Findings;
 pub use host_kit::{Finding, Severity};
 use jtc_bus::warning;
-use jtc_wire::{ControllerState, NodeState, Status, error};
+use jtc_wire::{ControllerState, Joint, NodeState, Status, error};
 
 use crate::port::Port;
 use crate::{Error, Session, words};
@@ -32,6 +32,8 @@ pub struct Observation {
     pub confirmed: Option<bool>,
     /// Another rate at which statuses were found.
     pub other_baud: Option<u32>,
+    /// Joints that are set absent (J-53).
+    pub absent: Vec<Joint>,
 }
 
 impl<P: Port> Session<P> {
@@ -61,6 +63,7 @@ impl<P: Port> Session<P> {
             status,
             confirmed: None,
             other_baud: None,
+            absent: Vec::new(),
         })
     }
 }
@@ -70,6 +73,7 @@ pub fn findings(seen: &Observation) -> Vec<Finding> {
     let mut all = Findings::default();
     link(seen, &mut all);
     if let Some(status) = &seen.status {
+        absent(status, &seen.absent, &mut all);
         errors(status, &mut all);
         set_up(status, &mut all);
         temperatures(status, &mut all);
@@ -134,6 +138,29 @@ fn link(seen: &Observation, all: &mut Findings) {
             "the wire towards the controller is open, or another program sends at the same time",
             "check the transmit wire; `fuser -v PORT` names other programs",
         );
+    }
+}
+
+/// A drive that answers although its joint is set absent is an error without a bit of its own (J-53).
+fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
+    for joint in joints {
+        let state = s.joints[joint.index()].state;
+        if state == NodeState::START {
+            let what = format!("{joint} is set absent");
+            all.add(
+                Severity::Warning,
+                what,
+                "no motion is executed, no teaching",
+                "`jtc bench present` ends it",
+            );
+        } else {
+            all.add(
+                Severity::Problem,
+                format!("{joint} is set absent, and its drive answers ({})", state.name()),
+                "either it is there, or a drive has the wrong number",
+                "`jtc bench present`, then `jtc recover`; or take the drive off the bus",
+            );
+        }
     }
 }
 

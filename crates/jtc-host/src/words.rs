@@ -1,7 +1,7 @@
 //! The controller's numbers in words.
 
 pub use jtc_bus::GRIPPER;
-use jtc_bus::{NODES, warning};
+use jtc_bus::{NODES, NodeState, warning};
 use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, can_flag, error};
 
 /// Name of a node on the joint bus.
@@ -102,6 +102,23 @@ pub fn can_flags(word: u32) -> Vec<String> {
 /// Whether a node does not answer; joints are nodes 0..5, the gripper is node 6.
 pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
+}
+
+/// Whether joint `j` (from 0) is set absent: under torque no other is in Start (J-20, J-53).
+pub fn is_absent(s: &Status, j: usize) -> bool {
+    let powered = [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
+    s.state.is_in(&powered) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
+}
+
+/// The joints that are set absent, where torque is on.
+pub fn absent(s: &Status) -> Vec<Joint> {
+    Joint::ALL.into_iter().filter(|joint| is_absent(s, joint.index())).collect()
+}
+
+/// Every joint that is there has its drive enabled.
+pub fn is_held(s: &Status) -> bool {
+    let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;
+    Joint::ALL.iter().all(|joint| enabled(joint) || is_absent(s, joint.index()))
 }
 
 /// Whether the controller still waits for a node to be ready.
@@ -205,6 +222,8 @@ pub fn next_step(s: &Status) -> &'static str {
         "`jtc teach off`"
     } else if s.is_executing() {
         "`jtc traj stop` ends the motion"
+    } else if s.state == ControllerState::HoldPos && !absent(s).is_empty() {
+        "`jtc jog JOINT RATE` moves a joint that is there; `jtc bench present` ends the work on a bench"
     } else if s.state == ControllerState::HoldPos {
         "`jtc traj run FILE` moves the arm"
     } else {

@@ -6,6 +6,7 @@ use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::Session;
 use jtc_host::doctor::{Observation, RATES, Severity, findings};
 use jtc_host::port::SerialPort;
+use jtc_wire::Joint;
 use serde_json::json;
 
 use super::status;
@@ -20,7 +21,16 @@ const TRY: Duration = Duration::from_millis(300);
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
-    let mut seen = Session::new(SerialPort::open(&name, link.baud)?).examine(LISTEN)?;
+    let mut session = Session::new(SerialPort::open(&name, link.baud)?);
+    let mut seen = session.examine(LISTEN)?;
+    // A drive that answers although its joint is set absent has no bit of its own (J-53).
+    let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
+    seen.absent = match &seen.status {
+        Some(_) if external => absent(session.absent().unwrap_or_default()),
+        Some(status) => jtc_host::words::absent(status),
+        None => Vec::new(),
+    };
+    drop(session);
     if seen.bytes > 0 && seen.statuses == 0 {
         seen.other_baud = other_rate(&name, link.baud, out);
     }
@@ -48,6 +58,10 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         (true, true) => Err(Failure::printed(ErrorKind::NoLink)),
         (true, false) => Err(Failure::printed(ErrorKind::Device)),
     }
+}
+
+fn absent(positions: [Option<f64>; jtc_wire::JOINTS]) -> Vec<Joint> {
+    Joint::ALL.into_iter().filter(|joint| positions[joint.index()].is_some()).collect()
 }
 
 fn no_link(seen: &Observation) -> bool {

@@ -22,9 +22,12 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Some(info) => {
             let payload = session.payload()?;
             let mut value = as_json(&info);
+            let absent = session.absent()?;
             value["payload"] = super::payload::as_json(&payload);
+            value["absent"] = super::bench::as_json(&absent)["absent"].take();
             out.result(&value, || {
-                format!("{}\npayload:   {}", as_text(&info), super::payload::words(&payload))
+                let (payload, absent) = (super::payload::words(&payload), super::bench::words(&absent));
+                format!("{}\npayload:   {payload}\nabsent:    {absent}", as_text(&info))
             });
         }
         None => out.result(&without_extensions_json(&status), || without_extensions(&status)),

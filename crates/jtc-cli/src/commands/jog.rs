@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
 use jtc_host::port::SerialPort;
+use jtc_host::words;
 use jtc_host::{Error, LinkError, Session};
-use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, NodeState, Status, TrajectoryState};
+use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
 use serde_json::json;
 
 use super::run::BRING_UP;
@@ -31,13 +32,18 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
     let mut begin = session.fresh_status()?;
-    if begin.state == ControllerState::HoldPos
-        && begin.joints.iter().any(|joint| joint.state != NodeState::ENABLED)
-    {
+    if begin.state == ControllerState::HoldPos && !words::is_held(&begin) {
         out.note("waiting until all drives are enabled");
         begin = session.wait_ready(BRING_UP)?;
     }
     settled(&mut session)?;
+    if let Some(joint) = args.joint.and_then(|joint| Joint::from_number(joint.into()))
+        && words::is_absent(&begin, joint.index())
+    {
+        let message = format!("{joint} is set absent, and there is nothing to move");
+        return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
+            .hint("`jtc bench show` shows which joints are absent"));
+    }
     let end = args.duration.map(|s| session.now() + Duration::from_secs_f64(s.clamp(0.0, 86_400.0)));
     let over = |session: &Session<SerialPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
     let jogged = match (args.joint.and_then(|joint| Joint::from_number(joint.into())), rate) {

@@ -1,6 +1,7 @@
 //! The commands, one file each or one file a family.
 
 mod arm;
+mod bench;
 mod decode;
 mod demo;
 mod doctor;
@@ -43,6 +44,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::monitor(&args, out),
         Command::Arm(command) => arm::arm(&command, out),
         Command::Params(command) => params::params(&command, out),
+        Command::Bench(command) => bench::bench(&command, out),
         Command::Payload(command) => payload::payload(&command, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),

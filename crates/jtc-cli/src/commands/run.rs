@@ -15,7 +15,7 @@ use jtc_host::trajectory::Trajectory;
 use jtc_host::{
     CheckError, CheckOptions, CheckedTrajectory, Error, MotionError, Sample, Session, StateError, words,
 };
-use jtc_wire::{ControllerState, NodeState, Status};
+use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
 use super::job::Job;
@@ -293,10 +293,16 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
         let failure = Failure::new(ErrorKind::Device, "not-ready", words::waiting_for(&status));
         return Err(failure.hint(words::next_step(&status)));
     }
-    let enabled = |s: &Status| s.joints.iter().all(|j| j.state == NodeState::ENABLED);
-    if !enabled(&status) {
+    let absent: Vec<String> = words::absent(&status).iter().map(ToString::to_string).collect();
+    if !absent.is_empty() {
+        let message =
+            format!("{}: set absent; no motion is executed, and nothing was sent", absent.join(", "));
+        return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
+            .hint("`jtc bench show` shows them; `jtc jog` moves the joints that are there; `jtc disable`, then `jtc bench present` ends it"));
+    }
+    if !words::is_held(&status) {
         operator.out.note("waiting until all drives are enabled");
-        let reached = |s: &Status| enabled(s) || operator.wants_the_end();
+        let reached = |s: &Status| words::is_held(s) || operator.wants_the_end();
         status = session.wait_for("all drives enabled", BRING_UP, reached)?;
         if operator.wants_the_end() {
             return Err(cancelled("wait for the drives"));

@@ -78,7 +78,13 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may answer; one that is enabled and not measured does not.
     let silent = !is_measured(s, j) && (words::is_silent(s, j) || state == NodeState::ENABLED);
-    if silent { "does not answer" } else { state.name() }
+    if words::is_absent(s, j) {
+        "absent"
+    } else if silent {
+        "does not answer"
+    } else {
+        state.name()
+    }
 }
 
 /// Pump and vacuum of the status are what the gripper sent.

@@ -213,7 +213,7 @@ impl Arm {
     fn find_settings(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let config = self.config();
         for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
-            for setting in settings::TABLE.iter().filter(|setting| setting.of_joint()) {
+            for setting in settings::TABLE.iter().filter(|setting| setting.of_joint() && setting.of_arm()) {
                 let Some(value) = setting.get(&config, joint.number()) else { continue };
                 let (low, high) = (setting.low, setting.high);
                 if !(low..=high).contains(&value) {

@@ -54,6 +54,11 @@ impl Arm {
         }
     }
 
+    /// Whether it is a setting of a joint that belongs to an arm, and this arm has a value of its own for it.
+    pub(super) fn gives_joint(&self, setting: &Setting, joint: Joint) -> bool {
+        setting.of_joint() && setting.of_arm() && self.gives(setting, Some(joint))
+    }
+
     /// The settings of this arm that a controller with the settings `device` uses otherwise: gravity first, then joint by joint.
     /// Empty: the controller's settings are those of this arm.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
@@ -70,7 +75,7 @@ impl Arm {
             compare(name, None, file, device, "m/s²");
         }
         for joint in Joint::ALL {
-            for row in TABLE.iter().filter(|row| row.of_joint() && self.gives(row, Some(joint))) {
+            for row in TABLE.iter().filter(|row| self.gives_joint(row, joint)) {
                 let value = |config| row.get(config, joint.number());
                 if let (Some(file), Some(device)) = (value(&own), value(device)) {
                     compare(row.name, Some(joint), file, device, row.unit);

@@ -63,7 +63,7 @@ impl Arm {
             let _ =
                 writeln!(out, "origin_xyz_m = {}\norigin_rpy_rad = {}", list(&origin.xyz), list(&origin.rpy));
             let Some(joint) = Joint::from_index(i) else { continue };
-            for row in settings::TABLE.iter().filter(|row| row.of_joint() && self.gives(row, Some(joint))) {
+            for row in settings::TABLE.iter().filter(|row| self.gives_joint(row, joint)) {
                 let Some(value) = row.get(&config, joint.number()) else { continue };
                 if row.name != "torque_gain" || value != 1.0 {
                     let _ = writeln!(out, "{} = {value:?}", row.name);

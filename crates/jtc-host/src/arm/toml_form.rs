@@ -227,7 +227,7 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
         let wrong = |problem: String| FileError::at(Place::name(format!("settings, {name}")), problem);
         let Some(row) = settings::named(name).filter(|row| super::has_no_key(row)) else {
             let problem = match settings::named(name) {
-                Some(row) if row.of_joint() => "stands in [[joint]], for each joint",
+                Some(row) if row.of_joint() && row.of_arm() => "stands in [[joint]], for each joint",
                 Some(row) if row.of_arm() => "stands above as gravity_m_s2",
                 Some(_) => "belongs to no arm; it is commanded while the arm is in use",
                 None => "is no setting of a controller; docs/settings.md lists them",

@@ -139,7 +139,7 @@ impl Arm {
         for joint in Joint::ALL {
             let j = joint.index();
             let mut add = |v: ArmValue| all.push(ArmValue { joint: Some(joint), ..v });
-            for row in settings::TABLE.iter().filter(|row| row.of_joint()) {
+            for row in settings::TABLE.iter().filter(|row| row.of_joint() && row.of_arm()) {
                 let given = self.gives(row, Some(joint));
                 let from = if given { self.sources.of((Some(joint), row.name)) } else { Source::Default };
                 add(value(setting(row, &drives), row.get(&config, joint.number()), from));

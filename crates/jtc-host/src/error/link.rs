@@ -137,7 +137,9 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &
         }
         (DataStatus::NotAllowed, Some(ControllerState::Error)) => "the controller is in Error: `jtc recover`",
         (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => "`jtc teach off` first",
-        (DataStatus::NotAllowed, _) => "`jtc status` shows the state; `jtc traj stop` ends a trajectory",
+        (DataStatus::NotAllowed, _) => {
+            "`jtc status` shows the state; `jtc traj stop` ends a trajectory. No motion and no teaching where joints are set absent"
+        }
         (DataStatus::StartPositionMismatch, _) => {
             "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
         }

@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
-use jtc_wire::{
-    ControllerState, DataStatus, ExecCommand, FrameType, NodeState, Status, TrajectoryState, fixed,
-};
+use jtc_wire::{ControllerState, DataStatus, ExecCommand, FrameType, Status, TrajectoryState, fixed};
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::port::Port;
+use crate::words;
 
 /// Longest that a controller waits with teaching until the arm is held, and a little more.
 const TEACHING: Duration = Duration::from_secs(11);
@@ -223,7 +222,7 @@ impl<P: Port> Session<P> {
         without_error(status)
     }
 
-    /// Waits until the controller holds the arm in HoldPos with every drive enabled; an error at once when it reports errors. The
+    /// Waits until the controller holds the arm in HoldPos with every drive enabled, but those of joints that are set absent; an error at once when it reports errors. The
     /// positions of the status are then measured ones, the pose that a run starts from.
     ///
     /// # Errors
@@ -231,9 +230,7 @@ impl<P: Port> Session<P> {
     /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it does not hold the arm in this time (it
     /// may still lack parameters); those of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
-        let ready = |s: &Status| {
-            s.state == ControllerState::HoldPos && s.joints.iter().all(|j| j.state == NodeState::ENABLED)
-        };
+        let ready = |s: &Status| s.state == ControllerState::HoldPos && words::is_held(s);
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
             s.state == ControllerState::Error || ready(s)
         })?;

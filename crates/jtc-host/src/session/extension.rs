@@ -274,8 +274,10 @@ impl<P: Port> Session<P> {
     ///
     /// Those of the line.
     pub fn speed(&mut self) -> Result<f64, LinkError> {
-        // What belongs to no arm is at the end of the table.
-        let first = settings::count(true) as u16;
+        let config = Config::avena();
+        let first = settings::values(&config, 0, false)
+            .position(|value| value.setting == settings::SPEED)
+            .unwrap_or(0) as u16;
         let speed = self.ask(&fixed::get_settings(first), |answer| match answer {
             Answer::Settings { values, .. } => Some(
                 values.iter().find(|value| value.setting == settings::SPEED).map_or(1.0, |value| value.value),

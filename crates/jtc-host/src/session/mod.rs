@@ -3,6 +3,7 @@
 //! Records of the controller are one-shot (J-04): each received frame is answered in exactly one status, in order. The session
 //! queues them and gives each to the request that waits for it.
 
+mod bench;
 mod commands;
 mod extension;
 mod follow;

@@ -103,6 +103,10 @@ fn j60_a_run_is_checked_with_the_payload() {
     let far = sim.file("far.csv", &stretched);
     sim.json(&["traj", "run", &far], 0);
     sim.json(&["traj", "run", &file, "--approach"], 0);
+    jtc(&["traj", "check", &far]).ends(0);
+    jtc(&["traj", "check", &far, "--payload", "6,0,0,0.1"]).ends(4);
+    jtc(&["traj", "check", &file, "--payload", "6,0,0,0.1"]).ends(0);
+    jtc(&["traj", "check", &file, "--payload", "-6"]).ends(2);
     sim.jtc(&["payload", "set", "--mass", "6", "--com", "0,0,0.1"]).ends(0);
     let run = sim.jtc(&["traj", "run", &file, "--approach"]).ends(0);
     assert!(run.err.contains("payload of the controller, 6 kg at (0, 0, 0.1) m"), "{}", run.err);

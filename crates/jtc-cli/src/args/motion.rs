@@ -26,13 +26,17 @@ pub struct CheckArgs {
 pub enum TrajCommand {
     /// Limits at and between points, torques by the arm model; nothing is sent
     #[command(
-        after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml"
+        after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml\n  \
+                            jtc traj check motion.csv --payload 2,0,0,0.08"
     )]
     Check {
         /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
         file: PathBuf,
         #[command(flatten)]
         check: CheckArgs,
+        /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m; `traj run` takes that of the controller
+        #[arg(long, env = "JTC_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
+        payload: Option<jtc_core::Payload>,
     },
     /// What a file holds
     #[command(after_help = "Examples:\n  jtc traj info motion.csv")]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, figure, table};
-use jtc_core::Config;
+use jtc_core::{Config, Payload};
 use jtc_host::check::Verdict;
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
@@ -20,7 +20,9 @@ use crate::progress::Progress;
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        TrajCommand::Check { file, check: args } => check(file, args, out),
+        TrajCommand::Check { file, check: args, payload } => {
+            check(file, args, payload.unwrap_or_default(), out)
+        }
         TrajCommand::Info { file, deg } => info(file, *deg, out),
         TrajCommand::Run(args) => run::run(args, out),
         TrajCommand::Replay(args) => {
@@ -89,8 +91,9 @@ fn may_be_moving(failure: Failure) -> Failure {
     Failure { hint, ..failure }
 }
 
-fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
-    let job = Job::load(file, args, out)?;
+fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Result<(), Failure> {
+    let mut job = Job::load(file, args, out)?;
+    job.config.payload = payload;
     let differences = job.arm.device_differences(&Config::avena());
     if !differences.is_empty() {
         out.note(format!(

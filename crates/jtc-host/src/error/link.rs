@@ -89,6 +89,10 @@ impl Diagnose for LinkError {
             Self::Refused { request, code, state, trajectory } => {
                 let next = match request {
                     FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
+                    FrameType::ArmModel | FrameType::ArmModelUseDefault if *code == DataStatus::IncorrectValue => Some(
+                        "a number is beyond its bounds (`jtc arm check FILE`), or a joint cannot hold this arm where it stands, with its \
+                         payload: `jtc payload show`, `jtc payload clear`",
+                    ),
                     _ => None,
                 };
                 Diagnosis::new(ErrorKind::Device, "refused", next.unwrap_or_else(|| after_refusal(*code, *state)))

@@ -237,7 +237,10 @@ pub fn with_values(
         apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
-    next.payload.check().map_err(SettingError::Payload)?;
+    // Principal moments are not worked out for a speed that changes in motion.
+    if next.payload != config.payload {
+        next.payload.check().map_err(SettingError::Payload)?;
+    }
     next.parameter_bounds.check_payload(&next.payload).map_err(SettingError::Bounds)?;
     Ok(next)
 }

@@ -8,7 +8,6 @@ use crate::JOINTS;
 use crate::config::Config;
 use crate::defaults;
 use crate::host::slices::{SliceOutcome, SliceProgress};
-use crate::limits::JointConfig;
 use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
 use crate::payload::PayloadBlend;
@@ -127,8 +126,9 @@ impl ReceivedParameters {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
         let now = self.dynamics.gravity_torque(at);
-        // Written so that NaN is too much.
-        let held = |j: usize| next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
+        // Written so that NaN is too much. A joint that is absent holds nothing (J-53).
+        let held =
+            |j: usize| config.absent[j] || next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
         (0..JOINTS).all(held)
     }
 
@@ -321,9 +321,8 @@ fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
 /// An arm like this can be held at `position` (rad), by the torque limits (J-06).
 fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
     let gravity = dynamics.gravity_torque(position);
-    // Written so that NaN is too much.
-    let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
-    gravity.iter().zip(&config.joints).all(held)
+    // Written so that NaN is too much. A joint that is absent holds nothing (J-53).
+    (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
 }
 
 /// Float `i`, refused when it is NaN, infinite or not there (J-06).

@@ -237,3 +237,31 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert!((telemetry.joints[2].torque_model - wanted[2]).abs() < 1e-3);
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
+
+/// What only a joint that is not there would have to hold is no reason to refuse a payload or a model.
+#[test]
+fn j53_absent_joints_hold_nothing() {
+    let payload = |mass: f64| {
+        let payload = Payload { mass, ..Payload::NONE };
+        settings::payload_values(&payload).flat_map(|value| value.emit()).collect::<Vec<u8>>()
+    };
+    // Stretched out: joint 2 holds hardly more than itself.
+    for there in [true, false] {
+        let mut rig = if there { Rig::new(Config::avena()) } else { bench(&[(1, 1.5)]) };
+        if there {
+            rig.nodes[1].report.position = 1.5;
+            rig.follow = false;
+            rig.defaults();
+            rig.run(700);
+        }
+        assert_eq!(rig.state(), ControllerState::HoldPos);
+        let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
+        assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
+        // Also where it is asked for again, at the end of Init.
+        rig.press_stop(10);
+        rig.clear(true, 0x7F);
+        rig.run(3_000);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+        assert_eq!(rig.ask(FrameType::ArmModelUseDefault, &[]), DataStatus::NoError);
+    }
+}

@@ -14,8 +14,8 @@ pub enum BenchCommand {
         after_help = "Each joint, counted from 1, is given with the angle at which the model has it. In Init or Error only: `jtc disable`\n\
                             takes the torque off before. No node is waited for at these joints, and their torque is zero. While a joint\n\
                             is absent no motion is executed and nothing is taught; the others are held, with the torque that the model has\n\
-                            for the whole arm, and can be jogged: push the model of what is on the bench. A drive that answers all the same is an error. It is not stored: after\n\
-                            the controller was switched off all joints are expected again.\n\nExamples:\n  \
+                            for the whole arm, and can be jogged: push the model of what is on the bench. A drive that answers all the\n\
+                            same is an error. It is not stored: after the controller was switched off all joints are expected again.\n\nExamples:\n  \
                             jtc bench absent 3=0.5 4=0\n  jtc bench absent 2=90 3=-45 --deg"
     )]
     Absent {

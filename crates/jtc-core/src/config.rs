@@ -29,6 +29,12 @@ pub struct Config {
     /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
     /// held within one such step (J-41).
     pub encoder_step: f64,
+    /// Age of a measurement when what is commanded because of it begins to act, ticks (J-62); 7 at most. The drives read their
+    /// encoder and apply the torque in the same millisecond loop of their own. A Move that they receive between two loops is
+    /// answered with what the first has read and acts in the second; its answer is used in the next tick, whose Move acts in the
+    /// third: two loops after the reading, wherever in the controller's millisecond they fall. An arm behind a slower bus, or
+    /// with drives that filter their positions, has a longer delay; 0 compares with what is commanded now.
+    pub delay_ticks: u8,
     /// Configuration bits sent to every joint (J-11).
     pub joint_config_bits: u8,
     /// Configuration bits sent to the gripper (J-11).

@@ -41,6 +41,11 @@ impl Deceleration {
         Self { length_ms, ..led }
     }
 
+    /// Where it begins, rad, and at which velocity, rad/s.
+    pub fn start(&self) -> (f64, f64) {
+        (self.from, self.velocity)
+    }
+
     /// The whole way moves by `way` (rad).
     pub fn shift(&mut self, way: f64) {
         self.from += way;

@@ -32,6 +32,7 @@ impl Config {
             velocity_full_scale: 2.0,
             drive_speed_trip: 1.8,
             encoder_step: core::f64::consts::TAU / 65_536.0,
+            delay_ticks: 2,
             joint_config_bits: 0x17,
             gripper_config_bits: 0x04,
             status_period_ms: 40,

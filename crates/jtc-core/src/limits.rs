@@ -65,10 +65,11 @@ impl Saturation {
     }
 }
 
-/// Set values (position, velocity, acceleration) outside the limits, as joint errors. The position limit holds for positions that
+/// Set values (position, velocity, acceleration) outside the limits, or a position `error` (rad, J-62), as joint errors. The
+/// position limit holds for positions that
 /// somebody `commanded`: an arm that is found beyond it is held where it is, or it could never be brought back. Rounding on
 /// the way between two points that the check of J-36 has passed is no error.
-pub(crate) fn check_set(set: (f64, f64, f64), measured: f64, limits: &JointConfig, commanded: bool) -> u16 {
+pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // Written so that NaN is outside.
     let (low, high) = (limits.position_min - ROUNDING, limits.position_max + ROUNDING);
@@ -76,7 +77,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), measured: f64, limits: &JointConfi
     bit(inside | !commanded, joint_error::POSITION)
         | bit(velocity.abs() <= limits.velocity_max + ROUNDING, joint_error::VELOCITY)
         | bit(acceleration.abs() <= limits.acceleration_max, joint_error::ACCELERATION)
-        | bit((position - measured).abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
+        | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
 fn bit(good: bool, bit: u16) -> u16 {
@@ -102,7 +103,7 @@ mod tests {
             | joint_error::VELOCITY
             | joint_error::ACCELERATION
             | joint_error::POSITION_ERROR;
-        assert_eq!(check_set((nan, nan, nan), 0.0, &limits(), true), all);
+        assert_eq!(check_set((nan, nan, nan), nan, &limits(), true), all);
         assert_eq!(check_set((0.0, 0.0, 0.0), nan, &limits(), true), joint_error::POSITION_ERROR);
         assert_eq!(Saturation::default().limit(nan, &limits(), 10, false), (0.0, joint_error::TORQUE));
     }
@@ -113,14 +114,14 @@ mod tests {
         for s in [-1.0, 1.0] {
             let position = if s < 0.0 { l.position_min } else { l.position_max };
             let set = (position, s * l.velocity_max, s * l.acceleration_max);
-            // The error is measured around 0, where it is exact.
-            assert_eq!(check_set(set, position, &l, true), 0);
-            assert_eq!(check_set((0.0, 0.0, 0.0), s * l.position_error_max, &l, true), 0);
+            assert_eq!(check_set(set, s * l.position_error_max, &l, true), 0);
             let beyond = |x: f64| x * (1.0 + 1e-8);
             let set = (beyond(position), beyond(set.1), beyond(set.2));
             let three = joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION;
-            assert_eq!(check_set(set, position, &l, true), three);
-            assert_eq!(check_set(set, position, &l, false), three & !joint_error::POSITION);
+            assert_eq!(check_set(set, 0.0, &l, true), three);
+            assert_eq!(check_set(set, 0.0, &l, false), three & !joint_error::POSITION);
+            let error = beyond(s * l.position_error_max);
+            assert_eq!(check_set((0.0, 0.0, 0.0), error, &l, true), joint_error::POSITION_ERROR);
             assert_eq!(Saturation::default().limit(s * l.torque_max, &l, 0, false), (s * l.torque_max, 0));
         }
     }
@@ -194,7 +195,7 @@ mod tests {
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();
         for (position, sign) in [(l.position_min - ROUNDING, -1.0), (l.position_max + ROUNDING, 1.0)] {
-            assert_eq!(check_set((position, sign * (l.velocity_max + ROUNDING), 0.0), position, &l, true), 0);
+            assert_eq!(check_set((position, sign * (l.velocity_max + ROUNDING), 0.0), 0.0, &l, true), 0);
         }
     }
 }

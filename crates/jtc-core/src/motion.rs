@@ -2,6 +2,7 @@
 //!
 //! Each part has its state and one step a tick; [`Motion`] connects them, and does to all of them what a change of the
 //! controller's state asks for.
+mod commanded;
 mod law;
 mod limiter;
 mod ramp;
@@ -83,6 +84,7 @@ impl Motion {
 
     /// A tick of the control law and of its limits: torques to command, and joint errors found on the way.
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> ([f64; JOINTS], [u16; JOINTS]) {
+        self.set.commanded.put(&self.set.point);
         let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
         let mut limited = self.limiter.step(inputs, &self.law.torque, &mut self.set);
         if let Some(sag) = &limited.sag {

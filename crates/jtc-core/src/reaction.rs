@@ -93,6 +93,7 @@ mod tests {
     fn j66_what_the_law_finds_in_motion_is_what_the_arm_reacts_to() {
         let found = |velocity: f64, offset: f64| {
             let mut controller = running();
+            controller.config.delay_ticks = 0;
             controller.motion.set.hold_for_test();
             controller.motion.set.point.velocity[1] = velocity;
             controller.motion.set.point.position[1] = controller.nodes.positions()[1] + offset;

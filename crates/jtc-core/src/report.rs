@@ -38,6 +38,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             set_position: set.position[j],
             set_velocity: set.velocity[j],
             set_acceleration: set.acceleration[j],
+            due_position: self.motion.set.due(&self.config)[j],
             position: self.nodes.positions()[j],
             velocity: self.nodes.velocities()[j],
             fresh: node.fresh(),

@@ -12,6 +12,8 @@ pub struct JointTelemetry {
     pub set_velocity: f64,
     /// Commanded acceleration, rad/s².
     pub set_acceleration: f64,
+    /// Position that was commanded for the time of the measurement, rad: what the control law compares it with (J-62).
+    pub due_position: f64,
     /// Measured position, rad.
     pub position: f64,
     /// Measured velocity, rad/s.
@@ -41,9 +43,9 @@ pub struct JointTelemetry {
 }
 
 impl JointTelemetry {
-    /// Commanded minus measured position, rad.
+    /// Position error, rad: the position that was commanded for the time of the measurement minus the measured one.
     pub fn position_error(&self) -> f64 {
-        self.set_position - self.position
+        self.due_position - self.position
     }
 }
 
@@ -84,7 +86,7 @@ mod tests {
     /// Positive where the joint lags behind a motion upwards, as the position part of the torque is.
     #[test]
     fn j41_the_position_error_is_commanded_minus_measured() {
-        let joint = JointTelemetry { set_position: 0.5, position: 0.25, ..JointTelemetry::default() };
+        let joint = JointTelemetry { due_position: 0.5, position: 0.25, ..JointTelemetry::default() };
         assert_eq!(joint.position_error(), 0.25);
     }
 }

@@ -5,7 +5,7 @@ use jtc_wire::{RawPoint, Response};
 use crate::controller::Controller;
 use crate::io::{Inputs, Outputs};
 use crate::motion::{ControlMode, LawInputs};
-use crate::{ControllerState, JOINTS, SetPoint};
+use crate::{ControllerState, JOINTS};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// One millisecond, with a bounded amount of work whatever the inputs.
@@ -50,7 +50,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// The answers of the nodes, and whether this tick comes in time.
     fn take_answers(&mut self, inputs: &Inputs<'_>) {
-        self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.point.velocity);
+        self.motion.set.next_tick();
+        let commanded = self.motion.set.due_velocity(&self.config);
+        self.nodes.take(inputs, &self.config, self.goal(), commanded);
         self.pump &= !self.nodes.gripper_lost();
         if self.late_ticks.count(inputs.missed_ticks) {
             self.errors.raise_device();
@@ -102,7 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
-        self.motion.set.point = SetPoint::still(*self.nodes.positions());
+        self.motion.set.follow_measured(&self.nodes);
         let left_ms = self.parameters.blend_left_ms();
         if left_ms > 0 {
             // What Teaching had found missing is now given.

@@ -106,11 +106,11 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
-            // An arm that goes where it is commanded to; what it reports now is seen two ticks after that command.
+            // An arm that goes where it is commanded to; what it reports now is seen two ticks after that command (J-62).
             let t = rig.controller.telemetry().joints[JOINT];
             if t.set_velocity != 0.0 {
                 rig.nodes[JOINT].report.velocity = t.set_velocity;
-                rig.nodes[JOINT].report.position = t.set_position + t.set_velocity * 0.002;
+                rig.nodes[JOINT].report.position = t.set_position;
             } else if tick < 3 {
                 rig.nodes[JOINT].report.position += velocity * 0.001;
             }

@@ -17,6 +17,8 @@ pub struct JointSample {
     pub set_acceleration: f64,
     /// Measured position, rad.
     pub position: f64,
+    /// Position error, rad: the position commanded for the time of the measurement minus the measured one (J-62).
+    pub error: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
     /// Model torque, N·m.
@@ -46,6 +48,7 @@ impl JointSample {
         set_velocity: f64::NAN,
         set_acceleration: f64::NAN,
         position: f64::NAN,
+        error: f64::NAN,
         velocity: f64::NAN,
         torque_model: f64::NAN,
         torque_p: f64::NAN,
@@ -61,12 +64,13 @@ impl JointSample {
     /// Without what a joint that does not answer cannot have sent: a gap, not a joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
-        Self { position: nan, velocity: nan, torque: nan, temperature: nan, ..self }
+        Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Commanded minus measured position, rad; NaN where one is unknown.
+    /// Position error, rad: as it was recorded, else the commanded minus the measured position of this moment; NaN where one is
+    /// unknown.
     pub fn position_error(&self) -> f64 {
-        self.set_position - self.position
+        if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
 }
 
@@ -83,6 +87,7 @@ impl From<&JointTelemetry> for JointSample {
             set_velocity: t.set_velocity,
             set_acceleration: t.set_acceleration,
             position: t.position,
+            error: t.position_error(),
             velocity: t.velocity,
             torque_model: t.torque_model,
             torque_p: t.torque_p,
@@ -180,8 +185,8 @@ impl Sample {
     }
 
     /// The values of a status while `trajectory` is executed: the commanded values are those of the reported point, as the
-    /// controller computes them.
-    pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory) -> Self {
+    /// controller computes them. The error is that of measurements as many `delay_ticks` old (J-62).
+    pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate
             && let Some(set) = trajectory.at_ms(status.point)
@@ -191,6 +196,11 @@ impl Sample {
                 joint.set_velocity = set.velocity[j];
                 joint.set_acceleration = set.acceleration[j];
             }
+            if let Some(due) = trajectory.at_ms(status.point.saturating_sub(delay_ticks.into())) {
+                for (joint, due) in sample.joints.iter_mut().zip(due.position) {
+                    joint.error = due - joint.position;
+                }
+            }
         }
         sample
     }
@@ -199,6 +209,7 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Point;
 
     #[test]
     fn a_joint_that_does_not_answer_has_no_position() {
@@ -211,5 +222,37 @@ mod tests {
         // It answers again, and its error is still latched.
         status.joints[2].position = 0.3;
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
+    }
+
+    /// What was commanded when the measurement was made is what it is compared with; where that is not known, what is commanded now.
+    #[test]
+    fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
+        let now = JointTelemetry {
+            set_position: 0.5,
+            due_position: 0.4,
+            position: 0.3,
+            ..JointTelemetry::default()
+        };
+        let sample = JointSample::from(&now);
+        assert_eq!(sample.position_error(), now.position_error());
+        assert!((sample.position_error() - 0.1).abs() < 1e-12);
+        let old = JointSample { error: f64::NAN, ..sample };
+        assert!((old.position_error() - 0.2).abs() < 1e-12);
+        assert!(sample.not_measured().position_error().is_nan());
+        // Of a status it is found on the path.
+        let point =
+            |q: f64, v: f64| Point { position: [q; JOINTS], velocity: [v; JOINTS], ..Point::default() };
+        let points = (0..=10).map(|k| point(0.05 * f64::from(k), 0.5)).collect();
+        let path = Trajectory { points, step_ms: 100 };
+        let mut status = Status { state: ControllerState::Operate.into(), point: 400, ..Status::default() };
+        status.joints[2].position = 0.2;
+        for delay in [0, 2, 7] {
+            let due = path.at_ms(400 - u32::from(delay)).expect("on the path").position[2];
+            let error = Sample::following(0.0, &status, &path, delay).joints[2].position_error();
+            assert!((error - (due - f64::from(0.2f32))).abs() < 1e-12, "{delay}: {error}");
+        }
+        let first =
+            Sample::following(0.0, &Status { point: 1, ..status }, &path, 7).joints[2].position_error();
+        assert!(first.is_finite(), "before the path it stands at its first point");
     }
 }

@@ -160,11 +160,15 @@ impl ControlLaw {
         let before = self.transfer.begin(&self.torque);
         let q = nodes.positions();
         let v = nodes.velocities();
-        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
+        // J-62: what is measured is compared with what was due then.
+        let due = set.due(config);
+        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts
+        // now: the measured position is taken to where the commanded motion has brought it since.
+        let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let zero = [0.0; JOINTS];
         let (qd, qdd) =
             if mode.moves() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
-        let model = parameters.dynamics.inverse(q, &qd, &qdd);
+        let model = parameters.dynamics.inverse(&now, &qd, &qdd);
         let payload = if mode == ControlMode::Teach {
             self.payload.torque(parameters.dynamics, q, v, config)
         } else {
@@ -181,7 +185,7 @@ impl ControlLaw {
                 ..JointTorque::default()
             };
             if mode != ControlMode::Teach {
-                let error = set.point.position[j] - q[j];
+                let error = due[j] - q[j];
                 let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
                 torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step);

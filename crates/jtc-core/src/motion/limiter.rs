@@ -44,8 +44,10 @@ impl Limiter {
         let on_path = braking && mode == ControlMode::Follow;
         let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         let (q, v) = (nodes.positions(), nodes.velocities());
+        let due = *set.due(config);
         let joints: [(f64, u16); JOINTS] = core::array::from_fn(|j| {
             let limits = &config.joints[j];
+            let error = due[j] - q[j];
             let computed = torque[j].sum();
             let catching = set.catch[j].step(v[j]) && mode == ControlMode::Hold;
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
@@ -54,9 +56,9 @@ impl Limiter {
             let (within, torque_error) =
                 self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
-            let set_error = limits::check_set(point, q[j], limits, mode == ControlMode::Follow);
+            let set_error = limits::check_set(point, error, limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
-                let sag = set.sag(j, computed - within, parameters.pid[j].kp, q[j], limits);
+                let sag = set.sag(j, computed - within, parameters.pid[j].kp, error, limits);
                 sags.get_or_insert([0.0; JOINTS])[j] = sag;
             }
             let set_error =

@@ -1,4 +1,5 @@
 //! Set values (J-40 to J-44): of the held arm, of what comes to rest, of the approach and of the path.
+use super::commanded::Commanded;
 use crate::catch::Catch;
 use crate::config::Config;
 use crate::deceleration::{Deceleration, moves};
@@ -14,6 +15,8 @@ use crate::{DT, JOINTS};
 pub(crate) struct SetValues {
     /// The set values of this tick.
     pub point: SetPoint,
+    /// Those of the last ticks (J-62).
+    pub(super) commanded: Commanded,
     /// The joint is enabled and its set position latched.
     pub(super) holding: [bool; JOINTS],
     /// The joint is set absent (J-53): there is nothing to hold.
@@ -29,8 +32,9 @@ pub(crate) struct SetValues {
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { point, holding, absent, catch, deceleration, jog } = self;
+        let Self { point, commanded, holding, absent, catch, deceleration, jog } = self;
         *point = SetPoint::still(*nodes.positions());
+        commanded.rest(nodes.positions());
         *holding = [false; JOINTS];
         *absent = [false; JOINTS];
         *catch = [Catch::default(); JOINTS];
@@ -41,8 +45,30 @@ impl SetValues {
     /// Whatever comes next begins at rest at `position`.
     pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
+        self.commanded.rest(position);
         self.deceleration = [None; JOINTS];
         self.jog = None;
+    }
+
+    /// The arm is led: the set position is the measured one.
+    pub fn follow_measured(&mut self, nodes: &Nodes) {
+        self.point = SetPoint::still(*nodes.positions());
+        self.commanded.rest(nodes.positions());
+    }
+
+    /// The next tick begins.
+    pub fn next_tick(&mut self) {
+        self.commanded.next_tick();
+    }
+
+    /// Positions (rad) that are due in the measurement of this tick (J-62).
+    pub fn due(&self, config: &Config) -> &[f64; JOINTS] {
+        self.commanded.position(config.delay_ticks)
+    }
+
+    /// Velocities (rad/s) that are due in it, before the set values of this tick are known: those of the last one at the latest.
+    pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
+        self.commanded.velocity(config.delay_ticks.max(1))
     }
 
     /// Joint velocities to move at from now on, rad/s.
@@ -74,10 +100,21 @@ impl SetValues {
         let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
             // Joints that are enabled later begin on their own.
-            let decelerates = moving && self.holding[j];
-            self.deceleration[j] =
-                decelerates.then_some(Deceleration::led(from[j], velocity[j], config, &config.joints[j]));
+            self.deceleration[j] = None;
+            if moving && self.holding[j] {
+                let led = Deceleration::led(from[j], velocity[j], config, &config.joints[j]);
+                self.decelerate(j, led, config);
+            }
         }
+    }
+
+    /// A joint comes to rest from where it was measured.
+    fn decelerate(&mut self, j: usize, mut deceleration: Deceleration, config: &Config) {
+        let (from, velocity) = deceleration.start();
+        self.commanded.begin(j, from, velocity, config.delay_ticks);
+        // J-62: it has gone on since.
+        deceleration.shift(self.commanded.position(0)[j] - from);
+        self.deceleration[j] = Some(deceleration);
     }
 
     /// A joint that comes to rest because a hand has led it is stopped like one with a falling load.
@@ -121,14 +158,13 @@ impl SetValues {
         for j in 0..JOINTS {
             if !held[j] {
                 self.point.position[j] = measured[j];
+                self.commanded.begin(j, measured[j], 0.0, 0);
                 self.catch[j] = if just_enabled[j] { Catch::begin(config) } else { Catch::default() };
-                let falls = just_enabled[j] && moves(velocity[j]);
-                self.deceleration[j] = falls.then_some(Deceleration::falling(
-                    measured[j],
-                    velocity[j],
-                    config,
-                    &config.joints[j],
-                ));
+                self.deceleration[j] = None;
+                if just_enabled[j] && moves(velocity[j]) {
+                    let falling = Deceleration::falling(measured[j], velocity[j], config, &config.joints[j]);
+                    self.decelerate(j, falling, config);
+                }
             } else if another {
                 // Its load moves when that of another joint does.
                 self.catch[j] = Catch::begin(config);
@@ -180,11 +216,11 @@ impl SetValues {
     }
 
     /// The set position of a joint whose load is being caught moves on towards it, by as much as the torque is beyond the limit
-    /// (`excess`, N·m). Returns by how much, rad.
-    pub fn sag(&mut self, j: usize, excess: f64, kp: f64, measured: f64, limits: &JointConfig) -> f64 {
-        let error = self.point.position[j] - measured;
+    /// (`excess`, N·m) at a position error of `error` (rad). Returns by how much, rad.
+    pub fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;
+        self.commanded.shift(j, step);
         if let Some(deceleration) = &mut self.deceleration[j] {
             deceleration.shift(step);
         }

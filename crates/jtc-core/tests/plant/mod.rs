@@ -139,11 +139,21 @@ impl Plant {
         }
     }
 
-    /// One millisecond of both. What the controller measures is two ticks older than the command that answers it.
+    /// One millisecond of both. What the controller measures in a tick was so in the tick before, of whose torque it knows nothing.
     pub fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
         self.report(rig);
+    }
+
+    /// The same, but what the rig's drives answer is that they are at `seen` (rad).
+    pub fn tick_seen_at(&mut self, rig: &mut Rig, seen: &[f64; 6]) {
+        self.report(rig);
+        for (node, q) in rig.nodes.iter_mut().zip(seen) {
+            node.report.position = read(*q);
+        }
+        rig.tick();
+        self.step(rig);
     }
 
     pub fn run(&mut self, rig: &mut Rig, ticks: usize) {
@@ -204,10 +214,15 @@ impl Plant {
     pub fn report(&self, rig: &mut Rig) {
         for j in 0..6 {
             let report = &mut rig.nodes[j].report;
-            report.position = (self.q[j] / ENCODER_STEP).floor() * ENCODER_STEP;
+            report.position = read(self.q[j]);
             report.velocity = (self.speeds[j].iter().sum::<f64>() / 10.0).clamp(-2.0, 2.0);
         }
     }
+}
+
+/// What the encoder reads at `q`, rad.
+fn read(q: f64) -> f64 {
+    (q / ENCODER_STEP).floor() * ENCODER_STEP
 }
 
 /// Inverse of a symmetric positive definite matrix, by Gauss and Jordan.

@@ -63,6 +63,7 @@ pub struct CheckedTrajectory {
     raw: Arc<[RawPoint]>,
     options: UploadOptions,
     verdict: Verdict,
+    delay_ticks: u8,
     number: u64,
 }
 
@@ -117,6 +118,7 @@ impl CheckedTrajectory {
                 raw: raw.into(),
                 options: options.upload,
                 verdict,
+                delay_ticks: config.delay_ticks,
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
             }),
             // A number that no frame carries is among the problems of the verdict.
@@ -137,6 +139,11 @@ impl CheckedTrajectory {
     /// The segments that it will be sent in.
     pub fn upload_options(&self) -> &UploadOptions {
         &self.options
+    }
+
+    /// Age of the controller's measurements, ticks (J-62).
+    pub(crate) fn delay_ticks(&self) -> u8 {
+        self.delay_ticks
     }
 
     /// As the wire carries it.

@@ -12,12 +12,13 @@ use crate::sample::{JointSample, Sample};
 /// A number of a joint: column name after `q1_`…, and how to reach it.
 type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
 
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 13] = [
     ("set_position_rad", |j| &mut j.set_position),
     ("set_velocity_rad_s", |j| &mut j.set_velocity),
     ("set_acceleration_rad_s2", |j| &mut j.set_acceleration),
     ("position_rad", |j| &mut j.position),
     ("velocity_rad_s", |j| &mut j.velocity),
+    ("error_rad", |j| &mut j.error),
     ("torque_model_nm", |j| &mut j.torque_model),
     ("torque_p_nm", |j| &mut j.torque_p),
     ("torque_i_nm", |j| &mut j.torque_i),

@@ -99,7 +99,7 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
         self.cdr
             .start()
             .header(stamp, "")
-            .array(j.map(|j| j.set_position - j.position))
+            .array(j.map(|j| j.position_error()))
             .array(j.map(|j| j.set_acceleration))
             .array(model)
             .array(j.map(|j| j.torque_p))
@@ -230,13 +230,13 @@ fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {
         }
         CONTROL_TOPIC => {
             cdr.skip_header()?;
-            cdr.array()?;
-            let mut columns = [[0.0; 6]; 8];
+            let mut columns = [[0.0; 6]; 9];
             for column in &mut columns {
                 *column = cdr.array()?;
             }
             for (i, joint) in joints.iter_mut().enumerate() {
                 [
+                    joint.error,
                     joint.set_acceleration,
                     joint.torque_model,
                     joint.torque_p,

@@ -15,6 +15,7 @@ fn samples(n: usize) -> Vec<Sample> {
             for (j, joint) in s.joints.iter_mut().enumerate() {
                 joint.set_position = (t + j as f64).sin();
                 joint.position = joint.set_position - 1e-3;
+                joint.error = 4e-4;
                 joint.torque = -12.5 * j as f64;
                 joint.temperature = 31.0;
                 (joint.state, joint.internal) = (NodeState::ENABLED, 1 << j);
@@ -57,6 +58,7 @@ fn check(name: &str) -> Recording {
             for (x, y) in [
                 (a.set_position, b.set_position),
                 (a.position, b.position),
+                (a.error, b.error),
                 (a.velocity, b.velocity),
                 (a.torque_p, b.torque_p),
                 (a.torque, b.torque),

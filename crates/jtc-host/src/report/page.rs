@@ -94,7 +94,7 @@ fn data(input: &ReportInput<'_>) -> Value {
         "position_rad": per_joint(fine, |j| j.position),
         "set_velocity_rad_s": per_joint(coarse, |j| j.set_velocity),
         "velocity_rad_s": per_joint(coarse, |j| j.velocity),
-        "error_mrad": per_joint(coarse, |j| (j.set_position - j.position) * 1e3),
+        "error_mrad": per_joint(coarse, |j| j.position_error() * 1e3),
         "torque_model_nm": per_joint(coarse, |j| j.torque_model),
         "torque_pid_nm": per_joint(coarse, |j| j.torque_p + j.torque_i + j.torque_d),
         "torque_friction_nm": per_joint(coarse, |j| j.torque_friction),

@@ -133,9 +133,8 @@ fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f6
 }
 
 fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
-    let lines: Vec<Vec<(f64, f64)>> = (0..6)
-        .map(|j| extremes(input.samples, |s| (s.joints[j].set_position - s.joints[j].position) * 1e3))
-        .collect();
+    let lines: Vec<Vec<(f64, f64)>> =
+        (0..6).map(|j| extremes(input.samples, |s| s.joints[j].position_error() * 1e3)).collect();
     let Some((low, high)) = bounds(lines.iter().flatten()) else { return };
     let reach = low.abs().max(high.abs()).max(0.1) * 1.1;
     let panel = Panel { left: 64.0, top: 418.0, width: 836.0, height: 88.0, time, value: (-reach, reach) };

@@ -10,7 +10,7 @@ use crate::sample::Sample;
 pub struct JointSummary {
     /// As in the arm file.
     pub name: String,
-    /// Root mean square of commanded minus measured position, mrad.
+    /// Root mean square of the position error, mrad: what was commanded for the time of a measurement minus that (J-62).
     pub rms_error_mrad: Option<f64>,
     /// Largest absolute error, mrad.
     pub max_error_mrad: Option<f64>,
@@ -68,7 +68,7 @@ impl Summary {
 impl JointSummary {
     fn of(info: &RecordingInfo, j: usize, samples: &[&Sample]) -> Self {
         let errors = || {
-            let error = |s: &&Sample| s.joints[j].set_position - s.joints[j].position;
+            let error = |s: &&Sample| s.joints[j].position_error();
             samples.iter().map(error).filter(|e| e.is_finite()).map(|e| e * 1e3)
         };
         let count = errors().count();

@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::sync::Arc;
 use std::time::Duration;
 
 use jtc_wire::Status;
@@ -13,7 +12,6 @@ use crate::port::Port;
 use crate::recording::RecordingInfo;
 use crate::report::Summary;
 use crate::sample::Sample;
-use crate::trajectory::Trajectory;
 use crate::{Arm, Error};
 
 /// What a run was: how it ended, and a sample of each status from its start.
@@ -49,7 +47,7 @@ impl<P: Port> Session<P> {
         observe: impl FnMut(&Sample) + 'static,
         each: impl FnMut(&Status) -> Flow,
     ) -> Run {
-        let samples = self.collect(checked.shared(), observe);
+        let samples = self.collect(checked, observe);
         let outcome = self.execute(checked).and_then(|()| self.follow(each));
         self.stop_observing();
         Run { outcome, samples: samples.take() }
@@ -58,14 +56,15 @@ impl<P: Port> Session<P> {
     /// Collects a sample of each status from now on.
     fn collect(
         &mut self,
-        trajectory: Arc<Trajectory>,
+        checked: &CheckedTrajectory,
         mut observe: impl FnMut(&Sample) + 'static,
     ) -> Rc<RefCell<Vec<Sample>>> {
+        let (trajectory, delay) = (checked.shared(), checked.delay_ticks());
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);
         let mut clock = Clock { start: self.now(), arrived: self.now(), point: 0, time_s: 0.0 };
         self.observe(move |now, status| {
-            let sample = Sample::following(clock.at(now, status), status, &trajectory);
+            let sample = Sample::following(clock.at(now, status), status, &trajectory, delay);
             observe(&sample);
             taken.borrow_mut().push(sample);
         });

@@ -24,8 +24,9 @@ struct Arm {
 }
 
 impl Arm {
+    /// What it measures is compared with the set values of the same tick, so that one tick shows what the law makes of them.
     fn held(gains: PidGains) -> Self {
-        let config = Config::avena();
+        let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
         motion.begin_at(&POSE);
         motion.set.hold_for_test();

@@ -344,3 +344,25 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     }
     assert!(moved > 0.2, "{moved} rad/s");
 }
+
+/// What is predicted for a measurement that is lost is what it would have shown: of an arm that follows exactly nothing is left for
+/// the PID controller, wherever in a motion with corners of the velocity the loss begins, and however late the answers are.
+#[test]
+fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
+    for late in [2, 4, DELAY_MAX] {
+        let mut worst = 0.0;
+        for begin in (0..260).step_by(3) {
+            let mut arm = ExactArm::holding(late);
+            arm.rig.upload(&pieces(0, &[(5.0, 8), (-5.0, 8)]), 10);
+            arm.rig.send(FrameType::TrajSetExecStatus, &[3]);
+            for tick in 0..500 {
+                arm.rig.nodes[0].silent = (180 + begin..184 + begin).contains(&tick);
+                let joint = arm.tick(0.0)[0];
+                worst = f64::max(worst, joint.position_error().abs());
+            }
+            assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
+        }
+        // The rate that is carried on is that of the last 5 ms, in which a corner was; 4 ms after it.
+        assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
+    }
+}

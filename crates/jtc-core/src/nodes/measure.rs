@@ -4,6 +4,8 @@
 //! without a usable answer takes the *prediction*: the last one, carried on at the rate at which the joint moved, and the
 //! change of the commanded velocity since. The first usable answer after missing ones differs from the prediction by an
 //! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
+//! The same holds when answers that had been late are overtaken by one in time: what came with the first is taken back by the last,
+//! and the offsets of many do not add up.
 //! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
 //! stays closed however often answers are lost.
 mod history;
@@ -42,6 +44,8 @@ pub(crate) struct Tick {
     pub answer: Option<Reading>,
     /// A Move asked for an answer.
     pub expected: bool,
+    /// It is not the only answer of this tick: those before it were late.
+    pub again: bool,
     /// Commanded velocity, rad/s.
     pub commanded: f64,
     /// Milliseconds since the last tick.
@@ -143,7 +147,7 @@ impl Measurement {
             let off = self.answer.position - answer.position;
             if !self.known {
                 *self = Self { known: true, ..Self::default() };
-            } else if self.missing {
+            } else if self.missing | tick.again {
                 self.position_offset.left += off;
                 self.velocity_offset.left += self.answer.velocity + change - answer.velocity;
                 self.fading = true;

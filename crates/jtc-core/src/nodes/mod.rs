@@ -171,7 +171,7 @@ impl Nodes {
         let gripper = &self.nodes[GRIPPER];
         let (gripper_state, gripper_configured) = (gripper.report.state, gripper.configured);
         for (n, node) in self.nodes.iter_mut().enumerate() {
-            node.misbehaved = false;
+            (node.misbehaved, node.again) = (false, false);
             node.deaf_left = node.deaf_left.saturating_sub(1);
             configured_before |= u8::from(node.configured) << n;
         }
@@ -235,6 +235,7 @@ impl Nodes {
             node.unasked = Some(report.state);
             return;
         }
+        node.again |= *answered & (1 << n) != 0;
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
@@ -265,6 +266,7 @@ impl Nodes {
             let tick = Tick {
                 answer: (answered & (1 << j) != 0).then_some(reading),
                 expected: self.sent_move,
+                again: node.again,
                 commanded: commanded[j],
                 elapsed_ms,
                 velocity_max: config.joints[j].velocity_max,

@@ -52,6 +52,8 @@ pub(crate) struct Node {
     pub(super) absent: bool,
     /// State that it reported while it was not listened to.
     pub(super) unasked: Option<NodeState>,
+    /// More than one answer came in since the last tick: all but the last were late.
+    pub(super) again: bool,
     /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }

@@ -7,7 +7,14 @@ const VELOCITY_MAX: f64 = 2.0;
 
 fn tick(answer: Option<f64>, velocity: f64) -> Tick {
     let answer = answer.map(|position| Reading { position, velocity });
-    Tick { answer, expected: true, commanded: velocity, elapsed_ms: 1, velocity_max: VELOCITY_MAX }
+    Tick {
+        answer,
+        expected: true,
+        again: false,
+        commanded: velocity,
+        elapsed_ms: 1,
+        velocity_max: VELOCITY_MAX,
+    }
 }
 
 /// A joint that has moved at this velocity for a while; it is at 0 now.
@@ -223,5 +230,53 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
         fading.step(0, &config);
         let kept = if dropped { (0.0, 0.0) } else { (left, slope) };
         assert_eq!((fading.left, fading.slope), kept);
+    }
+}
+
+/// Answers that come up to so many ticks late, in order, of a joint that moves steadily: of those that come in one tick the last one
+/// counts. Returns how far what is used is from an answer that is in time, and how much it steps beside the motion, rad at most.
+fn late_answers(velocity: f64, late: &[u32]) -> (f64, f64) {
+    let mut joint = moving(velocity);
+    let (mut arrives, mut off, mut step, mut last) = (0, 0.0f64, 0.0f64, joint.used().position);
+    let due: std::vec::Vec<u32> = (1..)
+        .zip(late)
+        .map(|(k, late)| {
+            arrives = (k + late).max(arrives);
+            arrives
+        })
+        .collect();
+    for k in 1..=late.len() as u32 {
+        let newest = due.iter().rposition(|&due| due == k);
+        let position = newest.map(|n| velocity * f64::from(n as u32 + 1) * DT);
+        let again = due.iter().filter(|&&due| due == k).count() > 1;
+        joint.step(&Tick { again, ..tick(position, velocity) }, &Config::avena());
+        let used = joint.used().position;
+        off = off.max((used - velocity * f64::from(k) * DT).abs());
+        step = step.max((used - last - velocity * DT).abs());
+        last = used;
+    }
+    (off, step)
+}
+
+/// An answer that is late is bridged as one that is missing, and so is the one that is in time again: otherwise each would leave a
+/// tick's way behind, always ahead, until the offset is as many of them as fade in a tenth of a second.
+#[test]
+fn j63_late_answers_make_no_step_and_their_offsets_do_not_add_up() {
+    let mut rng = 1u32;
+    let mut random = |most: u32| {
+        rng = rng.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (rng >> 16) % (most + 1)
+    };
+    for most in 0..=3 {
+        for velocity in [0.1, -0.4, 0.4] {
+            let late: std::vec::Vec<u32> = (0..3_000).map(|_| random(most)).collect();
+            let (off, step) = late_answers(velocity, &late);
+            let way = f64::from(most) * velocity.abs() * DT;
+            assert!(off <= 2.5 * way + 1e-12, "{velocity} rad/s, up to {most} ms late: {off} rad off");
+            assert!(
+                step <= 0.3 * way + 1e-12,
+                "{velocity} rad/s, up to {most} ms late: a step of {step} rad"
+            );
+        }
     }
 }

@@ -7,6 +7,7 @@ use jtc_core::BusState;
 
 use crate::drive::Drive;
 use crate::gripper::Gripper;
+use crate::jitter::Jitter;
 use crate::request::NodeRequest;
 
 /// A tick, µs.
@@ -158,6 +159,8 @@ pub struct Bus {
     log: Vec<TimedFrame>,
     /// Frames of members that are not of this world, oldest first.
     foreign: VecDeque<Frame>,
+    /// How late answers reach the controller.
+    pub jitter: Jitter,
     /// Something else on the bus, such as an analyser, acknowledges frames too.
     pub monitored: bool,
     /// What is wrong with it.
@@ -177,6 +180,7 @@ impl Bus {
             rng: fastrand::Rng::with_seed(seed),
             log: Vec::new(),
             foreign: VecDeque::new(),
+            jitter: Jitter::new(seed),
             monitored: false,
             fault: BusFault::default(),
             statistics: BusStatistics::default(),
@@ -191,6 +195,19 @@ impl Bus {
     /// One millisecond: `out` goes to the nodes, answers that are through by its end are added to
     /// `received`: they wait there until the controller takes them, however late its tick is.
     pub fn tick(
+        &mut self,
+        now_us: u64,
+        out: Option<&Frame>,
+        nodes: &mut Nodes,
+        received: &mut Vec<Frame>,
+    ) -> BusState {
+        let before = received.len();
+        let state = self.exchange(now_us, out, nodes, received);
+        self.jitter.delay(received, before);
+        state
+    }
+
+    fn exchange(
         &mut self,
         now_us: u64,
         out: Option<&Frame>,

@@ -89,6 +89,9 @@ pub struct SimConfig {
     pub absent_drives: u8,
     /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
     pub bus_monitored: bool,
+    /// Answers reach the controller up to so many ticks after they ended on the bus, drawn from the seed for each millisecond; none
+    /// overtakes an older one. 0: in the tick that follows.
+    pub answer_jitter_ms: u8,
     /// Rate of the serial line, bit/s; `None`: bytes take no time.
     pub baud: Option<u32>,
     /// Inter-byte timeout: silence that ends a frame, µs (J-03).
@@ -130,6 +133,7 @@ impl SimConfig {
             drives,
             absent_drives: 0,
             bus_monitored: false,
+            answer_jitter_ms: 0,
             baud: Some(115_200),
             inter_byte_timeout_us: 5_000,
             watchdog_ms: 10,

@@ -103,7 +103,7 @@ impl Drive {
 
     /// Torque on the joint, N·m.
     pub fn torque(&self) -> f64 {
-        self.torque
+        self.config.delivers * self.torque
     }
 
     /// It receives and acknowledges frames.

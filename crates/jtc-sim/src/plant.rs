@@ -1,10 +1,11 @@
 //! What is behind the joint bus: drives, gripper and the arm that they move. It is independent of the controller, which may be
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
+use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec};
 
 use crate::arm::Arm;
-use crate::bus::Nodes;
+use crate::bus::{Bus, Nodes};
 use crate::config::{SimConfig, Support};
 use crate::drive::{Drive, DriveFault};
 use crate::faults::FaultKind;
@@ -96,6 +97,18 @@ impl Plant {
         for node in 0..NODES {
             answers.extend(self.nodes.answer(node, now_us, &request, &self.scales));
         }
+    }
+
+    /// One millisecond of a bus on which the plant's nodes and one controller are: `out` goes to the nodes, the answers that are
+    /// through by its end are added to `received`.
+    pub fn exchange(
+        &mut self,
+        bus: &mut Bus,
+        now_us: u64,
+        out: Option<&Frame>,
+        received: &mut Vec<Frame>,
+    ) -> BusState {
+        bus.tick(now_us, out, &mut self.nodes, received)
     }
 
     /// Any node is on the bus and acknowledges frames.

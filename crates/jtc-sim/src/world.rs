@@ -96,6 +96,7 @@ impl World {
             config,
         };
         world.bus.monitored = world.config.bus_monitored;
+        world.bus.jitter.most_ms = world.config.answer_jitter_ms;
         world
     }
 

@@ -1,5 +1,5 @@
 //! How well the arm follows when it is not quite the arm that the controller believes in.
-use jtc_core::{ControllerState, TrajectoryState};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
@@ -69,5 +69,73 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
         println!("seed {seed}: {:?} mrad RMS", rms.map(|x| (x * 1e6).round() / 1e3));
         assert_eq!((telemetry.trajectory, telemetry.errors), (TrajectoryState::Finish, 0));
         assert!(rms.iter().all(|&x| x <= 2e-3), "seed {seed}: {rms:?}");
+    }
+}
+
+/// RMS of commanded minus true position when the torque of a tick begins to act, rad.
+fn true_error(config: SimConfig) -> [f64; 6] {
+    let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..config });
+    operator.bring_up().unwrap();
+    operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    let (mut sum, mut count) = ([0.0; 6], 0.0);
+    loop {
+        let truth = operator.world.truth().q;
+        operator.step();
+        let telemetry = operator.world.telemetry();
+        if telemetry.trajectory != TrajectoryState::Execute {
+            assert_eq!((telemetry.trajectory, telemetry.errors), (TrajectoryState::Finish, 0));
+            return sum.map(|s: f64| (s / count).sqrt());
+        }
+        count += 1.0;
+        for j in 0..6 {
+            sum[j] += (telemetry.joints[j].set_position - truth[j]).powi(2);
+        }
+    }
+}
+
+/// The simulated drives' measurements are two ticks old: with any other setting the arm is beside its path by the way of the rest.
+#[test]
+fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
+    let error = |delay_ticks: u8| {
+        let controller = Config { delay_ticks, ..Config::avena() };
+        true_error(SimConfig::new(controller, &Parameters::avena()))
+    };
+    let right = error(2);
+    assert!(right.iter().all(|&x| x < 0.3e-3), "{right:?}");
+    for wrong in [0, 1, 3] {
+        let ticks = f64::from(2 - i32::from(wrong)).abs();
+        for (j, (right, wrong)) in right.iter().zip(error(wrong)).enumerate() {
+            // Each joint moves at 0.2 rad/s and more, RMS.
+            assert!(wrong > *right + 0.1e-3 * ticks, "joint {}: {right} and {wrong}, {ticks} off", j + 1);
+        }
+    }
+}
+
+/// Drives that deliver less follow as well with a gain that makes up for it, and worse without.
+#[test]
+fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
+    let error = |delivers: f64, gain: f64| {
+        let mut controller = Config::avena();
+        controller.joints.iter_mut().for_each(|joint| joint.torque_gain = gain);
+        let mut config = SimConfig::new(controller, &Parameters::avena());
+        config.drives.iter_mut().for_each(|drive| drive.delivers = delivers);
+        true_error(config)
+    };
+    let (ideal, without, with) = (error(1.0, 1.0), error(1.0 / 1.3, 1.0), error(1.0 / 1.3, 1.3));
+    for j in 0..6 {
+        assert!((with[j] / ideal[j] - 1.0).abs() < 0.02, "joint {}: {} for {}", j + 1, with[j], ideal[j]);
+    }
+    let worst = |all: &[f64; 6]| all.iter().fold(0.0, |most: f64, x| most.max(*x));
+    assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");
+}
+
+/// Late answers are followed later, and that is all: no torque beyond its limit, and no error.
+#[test]
+fn j63_answers_that_come_late_at_random_are_bridged() {
+    for seed in 1..=3 {
+        let config = SimConfig { answer_jitter_ms: 1, seed, ..SimConfig::default() };
+        let error = true_error(config);
+        assert!(error.iter().all(|&x| x < 1e-3), "{seed}: {error:?}");
     }
 }

@@ -18,6 +18,8 @@ pub struct DriveConfig {
     pub over_speed: f64,
     /// Half of the working area, rad.
     pub working_area: f64,
+    /// Torque at the joint over the torque that the drive was asked for and believes to give. Known drives: about 1/1.3.
+    pub delivers: f64,
     /// The drive takes one message per interrupt: requests back to back leave it one behind for good.
     pub one_message_per_interrupt: bool,
     /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state
@@ -37,6 +39,7 @@ impl Default for DriveConfig {
             velocity_full_scale: 2.0,
             over_speed: 1.8,
             working_area: 2.9905,
+            delivers: 1.0,
             one_message_per_interrupt: false,
             answers_transition: false,
             long_answers: true,

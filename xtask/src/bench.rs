@@ -1,6 +1,7 @@
 //! `cargo xtask bench`: figures beside their anchors, all measured in the same run on the same machine.
 mod load;
 mod table;
+mod tracking;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,8 +21,11 @@ const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 /// Figures by name.
 type Figures = BTreeMap<String, f64>;
 
-/// `arguments`: `--json FILE`, `--quick`.
+/// `arguments`: `tracking`, or `--json FILE`, `--quick`.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    if let Some(("tracking", rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
+        return tracking::main(rest);
+    }
     let mut arguments = arguments.to_vec();
     let json_file = shell::option(&mut arguments, "--json")?;
     let quick = shell::flag(&mut arguments, "--quick");

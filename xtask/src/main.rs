@@ -29,6 +29,7 @@ Usage: cargo xtask COMMAND
                                --only: the steps with TEXT in their heading
   bench [--json FILE] [--quick]
                                performance and tracking figures beside their anchors, all measured in this run
+  bench tracking               write docs/tracking.md: our control law beside that of the existing firmware, on one arm
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
   prove mutants [--package NAME] [--survivors|--changed|--resume] [--report]
                                mutation testing of the crates that run on a board (hours); fails when a survivor has no

@@ -2,6 +2,8 @@
 //!
 //! The trajectories begin and end at the zero pose, in which `jtc sim` starts.
 
+mod demo;
+
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -10,6 +12,7 @@ use jtc_core::JOINTS;
 use crate::Arm;
 use crate::arm::AVENA_TOML;
 use crate::trajectory::{Point, Trajectory};
+pub use demo::demo_motion;
 
 /// The forms of files, with an example of each.
 pub const FORMS: &str = include_str!("example/forms.md");

@@ -1,0 +1,234 @@
+//! The existing firmware's control law and ours, along the same paths on the same simulated plant; writes docs/tracking.md.
+mod existing;
+mod page;
+mod paths;
+mod run;
+
+use jtc_bus::JOINTS;
+use jtc_core::{Config, Parameters};
+use jtc_sim::{FrictionModel, LuGre, ModelError, SimConfig};
+
+use run::{Figures, Outcome, Path, Result};
+
+/// Arms that are drawn for each figure, which is the median of theirs.
+const SEEDS: u64 = 10;
+
+/// What a run is like.
+#[derive(Clone, Copy, Debug)]
+pub struct Condition {
+    /// Heading on the page.
+    pub name: &'static str,
+    /// What it is.
+    pub what: &'static str,
+    /// Torque that the drives deliver of what they are asked for.
+    delivers: f64,
+    /// Our torque gain (J-61).
+    gain: f64,
+    friction: FrictionModel,
+    /// Speed around zero in which our compensation of friction changes its sign, rad/s (a setting).
+    sign_width: f64,
+    /// How far masses and friction are from what both controllers believe.
+    error: ModelError,
+    /// At the flange, which no controller knows of, kg.
+    mass: f64,
+    /// Share of receptions that fail.
+    lost: f64,
+    jitter_ms: u8,
+    /// The goal is judged.
+    pub judged: bool,
+}
+
+impl Condition {
+    const IDEAL: Self = Self {
+        name: "ideal drives",
+        what: "The drives deliver what they are asked for. The existing law asks for 1.3 times what it has computed.",
+        delivers: 1.0,
+        gain: 1.0,
+        friction: FrictionModel::Smooth { width: 0.01 },
+        sign_width: 0.02,
+        error: ModelError { mass: 0.1, friction: 0.2, mass_factors: None, friction_factors: None },
+        mass: 0.0,
+        lost: 0.0,
+        jitter_ms: 0,
+        judged: true,
+    };
+
+    const ALL: [Self; 8] = [
+        Self::IDEAL,
+        Self {
+            name: "drives deliver 1/1.3",
+            what: "As real drives seem to; ours has a torque gain of 1.3 (J-61).",
+            delivers: 1.0 / 1.3,
+            gain: 1.3,
+            ..Self::IDEAL
+        },
+        Self {
+            name: "sharper friction",
+            what: "The friction of the arm changes its sign within 0.005 rad/s instead of 0.01.",
+            friction: FrictionModel::Smooth { width: 0.005 },
+            ..Self::IDEAL
+        },
+        Self {
+            name: "LuGre friction",
+            what: "The joints stick, with 1.4 times the Coulomb torque, and slip along a Stribeck curve.",
+            friction: FrictionModel::LuGre(LuGre {
+                stiction_ratio: 1.4,
+                stribeck_speed: 0.01,
+                presliding: 1e-4,
+                damping_ratio: 0.7,
+            }),
+            judged: false,
+            ..Self::IDEAL
+        },
+        Self {
+            name: "2 kg unknown at the flange",
+            what: "Neither controller knows of them.",
+            mass: 2.0,
+            judged: false,
+            ..Self::IDEAL
+        },
+        Self {
+            name: "1 % of receptions lost",
+            what: "Of Moves and of answers, by each receiver on its own, while the arm moves.",
+            lost: 0.01,
+            judged: false,
+            ..Self::IDEAL
+        },
+        Self {
+            name: "answers 0 or 1 ms late",
+            what: "Drawn anew in each millisecond; none overtakes an older one.",
+            jitter_ms: 1,
+            judged: false,
+            ..Self::IDEAL
+        },
+        Self {
+            name: "answers 0 to 3 ms late",
+            what: "The same.",
+            jitter_ms: 3,
+            judged: false,
+            ..Self::IDEAL
+        },
+    ];
+
+    /// The same with a model that is right where `error` is zero.
+    fn believing(self, mass: f64, friction: f64) -> Self {
+        Self { error: ModelError { mass, friction, ..self.error }, ..self }
+    }
+
+    /// The world of a seed. Gravity is that of the existing firmware, whose arm hangs; `gain`: our torque gain.
+    fn world(&self, seed: u64, start: [f64; JOINTS], gain: f64) -> SimConfig {
+        let mut controller = Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() };
+        controller.friction_sign_width = self.sign_width;
+        controller.joints.iter_mut().for_each(|joint| joint.torque_gain = gain);
+        let mut world = SimConfig::new(controller, &Parameters::avena());
+        (world.seed, world.start, world.baud) = (seed, start, None);
+        (world.model_error, world.arm.friction_model) = (self.error, self.friction);
+        world.answer_jitter_ms = self.jitter_ms;
+        for drive in &mut world.drives {
+            (drive.delivers, drive.first_enable_ms) = (self.delivers, 20);
+        }
+        let flange = world.arm.model.joints[6].xyz;
+        let link = &mut world.arm.model.links[6];
+        let total = link.mass + self.mass;
+        for (x, f) in link.origin.xyz.iter_mut().zip(flange) {
+            *x = (link.mass * *x + self.mass * f) / total;
+        }
+        link.mass = total;
+        world
+    }
+
+    /// Medians of each figure of each joint over the seeds that got to the end of the path, for the existing law and for ours.
+    pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
+        let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
+        let (mut existing, mut ours) = (Vec::new(), Vec::new());
+        for seed in 1..=SEEDS {
+            existing.push(run::existing(&self.world(seed, start, 1.0), self.lost, path)?);
+            ours.push(run::ours(self.world(seed, start, self.gain), self.lost, path)?);
+        }
+        Ok([Runs::of(&existing), Runs::of(&ours)])
+    }
+}
+
+/// What became of a controller's runs.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    /// Those that got to the end of the path.
+    pub finished: usize,
+    /// Their medians.
+    pub figures: Option<Figures>,
+    /// How the others ended.
+    pub errors: Vec<String>,
+}
+
+impl Runs {
+    fn of(all: &[Outcome]) -> Self {
+        let finished: Vec<Figures> =
+            all.iter().filter_map(|outcome| outcome.as_ref().ok().copied()).collect();
+        let mut errors: Vec<String> =
+            all.iter().filter_map(|outcome| outcome.as_ref().err().cloned()).collect();
+        errors.sort();
+        errors.dedup();
+        let figures = (!finished.is_empty()).then(|| median(&finished));
+        Self { finished: finished.len(), figures, errors }
+    }
+}
+
+fn median(all: &[Figures]) -> Figures {
+    let of = |figure: fn(&Figures) -> &[f64; JOINTS]| {
+        core::array::from_fn(|j| {
+            let mut values: Vec<f64> = all.iter().map(|figures| figure(figures)[j]).collect();
+            values.sort_by(f64::total_cmp);
+            let n = values.len();
+            0.5 * (values[(n - 1) / 2] + values[n / 2])
+        })
+    };
+    Figures {
+        true_error: of(|figures| &figures.true_error),
+        own_error: of(|figures| &figures.own_error),
+        roughness: of(|figures| &figures.roughness),
+    }
+}
+
+/// What is left of our error where the model is right: a heading, and mrad per joint.
+fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
+    let sharp = match condition.friction {
+        FrictionModel::Smooth { width } => width,
+        FrictionModel::LuGre(_) => condition.sign_width,
+    };
+    let variants = [
+        ("as above", condition.believing(0.1, 0.2)),
+        ("friction as believed", condition.believing(0.1, 0.0)),
+        ("masses as believed", condition.believing(0.0, 0.2)),
+        ("both as believed", condition.believing(0.0, 0.0)),
+        (
+            "both, friction compensated as sharply",
+            Condition { sign_width: sharp, ..condition.believing(0.0, 0.0) },
+        ),
+    ];
+    let mut rows = Vec::new();
+    for (name, variant) in variants {
+        let [_, ours] = variant.compare(path)?;
+        rows.push((name, ours.figures.ok_or("no run got to its end")?.true_error));
+    }
+    Ok(rows)
+}
+
+fn main() -> Result<()> {
+    let file = std::env::args().nth(1).ok_or("usage: tracking FILE")?;
+    let mut comparisons = Vec::new();
+    for path in paths::all()? {
+        for condition in Condition::ALL {
+            let [existing, ours] = condition.compare(&path)?;
+            let mut comparison =
+                page::Comparison { path: path.name, condition, existing, ours, bounds: Vec::new() };
+            if !comparison.missed().is_empty() {
+                comparison.bounds = bounds(&path, &condition)?;
+            }
+            println!("{}, {}: {}", path.name, condition.name, comparison.verdict());
+            comparisons.push(comparison);
+        }
+    }
+    std::fs::write(&file, page::text(&comparisons))?;
+    println!("wrote {file}");
+    Ok(())
+}

@@ -1,0 +1,180 @@
+//! The page: text and tables.
+use std::fmt::Write as _;
+
+use jtc_bus::JOINTS;
+
+use crate::run::Figures;
+use crate::{Condition, Runs, paths};
+
+/// Both controllers under one condition on one path.
+pub struct Comparison {
+    pub path: &'static str,
+    pub condition: Condition,
+    pub existing: Runs,
+    pub ours: Runs,
+    /// Where the goal was missed: what is left of our error with a better model, mrad.
+    pub bounds: Vec<(&'static str, [f64; JOINTS])>,
+}
+
+/// A fifth of the existing firmware's error, but no less than what an encoder of 16 bits a turn lets be seen, mrad.
+const SHARE: f64 = 0.2;
+const LEAST: f64 = 0.04;
+
+/// What the existing firmware's own code did on this plant, compiled for a PC: commanded − measured and commanded − true, mrad,
+/// and the change of torque, N·m/ms, with ideal drives; commanded − measured with drives that deliver 1/1.3.
+const REFERENCE: [(&str, [f64; JOINTS]); 4] = [
+    ("ideal drives, commanded − measured", [0.258, 0.416, 0.368, 0.121, 0.127, 0.136]),
+    ("ideal drives, commanded − true", [1.07, 0.88, 1.14, 0.76, 0.65, 0.91]),
+    ("ideal drives, roughness", [1.54, 1.50, 1.47, 1.02, 0.99, 1.07]),
+    ("drives deliver 1/1.3, commanded − measured", [0.162, 0.154, 0.166, 0.092, 0.097, 0.112]),
+];
+
+const HEADER: &str = "| | j1 | j2 | j3 | j4 | j5 | j6 |\n|---|---|---|---|---|---|---|\n";
+
+const INTRODUCTION: &str = "\
+# Tracking
+
+How well the arm follows its path: the control law of the existing firmware and ours, on the same simulated arm, drives and bus, with the
+same gains, model and friction. `cargo xtask bench tracking` writes this page; everything is in virtual time, so that each run of it gives the
+same figures.
+
+The existing law is written down in `xtask/examples/tracking/existing.rs` after the firmware published in April 2022: inverse dynamics, PID and
+friction, times 1.3; points joined by straight lines; the measured position, two milliseconds old, compared with the present set
+position; a sign of friction that steps. Ours is the controller itself.
+
+- Figures are RMS over the path, medians of ten arms whose masses are drawn within ±10 % and whose friction within ±20 % of what both
+  controllers believe. Gravity is that of the existing firmware, whose arm hangs from above. The friction of the arm changes its sign
+  within 0.01 rad/s (ours compensates it within 0.02), unless a section has another.
+- *Commanded − true*, mrad: the set position of a tick less the true position when the torque of that tick begins to act.
+- *Commanded − measured*, mrad: what each law compares; with ours the set position of the time of the measurement (J-62).
+- *Roughness*, N·m: the change of the torque at the joint from a millisecond to the next.
+- The goal, for ideal drives, drives that deliver 1/1.3 and sharper friction: commanded − true at most the larger of a fifth of
+  the existing firmware's and 0.04 mrad (a step of the encoder is 0.096 mrad, which alone is 0.03 RMS).
+- The *demo path* is that of `jtc demo`. The *recorded path* was recorded with the existing arm (`TrajectoryInt.csv`); the five points that its
+  recording has left out, after points 184, 358, 544, 726 and 906, are filled in.
+";
+
+impl Comparison {
+    /// Joints (from 0) that miss the goal, with our error and the goal, mrad.
+    pub fn missed(&self) -> Vec<(usize, f64, f64)> {
+        let (Some(existing), Some(ours)) = (self.existing.figures, self.ours.figures) else {
+            return Vec::new();
+        };
+        let goals = goals(&existing);
+        let all = (0..JOINTS).map(|j| (j, ours.true_error[j], goals[j]));
+        all.filter(|(_, ours, goal)| self.condition.judged && rounded(*ours) > *goal).collect()
+    }
+
+    /// One sentence.
+    pub fn verdict(&self) -> String {
+        if self.ours.finished < self.existing.finished {
+            return format!(
+                "Ours stops in {} of {} runs: {}.",
+                self.existing.finished - self.ours.finished,
+                self.existing.finished,
+                self.ours.errors.join("; ")
+            );
+        }
+        if !self.condition.judged {
+            return "No goal is set here.".to_owned();
+        }
+        let missed = self.missed();
+        if missed.is_empty() {
+            return "The goal is met by every joint.".to_owned();
+        }
+        let joints =
+            missed.iter().map(|(j, ours, goal)| format!("joint {} ({ours:.3} of {goal:.3} mrad)", j + 1));
+        format!("The goal is missed by {}.", joints.collect::<Vec<_>>().join(", "))
+    }
+
+    fn section(&self, page: &mut String) {
+        let _ = write!(
+            page,
+            "\n### {}: {}\n\n{}\n\n{HEADER}",
+            self.path, self.condition.name, self.condition.what
+        );
+        let both = [("existing", self.existing.figures), ("ours", self.ours.figures)];
+        let mut rows = |what: &str, digits: usize, of: fn(&Figures) -> &[f64; JOINTS]| {
+            for (name, figures) in &both {
+                if let Some(figures) = figures {
+                    row(page, &format!("{name}, {what}"), of(figures), digits);
+                }
+            }
+        };
+        rows("commanded − true", 3, |figures| &figures.true_error);
+        rows("commanded − measured", 3, |figures| &figures.own_error);
+        rows("roughness", 2, |figures| &figures.roughness);
+        if let (true, Some(existing)) = (self.condition.judged, &self.existing.figures) {
+            row(page, "goal, commanded − true", &goals(existing), 3);
+        }
+        let _ = writeln!(page, "\n{}", self.verdict());
+        if !self.bounds.is_empty() {
+            let _ = write!(
+                page,
+                "\nWhat bounds it: our commanded − true, mrad, with a controller that knows more of this arm. Friction that is believed wrongly\n\
+                 is a step of torque wherever a joint turns, which only the integral takes back; so is a sign that is smoothed over another\n\
+                 speed than the arm's.\n\n{HEADER}"
+            );
+            for (name, error) in &self.bounds {
+                row(page, name, error, 3);
+            }
+        }
+    }
+}
+
+/// As many digits as the page shows.
+fn rounded(value: f64) -> f64 {
+    (1e3 * value).round() / 1e3
+}
+
+/// Goals of the joints, mrad.
+fn goals(existing: &Figures) -> [f64; JOINTS] {
+    existing.true_error.map(|error| rounded((SHARE * rounded(error)).max(LEAST)))
+}
+
+fn row(page: &mut String, name: &str, values: &[f64; JOINTS], digits: usize) {
+    let cells = values.map(|value| format!("{value:.digits$}")).join(" | ");
+    let _ = writeln!(page, "| {name} | {cells} |");
+}
+
+/// The existing law here beside the existing firmware's own code.
+fn reference(page: &mut String, all: &[Comparison]) {
+    let figures = |name: &str| {
+        let found = all.iter().find(|c| c.path == "demo path" && c.condition.name == name);
+        found.and_then(|comparison| comparison.existing.figures)
+    };
+    let (Some(ideal), Some(weak)) = (figures("ideal drives"), figures("drives deliver 1/1.3")) else {
+        return;
+    };
+    let here = [ideal.own_error, ideal.true_error, ideal.roughness, weak.own_error];
+    let _ = write!(
+        page,
+        "\n## The existing law, and the existing firmware\n\nThe firmware's own code, compiled for a PC, was run on this plant before (demo path). The \
+         law as it is written down here does the same:\n\n{HEADER}"
+    );
+    let mut most = 0.0f64;
+    for ((name, reference), here) in REFERENCE.iter().zip(&here) {
+        row(page, &format!("firmware, {name}"), reference, 3);
+        row(page, &format!("here, {name}"), here, 3);
+        most = here
+            .iter()
+            .zip(reference)
+            .map(|(here, firmware)| (here / firmware - 1.0).abs())
+            .fold(most, f64::max);
+    }
+    let _ = writeln!(page, "\nThe largest difference is {:.1} %.", 100.0 * most);
+}
+
+/// The whole page.
+pub fn text(all: &[Comparison]) -> String {
+    let mut page = INTRODUCTION.to_owned();
+    reference(&mut page, all);
+    let _ = writeln!(page, "\n## Comparison");
+    if all.iter().all(|comparison| comparison.path != paths::RECORDED) {
+        let _ = writeln!(page, "\nSkipped: the {} is not at hand.", paths::RECORDED);
+    }
+    for comparison in all {
+        comparison.section(&mut page);
+    }
+    page
+}

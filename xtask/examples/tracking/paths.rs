@@ -1,0 +1,55 @@
+//! The paths that are followed.
+use jtc_host::example;
+use jtc_wire::RawPoint;
+
+use crate::run::{Path, Result};
+
+/// Points of the recorded path after which one is missing in its recording, from 0.
+const MISSING_AFTER: [usize; 5] = [184, 358, 544, 726, 906];
+/// Its name on the page.
+pub const RECORDED: &str = "recorded path";
+/// ms between its points.
+const STEP_MS: u16 = 10;
+
+/// The path of `jtc demo` and, where the data of the existing arm are at hand, the one that was recorded with it.
+pub fn all() -> Result<Vec<Path>> {
+    let demo = example::demo_motion();
+    let mut paths = vec![Path { name: "demo path", points: demo.raw()?, step_ms: demo.step_ms }];
+    if let Some(points) = recorded() {
+        paths.push(Path { name: RECORDED, points, step_ms: STEP_MS });
+    }
+    Ok(paths)
+}
+
+/// `TrajectoryInt.csv`, with the points in it that its recording has left out.
+fn recorded() -> Option<Vec<RawPoint>> {
+    let raw =
+        |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
+    let given: Vec<RawPoint> =
+        test_kit::existing::points("TrajectoryInt.csv")?.into_iter().map(raw).collect();
+    let mut points = Vec::with_capacity(given.len() + MISSING_AFTER.len());
+    for (n, point) in given.iter().enumerate() {
+        points.push(*point);
+        if let (true, Some(next)) = (MISSING_AFTER.contains(&n), given.get(n + 1)) {
+            points.push(between(point, next));
+        }
+    }
+    Some(points)
+}
+
+/// In the middle between two points 20 ms apart: that of the cubic in the position.
+fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
+    let mean = |a: &[i16; 6], b: &[i16; 6]| {
+        core::array::from_fn(|j| ((i32::from(a[j]) + i32::from(b[j])) / 2) as i16)
+    };
+    let (p, v) = ([a.position_rad(), b.position_rad()], [a.velocity_rad_s(), b.velocity_rad_s()]);
+    let unit = jtc_wire::POSITION_SCALE / f64::from(i16::MAX);
+    RawPoint {
+        position: core::array::from_fn(|j| {
+            let middle = 0.5 * (p[0][j] + p[1][j]) + 0.02 / 8.0 * (v[0][j] - v[1][j]);
+            (middle / unit).round() as i16
+        }),
+        velocity: mean(&a.velocity, &b.velocity),
+        acceleration: mean(&a.acceleration, &b.acceleration),
+    }
+}

@@ -1,0 +1,132 @@
+//! One run of a controller along a path, on the simulated plant, and what it amounts to.
+use jtc_bus::{JOINTS, Scale};
+use jtc_core::{ControllerState, Parameters, TrajectoryState, joint_error};
+use jtc_sim::{Bus, Fault, FaultKind, Operator, Plant, SimConfig, Trigger, host};
+use jtc_wire::{ExecCommand, RawPoint};
+
+use crate::existing::{Existing, Phase};
+
+pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+
+/// The figures of a run, or how it ended before its end.
+pub type Outcome = std::result::Result<Figures, String>;
+
+/// A path: points and the time between them.
+pub struct Path {
+    pub name: &'static str,
+    pub points: Vec<RawPoint>,
+    pub step_ms: u16,
+}
+
+/// Per joint, RMS over the path.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Figures {
+    /// Commanded minus true position when the command begins to act, mrad.
+    pub true_error: [f64; JOINTS],
+    /// The position error of the controller: what it compares, mrad.
+    pub own_error: [f64; JOINTS],
+    /// Change of the torque at the joint in a millisecond, N·m.
+    pub roughness: [f64; JOINTS],
+}
+
+/// Sums over the milliseconds of a run.
+#[derive(Default)]
+struct Sums {
+    true_error: [f64; JOINTS],
+    own_error: [f64; JOINTS],
+    roughness: [f64; JOINTS],
+    last: Option<[f64; JOINTS]>,
+    count: f64,
+}
+
+impl Sums {
+    fn add(
+        &mut self,
+        set: &[f64; JOINTS],
+        truth: &[f64; JOINTS],
+        own: &[f64; JOINTS],
+        torque: &[f64; JOINTS],
+    ) {
+        let last = self.last.replace(*torque).unwrap_or(*torque);
+        self.count += 1.0;
+        for j in 0..JOINTS {
+            self.true_error[j] += (set[j] - truth[j]).powi(2);
+            self.own_error[j] += own[j].powi(2);
+            self.roughness[j] += (torque[j] - last[j]).powi(2);
+        }
+    }
+
+    fn figures(&self) -> Figures {
+        let rms = |sums: &[f64; JOINTS], scale: f64| sums.map(|sum| scale * (sum / self.count).sqrt());
+        Figures {
+            true_error: rms(&self.true_error, 1e3),
+            own_error: rms(&self.own_error, 1e3),
+            roughness: rms(&self.roughness, 1.0),
+        }
+    }
+}
+
+/// Ours: the simulated world with its controller.
+pub fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
+    let mut operator = Operator::new(config);
+    operator.bring_up()?;
+    operator.run(1_000);
+    operator.upload(&path.points, path.step_ms)?;
+    if lost > 0.0 {
+        let kind = FaultKind::FramesLost { probability: lost };
+        operator.world.inject(Fault { kind, trigger: Trigger::At(0), duration_ms: None });
+    }
+    operator.ask(&host::exec(ExecCommand::Execute))?;
+    let mut sums = Sums::default();
+    for _ in 0..60_000 {
+        let truth = operator.world.truth().q;
+        operator.step();
+        let t = operator.world.telemetry();
+        if t.trajectory == TrajectoryState::Finish {
+            return Ok(Ok(sums.figures()));
+        }
+        if t.trajectory != TrajectoryState::Execute || t.errors != 0 {
+            let joint = t.joints.iter().fold(0, |all, joint| all | joint.internal);
+            return Ok(Err(if joint & joint_error::TORQUE == 0 {
+                format!("error 0x{:04X}, of joints 0x{joint:02X}", t.errors)
+            } else {
+                "torque at its limit for more than 10 ms within 100 ms".to_owned()
+            }));
+        }
+        if t.state == ControllerState::Operate && t.point > 0 {
+            let (set, own) = (t.joints.map(|j| j.set_position), t.joints.map(|j| j.position_error()));
+            sums.add(&set, &truth, &own, &operator.world.truth().torque);
+        }
+    }
+    Err(format!("{} takes longer than a minute", path.name).into())
+}
+
+/// The existing law, on the same plant and bus.
+pub fn existing(config: &SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
+    let mut plant = Plant::new(config);
+    let mut bus = Bus::new(
+        config.drives.map(|drive| Scale { velocity: drive.velocity_full_scale }),
+        config.seed ^ 0x6275_7300,
+    );
+    bus.jitter.most_ms = config.answer_jitter_ms;
+    let mut controller = Existing::new(&config.controller, &Parameters::avena(), &path.points, path.step_ms);
+    let (mut received, mut sums) = (Vec::new(), Sums::default());
+    for tick in 0..90_000u64 {
+        let truth = plant.truth().q;
+        let frame = controller.tick(&received);
+        received.clear();
+        bus.fault.lost = if matches!(controller.phase, Phase::Operate(_)) { lost } else { 0.0 };
+        plant.exchange(&mut bus, 1_000 * tick, Some(&frame), &mut received);
+        plant.step(true);
+        match controller.phase {
+            Phase::Operate(_) => {
+                let set = controller.set.position;
+                let own = core::array::from_fn(|j| set[j] - controller.measured[j]);
+                sums.add(&set, &truth, &own, &plant.truth().torque);
+            }
+            Phase::Finish => return Ok(Ok(sums.figures())),
+            Phase::BringUp | Phase::Hold(_) => {}
+        }
+    }
+    Err(format!("{} takes longer than a minute", path.name).into())
+}

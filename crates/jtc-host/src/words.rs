@@ -37,6 +37,9 @@ pub fn request(request: FrameType) -> &'static str {
         FrameType::StoreArm => "storing the arm",
         FrameType::Disable => "taking the torque off",
         FrameType::Jog => "jogging",
+        FrameType::GetLog | FrameType::Log => "reading the flight recorder",
+        FrameType::ClearLog => "clearing the flight recorder",
+        FrameType::GetPoints | FrameType::Points => "reading the trajectory",
     }
 }
 

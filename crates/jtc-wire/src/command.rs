@@ -120,6 +120,20 @@ pub enum Command<'a> {
     Disable,
     /// Joint velocities, rad/s (J-58).
     Jog(Floats<'a>),
+    /// A page of the flight recorder's log (J-56).
+    GetLog {
+        /// Number of a block.
+        block: u32,
+        /// Its first byte that is wanted.
+        offset: u16,
+    },
+    /// Forget the log of the flight recorder, and record anew (J-56).
+    ClearLog,
+    /// Points of the trajectory in memory (J-56).
+    GetPoints {
+        /// How many to leave out.
+        first: u16,
+    },
 }
 
 /// Where the parts of the short bodies are, from their first byte.
@@ -134,8 +148,10 @@ pub mod field {
     pub const RESET_NODES: usize = 0;
     /// GripperControl: pump 0 or 1.
     pub const PUMP: usize = 0;
-    /// GetSettings and GetArm: where to begin, u16.
+    /// GetSettings, GetArm and GetPoints: where to begin, u16.
     pub const FROM: core::ops::Range<usize> = 0..2;
+    /// GetLog: block, u32, and byte in it, u16.
+    pub const LOG: core::ops::Range<usize> = 0..6;
 }
 
 impl<'a> Command<'a> {
@@ -197,6 +213,13 @@ impl<'a> Command<'a> {
             FrameType::StoreArm => Self::StoreArm,
             FrameType::Disable => Self::Disable,
             FrameType::Jog => Self::Jog(floats()?),
+            FrameType::GetLog => {
+                let bytes = body.get(field::LOG).and_then(|b| b.first_chunk());
+                let [a, b, c, d, e, f] = *bytes.ok_or(DataStatus::IncorrectValue)?;
+                Self::GetLog { block: u32::from_be_bytes([a, b, c, d]), offset: u16::from_be_bytes([e, f]) }
+            }
+            FrameType::ClearLog => Self::ClearLog,
+            FrameType::GetPoints => Self::GetPoints { first: from()? },
             // Those of the device: JtcStatus, Info, Settings, Arm. Without this arm the numbers between the types, which none has,
             // would lead into a trap.
             _ => return Err(DataStatus::NotAllowed),
@@ -230,6 +253,9 @@ impl<'a> Command<'a> {
             Self::StoreArm => FrameType::StoreArm,
             Self::Disable => FrameType::Disable,
             Self::Jog(_) => FrameType::Jog,
+            Self::GetLog { .. } => FrameType::GetLog,
+            Self::ClearLog => FrameType::ClearLog,
+            Self::GetPoints { .. } => FrameType::GetPoints,
         }
     }
 }

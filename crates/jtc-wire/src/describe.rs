@@ -135,6 +135,8 @@ impl Display for Command<'_> {
             Self::SetSettings(values) => write!(f, ": {values}"),
             Self::SetName(name) => write!(f, ": {name}"),
             Self::GetArm { offset } => write!(f, ": from byte {offset} on"),
+            Self::GetLog { block, offset } => write!(f, ": block {block} from byte {offset} on"),
+            Self::GetPoints { first } => write!(f, ": from point {first} on"),
             Self::Jog(values) => {
                 f.write_str(": rad/s")?;
                 values.iter().try_for_each(|value| write!(f, " {value}"))
@@ -148,6 +150,7 @@ impl Display for Command<'_> {
             | Self::FrictionPolynomialUseDefault
             | Self::GetInfo
             | Self::StoreArm
+            | Self::ClearLog
             | Self::Disable => Ok(()),
         }
     }

@@ -349,6 +349,8 @@ impl Command<'_> {
             Self::SetSettings(values) => set_settings(out, values.iter()),
             Self::SetName(name) => fixed(&fixed::set_name(&name)),
             Self::GetArm { offset } => fixed(&fixed::get_arm(offset)),
+            Self::GetLog { block, offset } => fixed(&fixed::get_log(block, offset)),
+            Self::GetPoints { first } => fixed(&fixed::get_points(first)),
             Self::ClearOccurredErrors
             | Self::FrictionTableUseDefault
             | Self::PidParamUseDefault
@@ -358,7 +360,8 @@ impl Command<'_> {
             | Self::FrictionPolynomialUseDefault
             | Self::GetInfo
             | Self::StoreArm
-            | Self::Disable => fixed(&fixed::empty(self.frame_type())),
+            | Self::Disable
+            | Self::ClearLog => fixed(&fixed::empty(self.frame_type())),
         }
     }
 }

@@ -4,12 +4,17 @@ use core::fmt;
 
 use crate::crc16;
 use crate::encode::EncodeError;
-use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER};
+use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER, POINT_LEN};
+use crate::segment::RawPoint;
 
 mod image;
 mod info;
+mod log;
 
 pub use image::{ArmImage, FrictionImage, Hash, IMAGE_MAX, field as image_field};
+pub(crate) use log::LOG_HEAD_LEN;
+pub use log::{LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState};
+
 pub use info::{BootCause, INFO_LEN, Info, StoreState, capability};
 
 /// Version of the extensions that this crate speaks. Later ones only add.
@@ -26,6 +31,8 @@ pub const PAGE_HEAD_LEN: usize = 4;
 pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
 /// Most bytes of the arm image in an Arm frame.
 pub const PAGE_BYTES: usize = ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN;
+/// Most points in a Points frame.
+pub const PAGE_POINTS: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / POINT_LEN;
 /// Bytes of a [`Name`].
 pub const NAME_LEN: usize = 32;
 
@@ -170,6 +177,33 @@ pub enum Answer<'a> {
         /// These.
         bytes: &'a [u8],
     },
+    /// To GetLog: bytes of the flight recorder's log.
+    Log(LogPage<'a>),
+    /// To GetPoints: points of the trajectory in memory.
+    Points {
+        /// How many points are before the first of these.
+        first: u16,
+        /// How many there are altogether.
+        total: u16,
+        /// These.
+        points: Points<'a>,
+    },
+}
+
+/// Points of a trajectory as on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Points<'a>(&'a [u8]);
+
+impl<'a> Points<'a> {
+    /// `None` when the bytes are no whole number of points.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        bytes.len().is_multiple_of(POINT_LEN).then_some(Self(bytes))
+    }
+
+    /// All in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
+        self.0.as_chunks::<POINT_LEN>().0.iter().map(RawPoint::parse)
+    }
 }
 
 impl<'a> Answer<'a> {
@@ -190,6 +224,11 @@ impl<'a> Answer<'a> {
                 let (offset, total, bytes) = page()?;
                 Some(Self::Arm { offset, total, bytes })
             }
+            FrameType::Log => LogPage::parse(body).map(Self::Log),
+            FrameType::Points => {
+                let (first, total, rest) = page()?;
+                Some(Self::Points { first, total, points: Points::parse(rest)? })
+            }
             _ => None,
         }
     }
@@ -200,6 +239,8 @@ impl<'a> Answer<'a> {
             Self::Info(_) => FrameType::Info,
             Self::Settings { .. } => FrameType::Settings,
             Self::Arm { .. } => FrameType::Arm,
+            Self::Log(_) => FrameType::Log,
+            Self::Points { .. } => FrameType::Points,
         }
     }
 
@@ -218,6 +259,10 @@ impl<'a> Answer<'a> {
                 sealed(out, FrameType::Settings, &page(first, total), values.0)
             }
             Self::Arm { offset, total, bytes } => sealed(out, FrameType::Arm, &page(offset, total), bytes),
+            Self::Log(log) => sealed(out, FrameType::Log, &log.head(), log.bytes),
+            Self::Points { first, total, points } => {
+                sealed(out, FrameType::Points, &page(first, total), points.0)
+            }
         }
     }
 }
@@ -247,6 +292,10 @@ impl fmt::Display for Answer<'_> {
             }
             Self::Arm { offset, total, bytes } => {
                 write!(f, "Arm: {} bytes from {offset} on of {total}", bytes.len())
+            }
+            Self::Log(log) => log.fmt(f),
+            Self::Points { first, total, points } => {
+                write!(f, "Points: {} from {first} on of {total}", points.iter().len())
             }
         }
     }

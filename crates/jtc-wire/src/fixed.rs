@@ -61,6 +61,17 @@ pub const fn get_arm(offset: u16) -> [u8; 8] {
     sealed(FrameType::GetArm, &offset.to_be_bytes())
 }
 
+/// GetLog: block `block` of the log from byte `offset` on.
+pub const fn get_log(block: u32, offset: u16) -> [u8; 12] {
+    let ([a, b, c, d], [e, f]) = (block.to_be_bytes(), offset.to_be_bytes());
+    sealed(FrameType::GetLog, &[a, b, c, d, e, f])
+}
+
+/// GetPoints: what follows the first `first` points.
+pub const fn get_points(first: u16) -> [u8; 8] {
+    sealed(FrameType::GetPoints, &first.to_be_bytes())
+}
+
 /// ClearOccurredErrors.
 pub const CLEAR_OCCURRED_ERRORS: [u8; 6] = empty(FrameType::ClearOccurredErrors);
 /// FrictionTableUseDefault.
@@ -87,6 +98,8 @@ pub const GET_INFO: [u8; 6] = empty(FrameType::GetInfo);
 pub const STORE_ARM: [u8; 6] = empty(FrameType::StoreArm);
 /// Disable.
 pub const DISABLE: [u8; 6] = empty(FrameType::Disable);
+/// ClearLog.
+pub const CLEAR_LOG: [u8; 6] = empty(FrameType::ClearLog);
 /// GripperControl: pump on.
 pub const PUMP_ON: [u8; 10] = gripper_control(true);
 /// GripperControl: pump off.

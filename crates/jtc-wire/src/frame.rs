@@ -3,7 +3,7 @@ use core::ops::Range;
 
 use crate::code::codes;
 use crate::crc16;
-use crate::extension::{ANSWER_MAX, INFO_LEN, PAGE_HEAD_LEN, SET_VALUES_MAX, VALUE_LEN};
+use crate::extension::{ANSWER_MAX, INFO_LEN, LOG_HEAD_LEN, PAGE_HEAD_LEN, SET_VALUES_MAX, VALUE_LEN};
 
 /// First byte of every frame.
 pub const HEADER: u8 = 0x9B;
@@ -65,9 +65,14 @@ codes! {
         StoreArm = 0x45;
         Disable = 0x46;
         Jog = 0x47;
+        GetLog = 0x4C;
+        ClearLog = 0x4D;
+        GetPoints = 0x4E;
         Info = 0x50;
         Settings = 0x51;
         Arm = 0x52;
+        Log = 0x5C;
+        Points = 0x5D;
     }
 }
 
@@ -109,13 +114,16 @@ impl FrameType {
             TrajSetExecStatus => Lengths::OneOf(&[7]),
             FrictionPolynomial => Lengths::OneOf(&[6, 102, 150]),
             ResetCanDevices | GripperControl => Lengths::OneOf(&[10]),
-            GetSettings | GetArm => Lengths::OneOf(&[8]),
+            GetSettings | GetArm | GetPoints => Lengths::OneOf(&[8]),
+            GetLog => Lengths::OneOf(&[12]),
             SetSettings => steps(FRAME_MIN + VALUE_LEN, VALUE_LEN, FRAME_MIN + VALUE_LEN * SET_VALUES_MAX),
             SetName => Lengths::OneOf(&[38]),
             Jog => Lengths::OneOf(&[30]),
             Info => steps(FRAME_MIN + INFO_LEN, 1, ANSWER_MAX),
             Settings => steps(FRAME_MIN + PAGE_HEAD_LEN, VALUE_LEN, ANSWER_MAX),
             Arm => steps(FRAME_MIN + PAGE_HEAD_LEN, 1, ANSWER_MAX),
+            Log => steps(FRAME_MIN + LOG_HEAD_LEN, 1, ANSWER_MAX),
+            Points => steps(FRAME_MIN + PAGE_HEAD_LEN, POINT_LEN, ANSWER_MAX),
             ClearOccurredErrors
             | FrictionTableUseDefault
             | PidParamUseDefault
@@ -125,7 +133,8 @@ impl FrameType {
             | FrictionPolynomialUseDefault
             | GetInfo
             | StoreArm
-            | Disable => Lengths::OneOf(&[6]),
+            | Disable
+            | ClearLog => Lengths::OneOf(&[6]),
         }
     }
 
@@ -229,7 +238,9 @@ mod tests {
         for byte in 0..=255u8 {
             match FrameType::from_byte(byte) {
                 Some(t) => assert_eq!(t as u8, byte),
-                None => assert!(byte == 0 || matches!(byte, 0x12..0x40 | 0x48..0x50 | 0x53..)),
+                None => {
+                    assert!(byte == 0 || matches!(byte, 0x12..0x40 | 0x48..0x4C | 0x4F | 0x53..0x5C | 0x5E..))
+                }
             }
         }
     }
@@ -246,6 +257,8 @@ mod tests {
                 FrameType::Info => 256 - 142 + 1,
                 FrameType::Settings => 25,
                 FrameType::Arm => 247,
+                FrameType::Log => 256 - 23 + 1,
+                FrameType::Points => 7,
                 _ => 1,
             };
             assert_eq!(allowed(t), expected, "{t}");

@@ -1,7 +1,7 @@
 //! Who a device is, and what it runs (J-52).
 use core::fmt;
 
-use super::{EXTENSION_VERSION, NAME_LEN, Name};
+use super::{EXTENSION_VERSION, LogState, NAME_LEN, Name};
 use crate::bits::missing_parameter;
 use crate::code::codes;
 use crate::words::{self, Bits};
@@ -27,7 +27,8 @@ mod field {
     pub const STORED: usize = 32;
     pub const STORE: usize = 33;
     pub const SEQUENCE: Range<usize> = 34..38;
-    // Two bytes are zero.
+    pub const LOG: usize = 38;
+    // A byte is zero.
     pub const NAME: Range<usize> = 40..72;
     pub const FIRMWARE: Range<usize> = 72..88;
     pub const REVISION: Range<usize> = 88..104;
@@ -107,6 +108,8 @@ pub struct Info {
     pub store: StoreState,
     /// Number of the stored arm: each store counts up.
     pub sequence: u32,
+    /// The flight recorder.
+    pub log: LogState,
     /// Name of the arm in use.
     pub arm: Name,
     /// Version of the firmware.
@@ -132,6 +135,7 @@ impl Default for Info {
             defaults_stored: false,
             store: StoreState::Absent,
             sequence: 0,
+            log: LogState::Absent,
             arm: Name::default(),
             firmware: [0; SHORT_TEXT],
             revision: [0; SHORT_TEXT],
@@ -188,6 +192,7 @@ impl Info {
         b[STORED] = self.defaults_stored.into();
         b[STORE] = self.store as u8;
         b[SEQUENCE].copy_from_slice(&self.sequence.to_be_bytes());
+        b[LOG] = self.log as u8;
         b[NAME].copy_from_slice(self.arm.as_bytes());
         b[FIRMWARE].copy_from_slice(&self.firmware);
         b[REVISION].copy_from_slice(&self.revision);
@@ -220,6 +225,7 @@ impl Info {
             defaults_stored: b[STORED] != 0,
             store: StoreState::from_byte(b[STORE]).unwrap_or_default(),
             sequence: word(SEQUENCE),
+            log: LogState::from_byte(b[LOG]).unwrap_or_default(),
             arm: Name::parse(b.get(NAME)?)?,
             firmware: short(FIRMWARE)?,
             revision: short(REVISION)?,
@@ -242,6 +248,7 @@ impl fmt::Display for Info {
             write!(f, "\n  up for {} ms, {} records lost", self.uptime_ms, self.lost_records)?;
             let stored = if self.defaults_stored { "stored" } else { "built in" };
             write!(f, "\n  defaults: {stored}; memory: {}, number {}", self.store, self.sequence)?;
+            write!(f, "\n  flight recorder: {}", self.log)?;
             write!(f, "\n  capabilities: {:#x}", self.capabilities)?;
         }
         Ok(())

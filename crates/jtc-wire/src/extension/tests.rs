@@ -78,10 +78,38 @@ fn j50_requests_are_these_bytes() {
     assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
     assert_eq!(fixed::get_settings(0x0102)[..6], [0x9B, 0x41, 0, 8, 1, 2]);
     assert_eq!(fixed::get_arm(0x0304)[..6], [0x9B, 0x44, 0, 8, 3, 4]);
+    assert_eq!(fixed::get_log(0x0102_0304, 0x0506)[..10], [0x9B, 0x4C, 0, 12, 1, 2, 3, 4, 5, 6]);
+    assert_eq!(fixed::CLEAR_LOG[..4], [0x9B, 0x4D, 0, 6]);
+    assert_eq!(fixed::get_points(0x0102)[..6], [0x9B, 0x4E, 0, 8, 1, 2]);
     assert_eq!(fixed::STORE_ARM[..4], [0x9B, 0x45, 0, 6]);
     assert_eq!(fixed::DISABLE[..4], [0x9B, 0x46, 0, 6]);
     let value = SettingValue { setting: 3, joint: 6, value: -1.5 };
     assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
+}
+
+/// Worked bytes of the page on the protocol.
+#[test]
+fn j56_a_page_of_the_log_is_these_bytes() {
+    let page = LogPage {
+        state: LogState::Error,
+        block: 0x1234,
+        offset: 1016,
+        end: 0x1235,
+        points: 501,
+        points_hash: 0xDEAD_BEEF,
+        bytes: &[0, 0, 0, 0, 1, 2, 3, 4],
+    };
+    let mut out = [0; ANSWER_MAX];
+    let n = Answer::Log(page).emit(&mut out).unwrap();
+    let bytes = [
+        0x9B, 0x5C, 0, 0x1F, 2, 0, 0, 0x12, 0x34, 0x03, 0xF8, 0, 0, 0x12, 0x35, 0x01, 0xF5, 0xDE, 0xAD, 0xBE,
+        0xEF, 0, 0, 0, 0, 1, 2, 3, 4,
+    ];
+    assert_eq!(out[..n - 2], bytes);
+    assert_eq!(Answer::parse(FrameRef::new_checked(&out[..n]).unwrap()), Some(Answer::Log(page)));
+    // The longest page is within what J-56 allows.
+    let full = LogPage { bytes: &[7; LOG_PAGE], ..page };
+    assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }
 
 /// The reference is the published test vector of FNV-1a, 64 bits.

@@ -78,7 +78,7 @@ fn judge(bytes: &[u8], capacity: usize) -> Response {
     if bytes.len() == 1 {
         return record(0, FrameStatus::DiscontinuousFrame, 1);
     }
-    let known = matches!(bytes[1], 1 | 2 | 4..=0x11 | 0x40..=0x47);
+    let known = matches!(bytes[1], 1 | 2 | 4..=0x11 | 0x40..=0x47 | 0x4C..=0x4E);
     if !known {
         return record(bytes[1], FrameStatus::IncorrectFrameType, 0);
     }
@@ -98,10 +98,11 @@ fn judge(bytes: &[u8], capacity: usize) -> Response {
         0x0B => n == 7,
         0x0E => n == 6 || n == 102 || n == 150,
         0x10 | 0x11 => n == 10,
-        0x41 | 0x44 => n == 8,
+        0x41 | 0x44 | 0x4E => n == 8,
         0x42 => (16..=2566).contains(&n) && (n - 6) % 10 == 0,
         0x43 => n == 38,
         0x47 => n == 30,
+        0x4C => n == 12,
         _ => n == 6,
     };
     match () {

@@ -111,7 +111,7 @@ fn j05_header() {
 #[test]
 fn j05_frame_type() {
     let mut line = Line::new();
-    for kind in (0x12..0x40).chain(0x48..=0xFF).chain([0x00, 0x03]) {
+    for kind in (0x12..0x40).chain(0x48..0x4C).chain(0x4F..=0xFF).chain([0x00, 0x03]) {
         let frame = [HEADER, kind, 0, 6];
         let crc = crc16(&frame).to_be_bytes();
         assert_eq!(line.send(&[&frame[..], &crc].concat()), [Bad(kind, IncorrectFrameType, 0)]);

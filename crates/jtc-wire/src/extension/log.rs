@@ -1,0 +1,84 @@
+//! Pages of the flight recorder's log (J-56).
+use core::fmt;
+
+use super::ANSWER_MAX;
+use crate::code::codes;
+use crate::frame::FRAME_MIN;
+
+/// Bytes in front of those of the log.
+pub(crate) const LOG_HEAD_LEN: usize = 17;
+/// Most bytes of the log in a Log frame: whole words.
+pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
+/// Block in a GetLog that no log has: it returns where the log is, and not one of its bytes.
+pub const LOG_NO_BLOCK: u32 = u32::MAX;
+
+codes! {
+    /// What a flight recorder does, or why its log ends (J-56).
+    #[derive(Default)]
+    #[allow(missing_docs)]
+    LogState {
+        #[default]
+        Absent = 0, "no recorder";
+        Recording = 1, "recording";
+        Error = 2, "stopped after an error";
+        Reset = 3, "stopped by a reset of the device";
+    }
+}
+
+/// What GetLog returns: bytes of one block of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LogPage<'a> {
+    /// What the recorder does.
+    pub state: LogState,
+    /// Number of the block: that which was asked for, or the oldest when that is not there any more.
+    pub block: u32,
+    /// Where in the block these bytes are.
+    pub offset: u16,
+    /// Number behind that of the newest block.
+    pub end: u32,
+    /// Points of the trajectory in the memory of the device.
+    pub points: u16,
+    /// Their hash.
+    pub points_hash: u32,
+    /// The bytes; none past the end of the log.
+    pub bytes: &'a [u8],
+}
+
+impl<'a> LogPage<'a> {
+    /// What is in front of the bytes.
+    pub(crate) fn head(&self) -> [u8; LOG_HEAD_LEN] {
+        let [a, b, c, d] = self.block.to_be_bytes();
+        let [e, f] = self.offset.to_be_bytes();
+        let [g, h, i, j] = self.end.to_be_bytes();
+        let [k, l] = self.points.to_be_bytes();
+        let [m, n, o, p] = self.points_hash.to_be_bytes();
+        [self.state as u8, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]
+    }
+
+    /// From the body of a frame; `None` when it is too short, or its state is none.
+    pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
+        let (head, bytes) = body.split_first_chunk::<LOG_HEAD_LEN>()?;
+        let [state, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *head;
+        Some(Self {
+            state: LogState::from_byte(state)?,
+            block: u32::from_be_bytes([a, b, c, d]),
+            offset: u16::from_be_bytes([e, f]),
+            end: u32::from_be_bytes([g, h, i, j]),
+            points: u16::from_be_bytes([k, l]),
+            points_hash: u32::from_be_bytes([m, n, o, p]),
+            bytes,
+        })
+    }
+}
+
+impl fmt::Display for LogPage<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { state, block, offset, end, points, points_hash, bytes } = self;
+        write!(
+            f,
+            "Log: {state}, {} bytes of block {block} from {offset} on, up to block {end}",
+            bytes.len()
+        )?;
+        write!(f, "; {points} points, hash {points_hash:08x}")
+    }
+}

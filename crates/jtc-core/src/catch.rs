@@ -8,6 +8,7 @@
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
+use crate::remembered::remembered;
 
 /// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
 /// swing.
@@ -29,6 +30,8 @@ pub(crate) struct Catch {
     peak: f64,
     peak_before: f64,
 }
+
+remembered!(Catch { left_ms, busy_ms, sag, peak, peak_before });
 
 impl Catch {
     /// The joint was just enabled.

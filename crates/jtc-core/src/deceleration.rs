@@ -4,6 +4,7 @@ use crate::DT;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
+use crate::remembered::remembered;
 
 /// Highest speed at which a joint counts as standing, rad/s.
 const STANDING: f64 = 0.02;
@@ -24,6 +25,8 @@ pub(crate) struct Deceleration {
     elapsed_ms: f64,
     length_ms: f64,
 }
+
+remembered!(Deceleration { from, velocity, elapsed_ms, length_ms });
 
 impl Deceleration {
     /// A joint that a hand leads: from a measured position (rad) and velocity (rad/s), of which the velocity limit is used at

@@ -1,4 +1,5 @@
 //! Errors latch (J-21): what has occurred, and what holds the controller in Error.
+use crate::remembered::remembered;
 use crate::{JOINTS, error};
 
 /// Latched and occurred errors.
@@ -20,6 +21,18 @@ pub(crate) struct Errors {
     can_occurred: u32,
     occurred: u16,
 }
+
+remembered!(Errors {
+    emergency_input,
+    device,
+    external_joints,
+    joints,
+    joints_occurred,
+    can,
+    can_shown,
+    can_occurred,
+    occurred,
+});
 
 impl Errors {
     pub fn raise_emergency_input(&mut self) {

@@ -3,14 +3,16 @@ mod answers;
 mod image;
 
 use jtc_wire::{
-    Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, Name, PAGE_BYTES,
-    PAGE_VALUES, RawPoint, StoreState, VALUE_LEN, Values, capability,
+    Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, LogState, Name,
+    PAGE_BYTES, PAGE_POINTS, PAGE_VALUES, POINT_LEN, Points, RawPoint, StoreState, VALUE_LEN, Values,
+    capability,
 };
 
 use crate::controller::Controller;
 use crate::defaults;
 use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::received::ReceivedParameters;
+use crate::recorder::LogRequest;
 use crate::settings::{self, Live};
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use answers::Answers;
@@ -53,7 +55,14 @@ pub(crate) struct Extensions {
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
-    identity: Identity,
+    /// How far the hash of the arm has been computed.
+    hashed: (usize, Hash),
+    pub identity: Identity,
+    /// Hash of the firmware's version and revision.
+    pub firmware_hash: u64,
+    /// The flight recorder, and what a host has asked of it (J-56).
+    pub log: LogState,
+    pub log_request: Option<LogRequest>,
     name: Name,
     store: StoreState,
     sequence: u32,
@@ -68,7 +77,11 @@ impl Extensions {
             unusable: false,
             hash: None,
             hosts_silent_ms: 0,
+            hashed: (0, Hash::new()),
             identity: Identity::default(),
+            firmware_hash: firmware_hash("", ""),
+            log: LogState::Absent,
+            log_request: None,
             name: Name::cut(defaults::NAME),
             store: StoreState::Absent,
             sequence: 0,
@@ -76,9 +89,39 @@ impl Extensions {
     }
 }
 
+impl Extensions {
+    /// The arm in use has changed.
+    pub fn forget_hash(&mut self) {
+        (self.hash, self.hashed) = (None, (0, Hash::new()));
+    }
+}
+
+/// Hash of a firmware's version and revision, by which a log names it (FNV-1a, 64 bits).
+pub fn firmware_hash(version: &str, revision: &str) -> u64 {
+    Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
+}
+
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// Another part of the hash of the arm, where it is not known.
+    pub(crate) fn hash_arm(&mut self) {
+        if self.extensions.hash.is_none() {
+            self.hash_more();
+        }
+    }
+
+    #[inline(never)]
+    fn hash_more(&mut self) {
+        let (offset, hash) = self.extensions.hashed;
+        let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
+        self.extensions.hashed = (offset, hash);
+        if self.image().hashed(offset) {
+            self.extensions.hash = Some(hash.value());
+        }
+    }
+
     /// Gives the controller its identity. For the board to call before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
+        self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
     }
 
@@ -104,7 +147,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         // The host has to ask for them.
         self.parameters.forget();
-        self.extensions.hash = None;
+        self.extensions.forget_hash();
         self.extensions.unusable = !loaded;
         loaded
     }
@@ -155,6 +198,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::Jog(velocities) => self.jog(&velocities).into(),
+            Command::GetLog { block, offset } if self.extensions.log != LogState::Absent => {
+                self.extensions.log_request = Some(LogRequest::Page { line, block, offset });
+                SliceOutcome::Done
+            }
+            Command::ClearLog if self.extensions.log != LogState::Absent => {
+                self.extensions.log_request = Some(LogRequest::Clear);
+                SliceOutcome::Done
+            }
+            Command::GetPoints { first } => {
+                self.get_points(line, first);
+                SliceOutcome::Done
+            }
             _ => SliceOutcome::Refused(DataStatus::NotAllowed),
         }
     }
@@ -226,8 +281,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-50: what was asked for on this line before is on its way.
     fn asked_twice(&self, line: usize, command: &Command<'_>) -> bool {
-        let returns =
-            matches!(command, Command::GetInfo | Command::GetSettings { .. } | Command::GetArm { .. });
+        let returns = matches!(
+            command,
+            Command::GetInfo
+                | Command::GetSettings { .. }
+                | Command::GetArm { .. }
+                | Command::GetLog { .. }
+                | Command::GetPoints { .. }
+        );
         returns && self.extensions.answers.waits(line)
     }
 
@@ -253,11 +314,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn info(&self, hash: u64) -> Info {
-        let Extensions { identity, name, store, sequence, .. } = &self.extensions;
+        let Extensions { identity, name, store, sequence, log, .. } = &self.extensions;
         let mut capabilities =
             capability::SETTINGS | capability::SPEED | capability::JOG | capability::PAYLOAD;
         if *store != StoreState::Absent {
             capabilities |= capability::STORE;
+        }
+        if *log != LogState::Absent {
+            capabilities |= capability::RECORDER;
         }
         Info {
             missing: self.parameters.missing(),
@@ -271,6 +335,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             defaults_stored: self.extensions.stored.is_there(),
             store: *store,
             sequence: *sequence,
+            log: *log,
             arm: *name,
             board: Name::cut(identity.board),
             ..Info::default()
@@ -297,6 +362,21 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let (read, total) = (self.image().read(offset.into(), &mut bytes), self.image().len() as u16);
         let bytes = bytes.get(..read).unwrap_or(&[]);
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
+    }
+
+    /// Points in memory, also of a trajectory that was given up (J-56).
+    fn get_points(&mut self, line: usize, first: u16) {
+        let held = self.store.held_points(first.into());
+        let mut bytes = [[0; POINT_LEN]; PAGE_POINTS];
+        let count = held.len().min(PAGE_POINTS);
+        for (slot, point) in bytes.iter_mut().zip(held) {
+            *slot = point.emit();
+        }
+        let page = bytes.get(..count).unwrap_or(&[]);
+        if let Some(points) = Points::parse(page.as_flattened()) {
+            let (_, total) = self.store.points_hash();
+            self.extensions.answers.put(line, &Answer::Points { first, total: total as u16, points });
+        }
     }
 
     /// All values or none (J-53). Where friction tables are in use, one is checked a tick.
@@ -351,7 +431,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.config = config;
         self.parameters.set_gravity(&self.config);
-        self.extensions.hash = None;
+        self.extensions.forget_hash();
     }
 
     /// J-54: first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.

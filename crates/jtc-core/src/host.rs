@@ -194,7 +194,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Friction, gains or model.
     fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
-        self.extensions.hash = None;
+        self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
                 // What is built in is another arm than the one that was stored (J-54).

@@ -7,6 +7,7 @@ use core::array::from_fn;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
+use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of every joint.
@@ -19,6 +20,8 @@ pub struct SetPoint {
     /// rad/s².
     pub acceleration: [f64; JOINTS],
 }
+
+remembered!(SetPoint { position, velocity, acceleration });
 
 impl SetPoint {
     /// Standing still at `position`.

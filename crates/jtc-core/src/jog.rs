@@ -4,6 +4,7 @@ use jtc_dynamics::sqrt;
 
 use crate::config::Config;
 use crate::limits::JointConfig;
+use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Ticks without a new command after which the joints come to rest.
@@ -30,6 +31,9 @@ pub(crate) struct Jog {
     /// Ticks since the last command.
     silent_ms: u16,
 }
+
+remembered!(JointJog { wanted, velocity, acceleration });
+remembered!(Jog { joints, silent_ms });
 
 impl Jog {
     /// New velocities, rad/s.

@@ -1,4 +1,5 @@
 //! Late and missing ticks (J-12): a few are borne; ten within a second are a failure of the device.
+use crate::remembered::remembered;
 
 /// So many of them.
 const COUNT: usize = 10;
@@ -13,6 +14,8 @@ pub(crate) struct LateTicks {
     at_ms: [u64; COUNT],
     next: usize,
 }
+
+remembered!(LateTicks { now_ms, at_ms, next });
 
 impl Default for LateTicks {
     fn default() -> Self {

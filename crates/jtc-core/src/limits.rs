@@ -1,6 +1,7 @@
 //! Limits of a joint (J-43), and what else is set for it.
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
+use crate::remembered::remembered;
 
 /// Settings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,8 @@ pub(crate) struct Saturation {
     /// How many of them.
     over_ms: u16,
 }
+
+remembered!(Saturation { saturated, history, over_ms });
 
 impl Saturation {
     /// The torque to command, within its limit, and the joint error of computed torques beyond it: in more than `over_ms_max`

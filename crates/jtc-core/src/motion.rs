@@ -15,6 +15,7 @@ use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
+use crate::remembered::remembered;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
 use limiter::Limiter;
@@ -32,6 +33,8 @@ pub(crate) struct Motion {
     pub over_speed: OverSpeed,
     pub ramp: PathRamp,
 }
+
+remembered!(Motion { set, law, limiter, over_speed, ramp });
 
 impl Motion {
     /// Torque off: nothing is held, no torque is remembered. Without torque that is so in every tick: each part is made new in

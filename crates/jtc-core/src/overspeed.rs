@@ -1,6 +1,7 @@
 //! Measured over-speed of a joint under torque (J-35): what no check of the commanded values can see.
 use crate::config::Config;
 use crate::nodes::Nodes;
+use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
 /// How long each joint has been too fast.
@@ -9,6 +10,8 @@ pub(crate) struct OverSpeed {
     /// Consecutive measurements above the threshold.
     ticks: [u16; JOINTS],
 }
+
+remembered!(OverSpeed { ticks });
 
 impl OverSpeed {
     /// Joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for

@@ -9,6 +9,7 @@
 use jtc_dynamics::sqrt;
 
 use crate::DT;
+use crate::remembered::remembered;
 
 /// Path time and how fast it goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,6 +27,8 @@ pub struct PathClock {
     /// The S with its margins is too slow for the time that a stop may take.
     hurried: bool,
 }
+
+remembered!(PathClock { time, rate, slope, target, halting_ms, hurried });
 
 /// Lowest and highest slope of path time, 1/s. Empty, the first above the second, where no slope does.
 pub type Bounds = (f64, f64);

@@ -2,6 +2,9 @@
 //! with the last payload and the one with the next, so that neither makes a step in torque.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
+use crate::JOINTS;
+use crate::remembered::remembered;
+
 /// Length of that way, ms.
 pub(crate) const BLEND_MS: u16 = 500;
 
@@ -13,7 +16,37 @@ pub(crate) struct PayloadBlend {
     left_ms: u16,
 }
 
+/// What is remembered of it: the other end of the way is the arm with its payload.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlendState {
+    left_ms: u16,
+    /// Numbers of the arm that the way began with, unless it has ended.
+    from: Option<[[f64; 7]; JOINTS]>,
+}
+
+remembered!(BlendState { left_ms, from });
+
 impl PayloadBlend {
+    /// What is remembered of it.
+    pub fn state(&self) -> BlendState {
+        BlendState { left_ms: self.left_ms, from: (self.left_ms > 0).then(|| self.from.numbers()) }
+    }
+
+    /// Goes on from there, with the dynamics of the arm and all of its payload.
+    pub fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
+        *self = Self::none(dynamics);
+        if let Some(from) = &state.from {
+            self.left_ms = state.left_ms.min(BLEND_MS);
+            self.from = LinkInertias::from_numbers(from);
+            dynamics.set_inertias(&self.between());
+        }
+    }
+
+    /// The arm at the present place of the way.
+    fn between(&self) -> LinkInertias {
+        self.from.toward(&self.to, 1.0 - f64::from(self.left_ms) * (1.0 / BLEND_MS as f64))
+    }
+
     /// Nothing is on its way.
     pub fn none(dynamics: &Dynamics) -> Self {
         let now = dynamics.inertias();
@@ -42,8 +75,7 @@ impl PayloadBlend {
             1 => self.end(dynamics),
             _ => {
                 self.left_ms -= 1;
-                let share = 1.0 - f64::from(self.left_ms) * (1.0 / BLEND_MS as f64);
-                dynamics.set_inertias(&self.from.toward(&self.to, share));
+                dynamics.set_inertias(&self.between());
             }
         }
     }

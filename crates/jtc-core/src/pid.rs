@@ -1,6 +1,7 @@
 //! PID controller of one joint (J-41).
 use crate::DT;
 use crate::parameters::PidGains;
+use crate::remembered::remembered;
 
 /// Ticks over which the derivative is taken.
 const WINDOW: usize = 5;
@@ -33,6 +34,9 @@ pub struct PidTorque {
     /// Kd·ė.
     pub d: f64,
 }
+
+remembered!(Pid { integral, errors, settled });
+remembered!(PidTorque { p, i, d });
 
 impl PidTorque {
     /// Sum, N·m.

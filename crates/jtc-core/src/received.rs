@@ -10,7 +10,8 @@ use crate::defaults;
 use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
-use crate::payload::PayloadBlend;
+use crate::payload::{BlendState, PayloadBlend};
+use crate::remembered::remembered;
 
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
@@ -39,7 +40,52 @@ pub(crate) struct ReceivedParameters {
     pub friction_is_new: bool,
 }
 
+/// What is remembered of them without the numbers, which are the arm's.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReceivedState {
+    received: u8,
+    given: u8,
+    friction_is_table: bool,
+    friction_is_new: bool,
+    payload: BlendState,
+}
+
+remembered!(ReceivedState { received, given, friction_is_table, friction_is_new, payload });
+
 impl ReceivedParameters {
+    /// What is remembered of them, without the numbers.
+    pub fn state(&self) -> ReceivedState {
+        let Self { received, given, friction_is_table, friction_is_new, .. } = *self;
+        ReceivedState { received, given, friction_is_table, friction_is_new, payload: self.payload.state() }
+    }
+
+    /// The same again, with the payload of these settings.
+    pub fn restore(&mut self, state: &ReceivedState, config: &Config) {
+        let ReceivedState { received, given, friction_is_table, friction_is_new, payload } = *state;
+        self.set_gravity(config);
+        self.payload.restore(&payload, &mut self.dynamics);
+        (self.received, self.given) = (received, given);
+        (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
+    }
+
+    /// Gains, model and polynomial are those that are built in.
+    pub fn built_in(&self) -> [bool; 3] {
+        [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
+    }
+
+    /// Those of them that are.
+    pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
+        if pid {
+            self.pid = defaults::PID;
+        }
+        if model {
+            self.model = defaults::MODEL;
+        }
+        if polynomial {
+            self.polynomial = defaults::POLYNOMIAL;
+        }
+    }
+
     /// Nothing was received yet.
     pub fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);

@@ -3,6 +3,7 @@ use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::check::SpeedRange;
 use crate::interpolation::{SetPoint, Step};
+use crate::remembered::remembered;
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// This share of a step before a point is at the point.
@@ -21,12 +22,58 @@ pub(crate) struct Store<M> {
     step: Step,
     /// Velocities of the accepted segments.
     speeds: [SpeedRange; JOINTS],
+    /// Points in memory, also of a trajectory that was given up, and their hash.
+    held: usize,
+    hash: u32,
+}
+
+/// What is remembered of the trajectory, without its points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StoreState {
+    received: usize,
+    next_segment: u16,
+    segments: u16,
+    number: u16,
+    step_ms: u16,
+    speeds: [SpeedRange; JOINTS],
+    held: usize,
+    hash: u32,
+}
+
+remembered!(StoreState { received, next_segment, segments, number, step_ms, speeds, held, hash });
+
+/// Begins a hash of points, and mixes a word into it: a multiplication for each, so that copying a segment stays cheap.
+const HASH_BEGIN: u32 = 0x811C_9DC5;
+fn mix(hash: u32, word: u32) -> u32 {
+    (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
+}
+
+/// The hash of points that follow others with this one.
+fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
+    points.iter().fold(hash, |hash, point| {
+        let pairs =
+            [&point.position, &point.velocity, &point.acceleration].map(|channel| channel.as_chunks::<2>().0);
+        pairs
+            .iter()
+            .flat_map(|pairs| pairs.iter())
+            .fold(hash, |hash, &[a, b]| mix(hash, u32::from(a as u16) | u32::from(b as u16) << 16))
+    })
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub fn new(points: M) -> Self {
         let speeds = [SpeedRange::default(); JOINTS];
-        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step: Step::new(1), speeds }
+        Self {
+            points,
+            received: 0,
+            next_segment: 0,
+            segments: 0,
+            number: 0,
+            step: Step::new(1),
+            speeds,
+            held: 0,
+            hash: HASH_BEGIN,
+        }
     }
 
     /// Points that fit: never more than the protocol allows, never more than the memory holds.
@@ -88,6 +135,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub fn begin(&mut self, segment: &Segment<'_>) {
         if segment.segment == 0 {
             self.clear();
+            (self.held, self.hash) = (0, HASH_BEGIN);
             self.segments = segment.segments;
             self.number = segment.trajectory;
             self.step = Step::new(segment.step_time);
@@ -100,6 +148,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
             *slot = point;
         }
+        self.hash = hash_points(self.hash, slots);
     }
 
     /// All points of the segment are copied; `speeds` are those of all points so far.
@@ -107,6 +156,40 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.speeds = speeds;
         self.received = (self.received + segment.len()).min(self.capacity());
         self.next_segment = segment.segment + 1;
+        self.held = self.received;
+    }
+
+    /// Hash of the points in memory and how many they are, also of a trajectory that was given up.
+    pub fn points_hash(&self) -> (u32, u32) {
+        (self.hash, self.held as u32)
+    }
+
+    /// Those points from number `first` on.
+    pub fn held_points(&self, first: usize) -> &[RawPoint] {
+        self.points.as_ref().get(first..self.held).unwrap_or(&[])
+    }
+
+    /// What is remembered, without the points.
+    pub fn state(&self) -> StoreState {
+        let Self { points: _, received, next_segment, segments, number, ref step, speeds, held, hash } =
+            *self;
+        StoreState { received, next_segment, segments, number, step_ms: step.ms, speeds, held, hash }
+    }
+
+    /// The same again; the points are put apart.
+    pub fn restore(&mut self, state: &StoreState) {
+        let StoreState { received, next_segment, segments, number, step_ms, speeds, held, hash } = *state;
+        (self.received, self.next_segment, self.segments) =
+            (received.min(self.capacity()), next_segment, segments);
+        (self.number, self.step, self.speeds) = (number, Step::new(step_ms), speeds);
+        (self.held, self.hash) = (held.min(self.capacity()), hash);
+    }
+
+    /// Points from number `first` on.
+    pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
+        for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
+            *slot = *point;
+        }
     }
 
     /// How many points there are, the last of them, and their speeds; `None` without points.

@@ -12,6 +12,7 @@ use crate::JOINTS;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
+use crate::remembered::remembered;
 
 /// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.
 const AVERAGE_MS: f64 = 100.0;
@@ -36,6 +37,8 @@ pub(crate) struct Payload {
     rest: [f64; JOINTS],
     elapsed_ms: u16,
 }
+
+remembered!(Payload { missing, observed_ms, mass, rest, elapsed_ms });
 
 impl Payload {
     /// The arm is not held: what is missing is to be found anew.

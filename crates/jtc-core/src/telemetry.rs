@@ -1,6 +1,7 @@
 //! What a tick computed, for recordings and tests.
 use jtc_bus::NodeState;
 
+use crate::remembered::remembered;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// One joint in one tick.
@@ -78,6 +79,8 @@ pub(crate) struct Observed {
     /// Torques commanded, N·m.
     pub torque: [f64; JOINTS],
 }
+
+remembered!(Observed { tick, torque });
 
 #[cfg(test)]
 mod tests {

@@ -110,6 +110,24 @@ impl Payload {
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 
 impl LinkInertias {
+    /// Their numbers, in an order of their own: kept, they make the same again with [`from_numbers`](Self::from_numbers).
+    pub fn numbers(&self) -> [[f64; 7]; JOINTS] {
+        self.0.map(|BaseInertialParameters { hx, hy, xx, yy, xy, xz, yz }| [hx, hy, xx, yy, xy, xz, yz])
+    }
+
+    /// Of the numbers of others.
+    pub fn from_numbers(numbers: &[[f64; 7]; JOINTS]) -> Self {
+        Self(numbers.map(|[hx, hy, xx, yy, xy, xz, yz]| BaseInertialParameters {
+            hx,
+            hy,
+            xx,
+            yy,
+            xy,
+            xz,
+            yz,
+        }))
+    }
+
     /// `share` of the way from these to `other`: 0 are these, 1 the other.
     #[inline(always)]
     pub fn toward(&self, other: &Self, share: f64) -> Self {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
+use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{
     BusState, Config, Controller, HOST_LINES, HostEvent, Identity, Inputs, Outputs, POINTS_MAX, Telemetry,
 };
@@ -92,6 +93,17 @@ pub struct Board {
     pub watchdog_resets: u32,
     /// What the last tick computed.
     telemetry: Telemetry,
+    recorder: SimRecorder,
+}
+
+/// The flight recorder with as much memory as the board gives it.
+pub type SimRecorder = Recorder<Vec<Block>, 2>;
+
+/// Blocks in each of the two pieces of the flight recorder's memory: 126 KiB together.
+pub const RECORDER_BLOCKS: usize = 63;
+
+fn recorder_memory() -> [Vec<Block>; 2] {
+    [(); 2].map(|()| vec![[0; BLOCK_WORDS]; RECORDER_BLOCKS])
 }
 
 impl Board {
@@ -112,6 +124,7 @@ impl Board {
             lost_bytes: 0,
             watchdog_resets: 0,
             telemetry: Telemetry::default(),
+            recorder: Recorder::new(recorder_memory(), false),
         };
         board.boot();
         board
@@ -140,8 +153,11 @@ impl Board {
         let resets = self.watchdog_resets;
         // What was being written is lost; the arm before it is still there.
         let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
+        let recorder = core::mem::replace(&mut self.recorder, Recorder::new([Vec::new(), Vec::new()], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
+        // Its memory keeps what is in it; a reset by the watchdog is a failure.
+        self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
 
@@ -175,6 +191,21 @@ impl Board {
             Some((arm, ms)) => memory.writing = Some((arm, ms - 1)),
             None => {}
         }
+    }
+
+    /// The flight recorder (J-56).
+    pub fn recorder(&self) -> &SimRecorder {
+        &self.recorder
+    }
+
+    /// Forgets the log of the flight recorder.
+    pub fn clear_log(&mut self) {
+        self.recorder.clear();
+    }
+
+    /// The controller itself, for a replay of what was recorded.
+    pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
+        &self.controller
     }
 
     /// The status of the last tick, when its outputs had `status` set.
@@ -250,7 +281,7 @@ impl Board {
                 event,
             })
             .collect();
-        let outputs = self.controller.tick(&Inputs {
+        let inputs = Inputs {
             bus: pins.bus,
             bus_state: pins.bus_state,
             safety_input: pins.safety_input,
@@ -258,7 +289,9 @@ impl Board {
             urgent,
             host: &host,
             status_free: pins.status_free,
-        });
+        };
+        let outputs = self.controller.tick(&inputs);
+        self.recorder.record(&mut self.controller, &inputs, &outputs);
         self.telemetry = self.controller.telemetry();
         self.worked.clear();
         self.worked.extend(host.iter().take(outputs.host_done).map(|host| Worked::from(&host.event)));

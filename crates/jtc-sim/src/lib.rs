@@ -28,7 +28,7 @@ mod typed;
 mod world;
 
 pub use arm::{Arm, SimArm};
-pub use board::Worked;
+pub use board::{RECORDER_BLOCKS, SimRecorder, Worked};
 pub use bus::{Bus, BusFault, BusStatistics, TimedFrame, frame_us};
 pub use config::{ModelError, SimConfig, Support};
 pub use drive::{Drive, DriveConfig, DriveFault};

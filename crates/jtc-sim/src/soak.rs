@@ -144,6 +144,11 @@ impl Soak {
         }
     }
 
+    /// Forgets the log of the flight recorder.
+    pub fn clear_log(&mut self) {
+        self.world.clear_log();
+    }
+
     /// The world, for a look at what led to a violation.
     pub fn world(&self) -> &World {
         &self.world

@@ -7,6 +7,7 @@ use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
+use crate::remembered::remembered;
 
 /// What rounding in single precision may add, in steps of the position, and as a share of the speed limit.
 const SLACK: f64 = 0.1;
@@ -107,6 +108,8 @@ pub(crate) struct SpeedRange {
     low: (f32, u32),
     high: (f32, u32),
 }
+
+remembered!(SpeedRange { low, high });
 
 impl SpeedRange {
     /// Adds the velocities (in steps) around a point.

@@ -1,5 +1,6 @@
 //! The phases of an execution.
 use crate::motion::ControlMode;
+use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::{JOINTS, TrajectoryState};
 
 /// Where in Operate the controller is.
@@ -13,6 +14,41 @@ pub(crate) enum Phase {
     AtStart,
     /// On the path; `leave`: the state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
+}
+
+impl Remembered for Phase {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        let kind = match self {
+            Self::Waiting { .. } => 0,
+            Self::Approaching { .. } => 1,
+            Self::AtStart => 2,
+            Self::Running { .. } => 3,
+        };
+        to.put(kind, 2);
+        match self {
+            Self::Waiting { elapsed_ms } => elapsed_ms.write(to),
+            Self::Approaching { from, elapsed_ms, leave } => {
+                from.write(to);
+                elapsed_ms.write(to);
+                leave.write(to);
+            }
+            Self::AtStart => {}
+            Self::Running { leave } => leave.write(to),
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        match from.take(2) {
+            0 => Self::Waiting { elapsed_ms: Remembered::read(from) },
+            1 => {
+                let start = Remembered::read(from);
+                let elapsed_ms = Remembered::read(from);
+                Self::Approaching { from: start, elapsed_ms, leave: Remembered::read(from) }
+            }
+            2 => Self::AtStart,
+            _ => Self::Running { leave: Remembered::read(from) },
+        }
+    }
 }
 
 impl Phase {

@@ -2,6 +2,7 @@
 use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 
 use crate::TrajectoryState;
+use crate::remembered::remembered;
 
 /// What became of the urgent commands of a line whose frames have not had their turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,6 +13,8 @@ pub(crate) struct Overtaking {
     /// An Execute was cancelled by them.
     pub(super) cancelled: bool,
 }
+
+remembered!(Overtaking { stops, pauses, cancelled });
 
 impl Overtaking {
     /// So many urgent commands were accepted.

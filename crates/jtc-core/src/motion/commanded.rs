@@ -5,6 +5,7 @@
 //! commanded is looked up that a joint which follows exactly would measure now: the *due* one. What is left between the two is an
 //! error of the joint, and not the way that it has gone since.
 use crate::interpolation::SetPoint;
+use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Set values that are kept: a power of two, so that an index needs no comparison.
@@ -20,6 +21,8 @@ pub(crate) struct Commanded {
     /// Slot of the present tick; it wraps around.
     now: u8,
 }
+
+remembered!(Commanded { position, velocity, now });
 
 impl Commanded {
     /// The next tick begins.

@@ -8,6 +8,7 @@ use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::pid::Pid;
+use crate::remembered::remembered;
 use crate::teach::Payload;
 use crate::{JOINTS, friction, joint_error};
 
@@ -68,6 +69,8 @@ pub(crate) struct ControlLaw {
     /// The arm gives way: the control law adds only so much to the torque of the model (J-66).
     pub(super) yielding: bool,
 }
+
+remembered!(ControlLaw { pid, torque, payload, transfer, yielding });
 
 impl ControlLaw {
     /// No torque is remembered.

@@ -3,6 +3,7 @@ use super::law::{ControlMode, LawInputs};
 use super::set_values::SetValues;
 use super::torque::JointTorque;
 use crate::limits::{self, Saturation};
+use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
 /// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
@@ -13,6 +14,8 @@ pub(super) const DRIVEN: f64 = 0.05;
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
 }
+
+remembered!(Limiter { saturation });
 
 /// What is left of a torque within the limits, per joint.
 pub(crate) struct Limited {

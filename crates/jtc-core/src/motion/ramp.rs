@@ -8,6 +8,7 @@ use crate::deceleration::moves;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::path::{Bounds, SlopeBounds};
+use crate::remembered::remembered;
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
 /// a tick and for the controller.
@@ -20,6 +21,8 @@ pub(crate) struct PathRamp {
     /// Mass matrix with rotors.
     inertia: [[f64; JOINTS]; JOINTS],
 }
+
+remembered!(PathRamp { inertia });
 
 impl PathRamp {
     /// A ramp of path time begins: its bounds need the inertia of the arm.

@@ -7,6 +7,7 @@ use crate::interpolation::SetPoint;
 use crate::jog::Jog;
 use crate::limits::JointConfig;
 use crate::nodes::Nodes;
+use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Where the arm is wanted, and what is not at rest there yet. HoldPos steps it by [`hold`](Self::hold), Operate by
@@ -28,6 +29,8 @@ pub(crate) struct SetValues {
     /// The arm is jogged (J-58).
     jog: Option<Jog>,
 }
+
+remembered!(SetValues { point, commanded, holding, absent, catch, deceleration, jog });
 
 impl SetValues {
     /// Nothing is held; the set position is the measured one.

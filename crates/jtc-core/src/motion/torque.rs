@@ -1,5 +1,6 @@
 //! The torque of one joint, in its parts.
 use crate::pid::PidTorque;
+use crate::remembered::remembered;
 
 /// Parts of one joint's torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,6 +15,8 @@ pub(crate) struct JointTorque {
     /// What is left of a step that is being blended out.
     pub blend: f64,
 }
+
+remembered!(JointTorque { model, pid, friction, payload, brake, blend });
 
 impl JointTorque {
     /// All but the model.

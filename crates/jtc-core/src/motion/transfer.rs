@@ -4,6 +4,7 @@ use crate::JOINTS;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::nodes::Nodes;
+use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 
 /// Which part of the last torque the next one continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,18 @@ pub(super) struct Transfer {
     just_enabled: [bool; JOINTS],
     /// The next torque has to continue the last one.
     next: Option<Continued>,
+}
+
+remembered!(Transfer { step, step_ms, left_ms, just_enabled, next });
+
+impl Remembered for Continued {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        (*self == Self::Everything).write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        if bool::read(from) { Self::Everything } else { Self::Correction }
+    }
 }
 
 impl Transfer {

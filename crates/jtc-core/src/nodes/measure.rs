@@ -12,6 +12,7 @@ mod history;
 
 use crate::DT;
 use crate::config::Config;
+use crate::remembered::remembered;
 use history::{Answered, History};
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
@@ -93,6 +94,24 @@ struct Fading {
     /// Change in a millisecond.
     slope: f64,
 }
+
+remembered!(Reading { position, velocity });
+remembered!(Fading { left, slope });
+remembered!(Measurement {
+    used,
+    known,
+    clock_ms,
+    answer,
+    answered_ms,
+    commanded,
+    rate,
+    carried,
+    history,
+    missing,
+    position_offset,
+    velocity_offset,
+    fading,
+});
 
 impl Fading {
     /// One tick.

@@ -13,6 +13,7 @@ mod node;
 #[cfg(test)]
 mod tests;
 
+use crate::remembered::remembered;
 use measure::{Reading, Tick};
 pub(crate) use node::{Goal, Node};
 
@@ -21,7 +22,7 @@ pub(crate) const GRIPPER: usize = 6;
 /// CAN flag of the gripper's receive timeout.
 const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
 /// Frames looked at in one tick.
-const FRAMES_MAX: usize = 32;
+pub(crate) const FRAMES_MAX: usize = 32;
 
 /// All nodes and the order of frames to them.
 #[derive(Clone, Debug)]
@@ -52,6 +53,25 @@ pub(crate) struct Nodes {
     moves: u8,
     configured_last: bool,
 }
+
+remembered!(Nodes {
+    nodes,
+    position,
+    velocity,
+    gripper,
+    some_absent,
+    gripper_lost,
+    still_ms,
+    rest_ms,
+    powered,
+    pump,
+    pressure,
+    ignored,
+    unacknowledged,
+    sent_move,
+    moves,
+    configured_last,
+});
 
 impl Nodes {
     /// Every node is to be reset once (J-20).

@@ -3,6 +3,7 @@ use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
 use crate::config::Config;
+use crate::remembered::remembered;
 
 /// Ticks after a reset in which a late answer of the node does not count.
 const DEAF_AFTER_RESET: u8 = 20;
@@ -57,6 +58,28 @@ pub(crate) struct Node {
     /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
+
+remembered!(Node {
+    report,
+    seen,
+    configured,
+    valid,
+    refused,
+    silent,
+    missed,
+    measured,
+    boot_left,
+    deaf_left,
+    clear,
+    reset,
+    enabled,
+    enable_wait,
+    fresh,
+    absent,
+    unasked,
+    again,
+    misbehaved,
+});
 
 impl Node {
     /// Its measurement came in since the last tick.

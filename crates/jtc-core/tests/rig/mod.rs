@@ -2,6 +2,7 @@
 #![allow(dead_code, unused_imports)]
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
+use jtc_core::recorder::{Block, Recorder};
 use jtc_core::{
     BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX,
     TrajectoryState,
@@ -47,6 +48,8 @@ pub struct Rig {
     /// Stop and Pause that arrive before the next tick.
     urgent: [UrgentCommands; HOST_LINES],
     host: std::collections::VecDeque<Sent>,
+    /// The flight recorder, in sessions that have one.
+    pub recorder: Option<Recorder<Vec<Block>, 2>>,
     /// Tick in which the hosts last asked for an extension: they receive each data status (J-51).
     known: Option<u64>,
 }
@@ -105,6 +108,7 @@ impl Rig {
             status_free: true,
             urgent: [UrgentCommands::NONE; HOST_LINES],
             host: std::collections::VecDeque::new(),
+            recorder: None,
             known: None,
         }
     }
@@ -287,6 +291,9 @@ impl Rig {
             status_free: self.status_free,
         };
         self.last = self.controller.tick(&inputs);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.record(&mut self.controller, &inputs, &self.last);
+        }
         drop(host);
         self.host.drain(..self.last.host_done);
         if self.last.status {

@@ -1,10 +1,11 @@
 //! What users of the world see and do.
 use jtc_bus::{Frame, Joint, NODES, NodeState};
-use jtc_core::{BusState, Telemetry};
+use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
+use jtc_wire::RawPoint;
 
 use super::{TICK_US, World};
-use crate::board::Worked;
+use crate::board::{SimRecorder, Worked};
 use crate::bus::{BusStatistics, TimedFrame};
 use crate::config::SimConfig;
 use crate::event::Log;
@@ -65,6 +66,21 @@ impl World {
         buffer[..count].copy_from_slice(&self.host_inbox[..count]);
         self.host_inbox.drain(..count);
         count
+    }
+
+    /// The flight recorder of the controller's board (J-56).
+    pub fn recorder(&self) -> &SimRecorder {
+        self.board.recorder()
+    }
+
+    /// Forgets the log of the flight recorder.
+    pub fn clear_log(&mut self) {
+        self.board.clear_log();
+    }
+
+    /// The controller itself, for a replay of what was recorded.
+    pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
+        self.board.controller()
     }
 
     /// What the controller's last tick computed.

@@ -1,5 +1,6 @@
 //! The last usable answers of a joint, and the rate of their positions.
 use crate::DT;
+use crate::remembered::remembered;
 
 /// Answers that are looked at, and milliseconds over which a rate is taken at least.
 const WINDOW: usize = 5;
@@ -45,6 +46,9 @@ pub(super) struct History {
     /// Which were about where they had been predicted; the newest is bit 0.
     as_predicted: u8,
 }
+
+remembered!(Answered { position, at_ms });
+remembered!(History { answers, next, known, as_predicted });
 
 impl History {
     /// Keeps an answer.

@@ -1,0 +1,261 @@
+//! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that outlasts a reset.
+//!
+//! What is recorded is what went *into* each tick, as few bits as that takes, every [`SNAPSHOT_MS`] a *snapshot* of what the controller
+//! remembers, and for each tick a check of what came *out*. A [`Replay`] of the log through the controller gives everything that it
+//! computed: commanded and measured motion, torques in their parts, states, errors. The arm and the points of the trajectory are named by
+//! hash.
+//!
+//! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared ([`Recorder::record`] executes that command, and
+//! those that read the log). It is also kept when the device was reset because it failed. A log in which the controller never had torque
+//! gives way to a new one as soon as torque comes on: an error at the start of a day is not to take the place of the one that matters.
+mod inputs;
+mod memory;
+mod replay;
+mod snapshot;
+
+use jtc_wire::{Answer, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, RawPoint};
+
+use crate::controller::Controller;
+use crate::io::{Inputs, Outputs};
+use crate::remembered::{BitSink, Remembered};
+use inputs::Reference;
+use memory::Writer;
+
+pub use inputs::{RecordedEvent, RecordedInputs, RecordedKind};
+pub use replay::{Log, Outcome, Record, Replay, Step, Unsure};
+pub use snapshot::{Origin, Snapshot};
+
+/// Words of a block.
+pub const BLOCK_WORDS: usize = 256;
+/// A block of the recorder's memory.
+pub type Block = [u32; BLOCK_WORDS];
+/// Bytes of a block.
+pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
+
+/// Ticks from one snapshot to the next.
+pub const SNAPSHOT_MS: u16 = 500;
+/// Ticks that are recorded after the first error (J-56).
+pub const AFTER_ERROR_MS: u16 = 300;
+/// After something that a replay cannot repeat, the next snapshot comes so soon after the last.
+const EARLY_SNAPSHOT_MS: u16 = 250;
+/// Ticks for which recording rests after a page was asked for: what is being read is not overwritten.
+const HELD_MS: u16 = 2_000;
+
+/// A request to the recorder that a host has sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LogRequest {
+    /// A page for this line, from a byte of a block on.
+    Page { line: usize, block: u32, offset: u16 },
+    /// Forget the log and begin anew.
+    Clear,
+}
+
+/// The recorder. `P` is a piece of its memory: blocks that keep their contents over a reset and are not cached.
+///
+/// The board makes one at its start with whatever the memory holds, and calls [`record`](Self::record) behind every tick.
+pub struct Recorder<P, const N: usize> {
+    writer: Writer<P, N>,
+    reference: Reference,
+    /// Check of what came out since the last snapshot.
+    chain: u32,
+    since_snapshot: u16,
+    /// Something came that a replay cannot repeat: a snapshot is due.
+    uncertain: bool,
+    /// In the last tick an error was latched.
+    was_in_error: bool,
+    /// Ticks left until the log stops.
+    stops_in: Option<u16>,
+    /// Ticks left for which recording rests.
+    held: u16,
+}
+
+impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
+    /// With this memory. What it holds of a log is kept when that log was stopped, or when the device was reset because it `failed`;
+    /// else recording begins anew.
+    pub fn new(pieces: [P; N], failed: bool) -> Self {
+        let mut writer = Writer::new(pieces);
+        if writer.state == LogState::Recording {
+            if failed && !writer.is_empty() {
+                writer.freeze(LogState::Reset);
+            } else {
+                writer.clear();
+            }
+        }
+        Self {
+            writer,
+            reference: Reference::default(),
+            chain: 0,
+            since_snapshot: 0,
+            uncertain: false,
+            was_in_error: false,
+            stops_in: None,
+            held: 0,
+        }
+    }
+
+    /// The memory, for the recorder after a reset.
+    pub fn into_memory(self) -> [P; N] {
+        self.writer.into_memory()
+    }
+
+    /// The memory as it is.
+    pub fn memory(&self) -> &[P; N] {
+        self.writer.memory()
+    }
+
+    /// The blocks of the log, oldest first.
+    pub fn blocks(&self) -> impl Iterator<Item = &Block> {
+        let (oldest, end) = self.writer.range();
+        (oldest..end).filter_map(|block| self.writer.block(block))
+    }
+
+    /// What the recorder does, or why it stopped.
+    pub fn state(&self) -> LogState {
+        self.writer.state
+    }
+
+    /// Records a tick that the controller has just executed, and serves what hosts ask of the recorder. For the board to call behind
+    /// every tick. Some hundred instructions; every [`SNAPSHOT_MS`] some ten thousand.
+    #[inline(never)]
+    pub fn record<M>(&mut self, controller: &mut Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
+    where
+        M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
+    {
+        controller.hash_arm();
+        let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
+        let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
+        if self.writer.state != LogState::Recording && torque && !self.writer.powered {
+            self.clear();
+        }
+        if self.writer.state == LogState::Recording {
+            self.take(controller, inputs, outputs, new_error);
+        }
+        if let Some(request) = controller.extensions.log_request.take() {
+            self.serve(controller, request);
+        }
+        controller.extensions.log = self.writer.state;
+    }
+
+    /// One tick of a log that goes on.
+    fn take<M>(&mut self, controller: &Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs, new_error: bool)
+    where
+        M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
+    {
+        self.writer.powered |= controller.state.has_torque();
+        if self.held > 0 {
+            // An error is not to be missed.
+            self.held = if new_error { 0 } else { self.held - 1 };
+            if self.held > 0 {
+                return;
+            }
+            self.writer.begin();
+            self.snapshot(controller);
+        } else if self.writer.is_empty() {
+            // Some ticks after the start the arm has its name.
+            if controller.extensions.hash.is_none() && !new_error {
+                return;
+            }
+            self.writer.begin();
+            self.snapshot(controller);
+        } else {
+            self.tick(controller, inputs, outputs);
+        }
+        self.writer.commit();
+        if new_error && self.stops_in.is_none() {
+            self.stops_in = Some(AFTER_ERROR_MS);
+        } else if let Some(left) = &mut self.stops_in {
+            *left -= 1;
+            if *left == 0 {
+                self.stops_in = None;
+                self.writer.freeze(LogState::Error);
+            }
+        }
+    }
+
+    fn tick<M>(&mut self, controller: &Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
+    where
+        M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
+    {
+        self.writer.put(0, 1);
+        self.uncertain |= !self.reference.write(inputs, outputs.host_done, &mut self.writer);
+        self.chain = chain(self.chain, controller, outputs);
+        self.writer.put(check(self.chain), 8);
+        self.since_snapshot += 1;
+        let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
+        // While the arm changes its hash is not known; that is over soon, unless a host sends parameters without end.
+        let named = controller.extensions.hash.is_some() || self.since_snapshot >= 2 * SNAPSHOT_MS;
+        if self.since_snapshot >= due && named {
+            self.snapshot(controller);
+        }
+    }
+
+    #[inline(never)]
+    fn snapshot<M>(&mut self, controller: &Controller<M>)
+    where
+        M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
+    {
+        self.writer.mark_snapshot();
+        self.writer.put(1, 1);
+        controller.origin().write(&mut self.writer);
+        controller.write_state(&mut self.writer);
+        (self.reference, self.chain) = (Reference::default(), 0);
+        (self.since_snapshot, self.uncertain) = (0, false);
+    }
+
+    /// Forgets the log and begins anew, as a ClearLog has it do.
+    pub fn clear(&mut self) {
+        self.writer.clear();
+        (self.stops_in, self.held) = (None, 0);
+    }
+
+    fn serve<M>(&mut self, controller: &mut Controller<M>, request: LogRequest)
+    where
+        M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
+    {
+        let LogRequest::Page { line, block, offset } = request else {
+            self.clear();
+            return;
+        };
+        let reads = block != LOG_NO_BLOCK && !self.writer.is_empty();
+        if self.writer.state == LogState::Recording && self.stops_in.is_none() && reads {
+            // What comes after an error goes first.
+            self.held = HELD_MS;
+        }
+        let (oldest, end) = self.writer.range();
+        // What is not there any more is passed over.
+        let (block, offset) = if block < oldest { (oldest, 0) } else { (block, offset) };
+        let mut bytes = [0; LOG_PAGE];
+        let read = self.writer.read(block, usize::from(offset) & !3, &mut bytes);
+        let (points_hash, points) = controller.store.points_hash();
+        let page = LogPage {
+            state: self.writer.state,
+            block,
+            offset: offset & !3,
+            end,
+            points: points as u16,
+            points_hash,
+            bytes: bytes.get(..read).unwrap_or(&[]),
+        };
+        controller.extensions.answers.put(line, &Answer::Log(page));
+    }
+}
+
+/// Mixes what came out of a tick into the check of the ticks before it.
+fn chain<M>(chain: u32, controller: &Controller<M>, outputs: &Outputs) -> u32 {
+    let mix = |hash: u32, word: u32| (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
+    let states = u32::from(controller.errors.word()) << 16
+        | (controller.state as u32) << 8
+        | (controller.trajectory as u32) << 4
+        | u32::from(outputs.safety_output);
+    let hash = mix(chain, states);
+    let Some(frame) = &outputs.bus else { return hash };
+    let (words, rest) = frame.data().as_chunks::<4>();
+    let hash =
+        words.iter().fold(mix(hash, frame.id.into()), |hash, word| mix(hash, u32::from_le_bytes(*word)));
+    rest.iter().fold(hash, |hash, byte| mix(hash, (*byte).into()))
+}
+
+/// The part of it that is recorded: enough, because each check contains all ticks before it.
+fn check(chain: u32) -> u32 {
+    chain >> 24
+}

@@ -1,0 +1,505 @@
+//! The inputs of a tick, as few bits as they take: what the nodes answer against what they answered before, what is as ever in one bit.
+//!
+//! Writer and reader keep the same [`Reference`]; a snapshot begins it anew on both sides.
+use jtc_bus::{Frame, MAX_LEN, id};
+use jtc_wire::{
+    EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
+};
+
+use crate::io::{BusState, HostEvent, Inputs};
+use crate::nodes::FRAMES_MAX;
+use crate::remembered::{BitSink, BitSource};
+use crate::response_queue::HOST_LINES;
+use crate::{JOINTS, NODES};
+
+/// Longest frame of a host that is recorded with its bytes.
+pub const HOST_BYTES: usize = 48;
+/// Bytes of frames of hosts that are recorded, on average in a tick and at once.
+const ALLOWANCE: (u16, u16) = (2, 400);
+/// Words of a payload.
+const WORDS: usize = MAX_LEN / 4;
+
+/// How a number is written, by its size: not at all when 0, else in so many bits.
+struct Code(u32, u32, u32);
+
+const VELOCITY: Code = Code(6, 11, 17);
+const TORQUE: Code = Code(5, 10, 17);
+/// Positions of a 16-bit encoder change the upper half only.
+const STEPS: u32 = 5;
+const FINE: u32 = 22;
+
+fn zigzag(value: i32) -> u32 {
+    ((value << 1) ^ (value >> 31)) as u32
+}
+
+fn straight(code: u32) -> i32 {
+    (code >> 1) as i32 ^ -((code & 1) as i32)
+}
+
+impl Code {
+    #[inline]
+    fn write<S: BitSink>(&self, value: i32, to: &mut S) {
+        let code = zigzag(value);
+        if code == 0 {
+            to.put(0, 1);
+        } else if code >> self.0 == 0 {
+            to.put(0b01 | code << 2, 2 + self.0);
+        } else if code >> self.1 == 0 {
+            to.put(0b011 | code << 3, 3 + self.1);
+        } else {
+            to.put(0b111 | code << 3, 3 + self.2);
+        }
+    }
+
+    fn read<S: BitSource>(&self, from: &mut S) -> i32 {
+        straight(match prefix(from) {
+            0 => 0,
+            1 => from.take(self.0),
+            2 => from.take(self.1),
+            _ => from.take(self.2),
+        })
+    }
+}
+
+/// How many ones there are in front of a zero, at most 3.
+fn prefix<S: BitSource>(from: &mut S) -> u32 {
+    (0..3).find(|_| from.take(1) == 0).unwrap_or(3)
+}
+
+#[inline]
+fn write_position<S: BitSink>(change: i32, to: &mut S) {
+    let (code, steps) = (zigzag(change), zigzag(change >> 16));
+    if change == 0 {
+        to.put(0, 1);
+    } else if change as u16 == 0 && steps >> STEPS == 0 {
+        to.put(0b01 | steps << 2, 2 + STEPS);
+    } else if code >> FINE == 0 {
+        to.put(0b011 | code << 3, 3 + FINE);
+    } else {
+        to.put(0b111, 3);
+        to.put(change as u32, 32);
+    }
+}
+
+fn read_position<S: BitSource>(from: &mut S) -> i32 {
+    match prefix(from) {
+        0 => 0,
+        1 => straight(from.take(STEPS)) << 16,
+        2 => straight(from.take(FINE)),
+        _ => from.take(32) as i32,
+    }
+}
+
+/// What the next inputs are written against.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    /// The last answer to a Move of each node: bytes, and big-endian words.
+    len: [u8; NODES],
+    words: [[u32; WORDS]; NODES],
+    /// How many nodes answer.
+    expected: u8,
+    /// Bytes of frames of hosts that may still be recorded.
+    allowance: u16,
+}
+
+impl Default for Reference {
+    fn default() -> Self {
+        Self { len: [16; NODES], words: [[0; WORDS]; NODES], expected: NODES as u8, allowance: ALLOWANCE.1 }
+    }
+}
+
+/// Bytes of a frame as big-endian words; `None` where that leaves a rest.
+#[inline]
+fn words(frame: &Frame) -> Option<[u32; WORDS]> {
+    let (chunks, rest) = frame.data().as_chunks::<4>();
+    let mut words = [0; WORDS];
+    for (to, from) in words.iter_mut().zip(chunks) {
+        *to = u32::from_be_bytes(*from);
+    }
+    rest.is_empty().then_some(words)
+}
+
+fn is_move_answer(frame: &Frame) -> bool {
+    id::command(frame.id) == id::MOVE_ANSWER && usize::from(id::node(frame.id)) < NODES
+}
+
+impl Reference {
+    /// Writes the inputs; returns whether all of them are there (a replay of this tick gives the same).
+    pub fn write<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
+        to.put(inputs.status_free.into(), 1);
+        let quiet = inputs.safety_input
+            && inputs.bus_state == Inputs::QUIET.bus_state
+            && inputs.missed_ticks == 0
+            && inputs.host.is_empty()
+            && inputs.urgent.iter().all(UrgentCommands::is_empty);
+        to.put(quiet.into(), 1);
+        self.allowance = (self.allowance + ALLOWANCE.0).min(ALLOWANCE.1);
+        let whole = quiet || self.write_rest(inputs, done, to);
+        self.write_bus(inputs.bus, to);
+        whole
+    }
+
+    fn write_bus<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
+        let bus = bus.get(..FRAMES_MAX).unwrap_or(bus);
+        let ordered = bus.len() == usize::from(self.expected)
+            && bus
+                .iter()
+                .enumerate()
+                .all(|(n, frame)| frame.id == id::MOVE_ANSWER + n as u16 && self.has_len(n, frame));
+        to.put(ordered.into(), 1);
+        if ordered {
+            for (n, frame) in bus.iter().enumerate() {
+                self.write_answer(n, frame, to);
+            }
+        } else {
+            self.write_frames(bus, to);
+        }
+    }
+
+    #[inline]
+    fn has_len(&self, n: usize, frame: &Frame) -> bool {
+        self.len.get(n).is_some_and(|len| usize::from(*len) == frame.data().len())
+    }
+
+    /// Frames in any order.
+    #[inline(never)]
+    fn write_frames<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
+        to.put(bus.len() as u32, 6);
+        let mut answers = 0;
+        for frame in bus {
+            let (n, data) = (usize::from(id::node(frame.id)), frame.data());
+            let answer = is_move_answer(frame) && data.len() >= 16 && data.len() % 4 == 0;
+            to.put(answer.into(), 1);
+            if answer {
+                answers |= 1u32 << n;
+                to.put(n as u32, 3);
+                to.put(data.len() as u32 / 4 - 4, 2);
+                if let Some(len) = self.len.get_mut(n) {
+                    *len = data.len() as u8;
+                }
+                self.write_answer(n, frame, to);
+            } else {
+                to.put(frame.id.into(), 11);
+                to.put(data.len() as u32, 5);
+                for byte in data {
+                    to.put((*byte).into(), 8);
+                }
+            }
+        }
+        self.expect(answers);
+    }
+
+    /// Which nodes are expected from now on.
+    fn expect(&mut self, answers: u32) {
+        if answers == 0x3F || answers == 0x7F {
+            self.expected = answers.count_ones() as u8;
+        }
+    }
+
+    /// An answer of node `n` to a Move, of the length that is known.
+    #[inline]
+    fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
+        let (Some(before), Some(now)) = (self.words.get_mut(n), words(frame)) else { return };
+        let count = frame.data().len() / 4;
+        let first = if n < JOINTS {
+            write_position(now[0].wrapping_sub(before[0]) as i32, to);
+            let velocity = |word: u32| i32::from((word >> 16) as i16);
+            VELOCITY.write(velocity(now[1]) - velocity(before[1]), to);
+            TORQUE.write(i32::from(now[1] as i16) - i32::from(before[1] as i16), to);
+            2
+        } else {
+            0
+        };
+        let same = now.get(first..) == before.get(first..);
+        to.put((!same).into(), 1);
+        if !same {
+            for (now, before) in now.iter().zip(&*before).take(count).skip(first) {
+                to.put((now != before).into(), 1);
+                if now != before {
+                    to.put(*now, 32);
+                }
+            }
+        }
+        *before = now;
+    }
+
+    /// What is not as ever, but for the joint bus.
+    #[inline(never)]
+    fn write_rest<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
+        to.put(inputs.safety_input.into(), 1);
+        to.put(inputs.bus_state.acknowledged.into(), 1);
+        to.put(inputs.bus_state.bus_off.into(), 1);
+        to.put((inputs.missed_ticks != 0).into(), 1);
+        if inputs.missed_ticks != 0 {
+            to.put(inputs.missed_ticks.into(), 16);
+        }
+        for commands in &inputs.urgent {
+            to.put(commands.iter().count() as u32, 2);
+            for (command, count) in commands.iter() {
+                to.put((command == UrgentCommand::Pause).into(), 1);
+                to.put(count.into(), 8);
+            }
+        }
+        // Those that were done, and the one that was worked on or had no turn.
+        let count = inputs.host.len().min(done + 1).min(EVENTS_MAX);
+        to.put(count as u32, 5);
+        let mut whole = true;
+        for event in inputs.host.iter().take(count) {
+            whole &= self.write_event(event, to);
+        }
+        whole
+    }
+
+    /// One event; false when its bytes were left out.
+    fn write_event<S: BitSink>(&mut self, event: &HostEvent<'_>, to: &mut S) -> bool {
+        to.put(event.line.min(3) as u32, 2);
+        to.put(event.overtaken.into(), 1);
+        let (kind, response) = match event.event {
+            LinkEvent::Frame(frame) => {
+                to.put(frame.frame_type as u32, 8);
+                let len = frame.bytes.len();
+                // Parameters change the arm, whatever their length: a snapshot after them says which it is.
+                let fits =
+                    len <= HOST_BYTES && len <= self.allowance.into() && !changes_arm(frame.frame_type);
+                to.put(if fits { 0 } else { 1 }, 2);
+                if fits {
+                    self.allowance -= len as u16;
+                    to.put(len as u32, 6);
+                    for byte in frame.bytes {
+                        to.put((*byte).into(), 8);
+                    }
+                }
+                return fits;
+            }
+            LinkEvent::Bad(response) => (2, response),
+            LinkEvent::Noise(response) => (3, response),
+        };
+        to.put(response.frame_type.into(), 8);
+        to.put(kind, 2);
+        to.put(response.status as u32, 3);
+        true
+    }
+}
+
+/// Frames that change the parameters, which a log has by hash only.
+fn changes_arm(frame_type: FrameType) -> bool {
+    use FrameType::*;
+    frame_type.is_default() || matches!(frame_type, FrictionTable | PidParam | ArmModel | FrictionPolynomial)
+}
+
+/// An event of a host as it was recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedEvent {
+    /// Line.
+    pub line: usize,
+    /// An urgent command has overtaken it (J-04).
+    pub overtaken: bool,
+    /// Type byte, 0 where unknown.
+    pub frame_type: u8,
+    /// What it was.
+    pub kind: RecordedKind,
+    bytes: [u8; HOST_BYTES],
+    len: usize,
+}
+
+/// Kinds of [`RecordedEvent`]s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RecordedKind {
+    /// A good frame with its bytes.
+    Frame,
+    /// A good frame whose bytes are not in the log: too long, too many, or parameters.
+    Unrecorded,
+    /// A bad frame, and its status.
+    Bad(FrameStatus),
+    /// Noise, and its status.
+    Noise(FrameStatus),
+}
+
+impl RecordedEvent {
+    const NONE: Self = Self {
+        line: 0,
+        overtaken: false,
+        frame_type: 0,
+        kind: RecordedKind::Unrecorded,
+        bytes: [0; HOST_BYTES],
+        len: 0,
+    };
+
+    /// The bytes of a recorded frame.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&[])
+    }
+
+    /// As the controller gets it. In place of a frame that was not recorded: one that changes nothing.
+    pub fn event(&self) -> HostEvent<'_> {
+        let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
+            (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
+            (RecordedKind::Noise(status), _) => LinkEvent::Noise(Response::bad(self.frame_type, status, 0)),
+            (_, Some(frame_type)) => LinkEvent::Frame(FrameRef { frame_type, bytes: self.bytes() }),
+            (_, None) => LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0)),
+        };
+        HostEvent { line: self.line, overtaken: self.overtaken, event }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let mut event = Self { line: from.take(2) as usize, overtaken: from.take(1) != 0, ..Self::NONE };
+        event.frame_type = from.take(8) as u8;
+        let kind = from.take(2);
+        event.kind = match kind {
+            0 => {
+                event.len = (from.take(6) as usize).min(HOST_BYTES);
+                for byte in event.bytes.iter_mut().take(event.len) {
+                    *byte = from.take(8) as u8;
+                }
+                RecordedKind::Frame
+            }
+            1 => {
+                event.bytes = [0; HOST_BYTES];
+                RecordedKind::Unrecorded
+            }
+            kind => {
+                let status = FrameStatus::from_byte(from.take(3) as u8).unwrap_or_default();
+                if kind == 2 { RecordedKind::Bad(status) } else { RecordedKind::Noise(status) }
+            }
+        };
+        event
+    }
+}
+
+/// The inputs of a tick as they were recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedInputs {
+    /// State of the joint bus.
+    pub bus_state: BusState,
+    /// Level of the safety input.
+    pub safety_input: bool,
+    /// Ticks that did not come before this one.
+    pub missed_ticks: u16,
+    /// Stop and Pause that arrived.
+    pub urgent: [UrgentCommands; HOST_LINES],
+    /// The lines could take a status.
+    pub status_free: bool,
+    bus: [Option<Frame>; FRAMES_MAX],
+    host: [RecordedEvent; EVENTS_MAX],
+    host_len: usize,
+}
+
+impl RecordedInputs {
+    /// Frames of the joint bus.
+    pub fn bus(&self) -> impl Iterator<Item = Frame> + '_ {
+        self.bus.iter().map_while(|frame| *frame)
+    }
+
+    /// What hosts sent, as far as it was looked at.
+    pub fn host(&self) -> &[RecordedEvent] {
+        self.host.get(..self.host_len).unwrap_or(&[])
+    }
+
+    /// Every input is there: a replay of this tick does what the controller did.
+    pub fn is_whole(&self) -> bool {
+        self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
+    }
+
+    pub(super) fn read<S: BitSource>(reference: &mut Reference, from: &mut S) -> Self {
+        let status_free = from.take(1) != 0;
+        let mut inputs = Self {
+            bus_state: Inputs::QUIET.bus_state,
+            safety_input: true,
+            missed_ticks: 0,
+            urgent: [UrgentCommands::NONE; HOST_LINES],
+            status_free,
+            bus: [None; FRAMES_MAX],
+            host: [RecordedEvent::NONE; EVENTS_MAX],
+            host_len: 0,
+        };
+        if from.take(1) == 0 {
+            inputs.read_rest(from);
+        }
+        reference.read_bus(&mut inputs.bus, from);
+        inputs
+    }
+
+    fn read_rest<S: BitSource>(&mut self, from: &mut S) {
+        self.safety_input = from.take(1) != 0;
+        self.bus_state = BusState { acknowledged: from.take(1) != 0, bus_off: from.take(1) != 0 };
+        if from.take(1) != 0 {
+            self.missed_ticks = from.take(16) as u16;
+        }
+        for commands in &mut self.urgent {
+            for _ in 0..from.take(2) {
+                let pause = from.take(1) != 0;
+                let command = if pause { UrgentCommand::Pause } else { UrgentCommand::Stop };
+                commands.add(command, from.take(8) as u8);
+            }
+        }
+        self.host_len = (from.take(5) as usize).min(EVENTS_MAX);
+        for event in self.host.iter_mut().take(self.host_len) {
+            *event = RecordedEvent::read(from);
+        }
+    }
+}
+
+impl Reference {
+    fn read_bus<S: BitSource>(&mut self, bus: &mut [Option<Frame>; FRAMES_MAX], from: &mut S) {
+        if from.take(1) != 0 {
+            for (n, slot) in bus.iter_mut().enumerate().take(self.expected.into()) {
+                *slot = self.read_answer(n, from);
+            }
+            return;
+        }
+        let count = from.take(6) as usize;
+        let mut answers = 0;
+        for slot in bus.iter_mut().take(count) {
+            *slot = if from.take(1) != 0 {
+                let n = from.take(3) as usize;
+                answers |= 1u32 << n;
+                let len = 4 * (from.take(2) as u8 + 4);
+                if let Some(place) = self.len.get_mut(n) {
+                    *place = len;
+                }
+                self.read_answer(n, from)
+            } else {
+                let (id, len) = (from.take(11) as u16, from.take(5) as usize);
+                let mut data = [0; MAX_LEN];
+                for byte in data.iter_mut().take(len) {
+                    *byte = from.take(8) as u8;
+                }
+                data.get(..len).and_then(|data| Frame::new(id, data))
+            };
+            if slot.is_none() {
+                from.damage();
+                return;
+            }
+        }
+        self.expect(answers);
+    }
+
+    fn read_answer<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
+        let (words, len) = (self.words.get_mut(n)?, usize::from(*self.len.get(n)?));
+        let mut now = *words;
+        let first = if n < JOINTS {
+            now[0] = now[0].wrapping_add(read_position(from) as u32);
+            let velocity = i32::from((now[1] >> 16) as i16).wrapping_add(VELOCITY.read(from)) as u16;
+            let torque = i32::from(now[1] as i16).wrapping_add(TORQUE.read(from)) as u16;
+            now[1] = u32::from(velocity) << 16 | u32::from(torque);
+            2
+        } else {
+            0
+        };
+        if from.take(1) != 0 {
+            for word in now.iter_mut().take(len / 4).skip(first) {
+                if from.take(1) != 0 {
+                    *word = from.take(32);
+                }
+            }
+        }
+        // What is behind a payload that has become shorter is zero on the other side.
+        now.iter_mut().skip(len / 4).for_each(|word| *word = 0);
+        *words = now;
+        let mut bytes = [0; MAX_LEN];
+        for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now) {
+            *to = word.to_be_bytes();
+        }
+        Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..len)?)
+    }
+}

@@ -1,0 +1,407 @@
+//! The memory of the flight recorder: a ring of blocks that stay readable wherever a reset cuts the writing (J-56).
+//!
+//! A block has a head of [`HEAD`] words and bits behind it. Its *commit* word has the number of bits and their check, and is written once
+//! a tick, last: what a cut tick has left behind the committed bits is not read. Memory that was never written, or has been damaged, fails
+//! the check and reads as no block.
+use core::sync::atomic::{Ordering, compiler_fence};
+
+use jtc_wire::LogState;
+
+use super::{BLOCK_WORDS, Block};
+use crate::remembered::{BitSink, BitSource};
+
+/// "JTCF" and the version of the layout.
+const MAGIC: u32 = 0x4A46_0001;
+/// Words in front of the bits.
+const HEAD: usize = 5;
+/// Bits of a block.
+const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
+
+/// Where the words of the head are.
+mod head {
+    pub const MAGIC: usize = 0;
+    /// Number of the block.
+    pub const SEQUENCE: usize = 1;
+    /// Bits (low half) and their check.
+    pub const COMMIT: usize = 2;
+    /// Where the first snapshot begins (low half, [`super::NONE`]: nowhere) and the complement.
+    pub const SNAPSHOT: usize = 3;
+    /// State of the log (low half) and the complement.
+    pub const FLAGS: usize = 4;
+}
+
+/// No snapshot begins in a block.
+const NONE: u16 = 0xFFFF;
+
+/// The controller has had torque since the log was begun.
+const POWERED: u16 = 0x100;
+
+/// A number with its complement above it.
+const fn doubled(value: u16) -> u32 {
+    value as u32 | (!value as u32) << 16
+}
+
+/// The number, if the complement is right.
+fn halved(word: u32) -> Option<u16> {
+    let value = word as u16;
+    (doubled(value) == word).then_some(value)
+}
+
+fn mix(hash: u32, word: u32) -> u32 {
+    (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
+}
+
+/// The commit word for so many bits, the last of them in `rest`.
+fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
+    let hash = mix(hash, rest);
+    bits | (hash ^ hash << 16) & 0xFFFF_0000
+}
+
+/// A block that was written, and whose head and bits are whole.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Whole<'a> {
+    pub sequence: u32,
+    /// Bits that are committed.
+    pub bits: u32,
+    /// Where the first snapshot begins.
+    pub snapshot: Option<u32>,
+    pub state: LogState,
+    pub powered: bool,
+    words: &'a [u32],
+}
+
+impl<'a> Whole<'a> {
+    /// `None` for memory that holds no block.
+    pub fn parse(block: &'a Block) -> Option<Self> {
+        let (head, words) = block.split_first_chunk::<HEAD>()?;
+        let bits = head[head::COMMIT] & 0xFFFF;
+        if head[head::MAGIC] != MAGIC || bits > BITS {
+            return None;
+        }
+        let (snapshot, flags) = (halved(head[head::SNAPSHOT])?, halved(head[head::FLAGS])?);
+        let state = LogState::from_byte(flags as u8)?;
+        let (full, rest) = (bits as usize / 32, bits % 32);
+        let begin = mix(MAGIC, head[head::SEQUENCE]);
+        let hash = words.iter().take(full).fold(begin, |hash, word| mix(hash, *word));
+        let last = words.get(full).map_or(0, |word| word & ((1 << rest) - 1));
+        if commit(hash, last, bits) != head[head::COMMIT] {
+            return None;
+        }
+        let snapshot = (snapshot != NONE && u32::from(snapshot) < bits).then_some(snapshot.into());
+        let (sequence, powered) = (head[head::SEQUENCE], flags & POWERED != 0);
+        Some(Self { sequence, bits, snapshot, state, powered, words })
+    }
+}
+
+/// Memory in one or more pieces, as one ring.
+pub(super) struct Ring<P, const N: usize> {
+    pieces: [P; N],
+}
+
+impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
+    fn len(&self) -> u32 {
+        self.pieces.iter().map(|piece| piece.as_ref().len() as u32).sum()
+    }
+
+    /// The block of this number.
+    fn block(&self, sequence: u32) -> Option<&Block> {
+        let mut at = sequence.checked_rem(self.len())? as usize;
+        for piece in &self.pieces {
+            match piece.as_ref().get(at) {
+                Some(block) => return Some(block),
+                None => at -= piece.as_ref().len(),
+            }
+        }
+        None
+    }
+
+    fn block_mut(&mut self, sequence: u32) -> Option<&mut Block> {
+        let mut at = sequence.checked_rem(self.len())? as usize;
+        for piece in &mut self.pieces {
+            let len = piece.as_ref().len();
+            if at < len {
+                return piece.as_mut().get_mut(at);
+            }
+            at -= len;
+        }
+        None
+    }
+
+    /// The block of this number, if it is there and whole.
+    fn whole(&self, sequence: u32) -> Option<Whole<'_>> {
+        self.block(sequence).and_then(Whole::parse).filter(|whole| whole.sequence == sequence)
+    }
+
+    /// The newest block.
+    fn newest(&self) -> Option<u32> {
+        let all = self.pieces.iter().flat_map(|piece| piece.as_ref()).filter_map(Whole::parse);
+        // In its place: others are left from memory of another size.
+        all.map(|whole| whole.sequence).filter(|sequence| self.whole(*sequence).is_some()).max()
+    }
+
+    fn wipe(&mut self) {
+        for block in self.pieces.iter_mut().flat_map(|piece| piece.as_mut()) {
+            block[head::MAGIC] = 0;
+        }
+    }
+}
+
+/// Writes bits into the ring.
+pub(super) struct Writer<P, const N: usize> {
+    ring: Ring<P, N>,
+    /// Number of the open block; `None` before the first.
+    open: Option<u32>,
+    /// Number of the next block.
+    next: u32,
+    /// The head of the open block has been written.
+    begun: bool,
+    /// Word of the open block that is filled next, with `fill` bits of it in `rest`.
+    word: usize,
+    rest: u32,
+    fill: u32,
+    hash: u32,
+    snapshot: u16,
+    pub state: LogState,
+    pub powered: bool,
+}
+
+impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
+    /// Whatever the memory holds.
+    pub fn new(pieces: [P; N]) -> Self {
+        let ring = Ring { pieces };
+        let newest = ring.newest();
+        let (state, powered) = newest
+            .and_then(|sequence| ring.whole(sequence))
+            .map_or((LogState::Recording, false), |whole| (whole.state, whole.powered));
+        Self {
+            ring,
+            open: newest,
+            next: newest.map_or(0, |newest| newest.wrapping_add(1)),
+            begun: true,
+            word: HEAD,
+            rest: 0,
+            fill: 0,
+            hash: 0,
+            snapshot: NONE,
+            state,
+            powered,
+        }
+    }
+
+    pub fn into_memory(self) -> [P; N] {
+        self.ring.pieces
+    }
+
+    pub fn memory(&self) -> &[P; N] {
+        &self.ring.pieces
+    }
+
+    /// The block of this number.
+    pub fn block(&self, sequence: u32) -> Option<&Block> {
+        self.ring.block(sequence)
+    }
+
+    /// Nothing is in the memory.
+    pub fn is_empty(&self) -> bool {
+        self.open.is_none()
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.ring.wipe();
+        (self.open, self.state, self.powered) = (None, LogState::Recording, false);
+    }
+
+    /// What follows begins in a block of its own, with a snapshot.
+    pub fn begin(&mut self) {
+        self.open_block();
+    }
+
+    /// A snapshot begins here.
+    pub fn mark_snapshot(&mut self) {
+        if self.snapshot == NONE {
+            self.snapshot = (((self.word - HEAD) * 32) as u32 + self.fill) as u16;
+        }
+    }
+
+    fn open_block(&mut self) {
+        let sequence = self.next;
+        self.next = sequence.wrapping_add(1);
+        self.open = Some(sequence);
+        if let Some(block) = self.ring.block_mut(sequence) {
+            block[head::MAGIC] = 0;
+        }
+        (self.begun, self.word, self.rest, self.fill, self.snapshot) = (false, HEAD, 0, 0, NONE);
+        self.hash = mix(MAGIC, sequence);
+    }
+
+    /// Everything that was put counts from now on.
+    pub fn commit(&mut self) {
+        let Self { rest, fill, hash, word, snapshot, state, powered, begun, open, .. } = *self;
+        let Some(block) = open.and_then(|sequence| self.ring.block_mut(sequence)) else { return };
+        if let Some(place) = block.get_mut(word) {
+            *place = rest;
+        }
+        let bits = ((word - HEAD) * 32) as u32 + fill;
+        block[head::SNAPSHOT] = doubled(snapshot);
+        block[head::FLAGS] = flags(state, powered);
+        compiler_fence(Ordering::SeqCst);
+        block[head::COMMIT] = commit(hash, rest, bits);
+        if !begun {
+            block[head::SEQUENCE] = open.unwrap_or(0);
+            compiler_fence(Ordering::SeqCst);
+            block[head::MAGIC] = MAGIC;
+            self.begun = true;
+        }
+    }
+
+    /// The log ends here, for this reason.
+    pub fn freeze(&mut self, state: LogState) {
+        self.state = state;
+        let flags = flags(state, self.powered);
+        if let Some(block) = self.open.and_then(|sequence| self.ring.block_mut(sequence)) {
+            block[head::FLAGS] = flags;
+        }
+    }
+
+    /// Numbers of the oldest block and of the one behind the newest.
+    pub fn range(&self) -> (u32, u32) {
+        let Some(newest) = self.open else { return (self.next, self.next) };
+        let mut oldest = newest;
+        for _ in 1..self.ring.len() {
+            let before = oldest.wrapping_sub(1);
+            if oldest == 0 || self.ring.block(before).is_none_or(|block| !in_place(block, before)) {
+                break;
+            }
+            oldest = before;
+        }
+        (oldest, newest.wrapping_add(1))
+    }
+
+    /// Bytes of a block from `offset` on, little-endian words; returns how many there were.
+    pub fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
+        let Some(block) = self.ring.block(sequence).filter(|block| in_place(block, sequence)) else {
+            return 0;
+        };
+        let words = block.get(offset / 4..).unwrap_or(&[]);
+        let mut read = 0;
+        for (to, word) in out.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+            *to = word.to_le_bytes();
+            read += 4;
+        }
+        read
+    }
+
+    #[cold]
+    fn next_block(&mut self) {
+        // What is full counts as it is: its end may be in the middle of a tick, whose rest follows.
+        self.commit();
+        self.open_block();
+    }
+}
+
+fn flags(state: LogState, powered: bool) -> u32 {
+    doubled(state as u16 | if powered { POWERED } else { 0 })
+}
+
+/// The block has this number; what is in it is not looked at.
+fn in_place(block: &Block, sequence: u32) -> bool {
+    block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
+}
+
+impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N> {
+    #[inline]
+    fn put(&mut self, value: u32, bits: u32) {
+        self.rest |= value << self.fill;
+        let fill = self.fill + bits;
+        if fill < 32 {
+            self.fill = fill;
+            return;
+        }
+        let word = self.rest;
+        if let Some(place) = self.open.and_then(|n| self.ring.block_mut(n)).and_then(|b| b.get_mut(self.word))
+        {
+            *place = word;
+        }
+        self.hash = mix(self.hash, word);
+        self.word += 1;
+        // What did not fit; nothing where all of it did.
+        let used = 32 - self.fill;
+        (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
+        if self.word == BLOCK_WORDS {
+            let (rest, fill) = (self.rest, self.fill);
+            (self.rest, self.fill) = (0, 0);
+            self.next_block();
+            (self.rest, self.fill) = (rest, fill);
+        }
+    }
+}
+
+/// Reads the bits of blocks that follow each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reader<'a> {
+    blocks: &'a [Block],
+    /// Block in the list, and bit in it.
+    block: usize,
+    bit: u32,
+    current: Option<Whole<'a>>,
+    damaged: bool,
+}
+
+impl<'a> Reader<'a> {
+    /// From bit `bit` of the first of `blocks` on.
+    pub fn new(blocks: &'a [Block], bit: u32) -> Self {
+        let current = blocks.first().and_then(Whole::parse);
+        Self { blocks, block: 0, bit, current, damaged: false }
+    }
+
+    /// Block in the list that is read.
+    pub fn block(&self) -> usize {
+        self.block
+    }
+
+    /// Nothing is left, or the next bits are in a block that does not follow.
+    pub fn at_end(&mut self) -> bool {
+        self.advance();
+        self.current.is_none_or(|whole| self.bit >= whole.bits)
+    }
+
+    /// To the next block where this one is used up and another follows.
+    fn advance(&mut self) {
+        let Some(whole) = self.current else { return };
+        if self.bit < whole.bits || whole.bits < BITS {
+            return;
+        }
+        let next = self.blocks.get(self.block + 1).and_then(Whole::parse);
+        if let Some(next) = next.filter(|next| next.sequence == whole.sequence.wrapping_add(1)) {
+            (self.current, self.block, self.bit) = (Some(next), self.block + 1, 0);
+        }
+    }
+}
+
+impl BitSource for Reader<'_> {
+    fn take(&mut self, bits: u32) -> u32 {
+        let (mut value, mut got) = (0u64, 0);
+        while got < bits {
+            if self.at_end() {
+                self.damaged = true;
+                return 0;
+            }
+            let Some(whole) = self.current else { return 0 };
+            let (word, at) = ((self.bit / 32) as usize, self.bit % 32);
+            let here = (bits - got).min(32 - at).min(whole.bits - self.bit);
+            let word = u64::from(whole.words.get(word).copied().unwrap_or(0));
+            value |= ((word >> at) & ((1 << here) - 1)) << got;
+            (self.bit, got) = (self.bit + here, got + here);
+        }
+        value as u32
+    }
+
+    fn damage(&mut self) {
+        self.damaged = true;
+    }
+
+    fn is_damaged(&self) -> bool {
+        self.damaged
+    }
+}

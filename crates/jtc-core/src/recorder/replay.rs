@@ -1,0 +1,287 @@
+//! A log read back, and run through the controller again.
+use jtc_bus::Frame;
+use jtc_wire::{EVENTS_MAX, FrameType, IMAGE_MAX, LogState, RawPoint};
+
+use super::inputs::{RecordedEvent, RecordedInputs, Reference};
+use super::memory::{Reader, Whole};
+use super::snapshot::{Origin, Snapshot};
+use super::{Block, chain, check};
+use crate::controller::Controller;
+use crate::io::{HostEvent, Inputs, Outputs};
+use crate::nodes::FRAMES_MAX;
+use crate::remembered::{BitSink, BitSource, Remembered};
+use crate::telemetry::Telemetry;
+
+/// What a log has of a moment.
+// A snapshot is large, and there are few.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug)]
+pub enum Record {
+    /// The state after the tick before.
+    Snapshot(Snapshot),
+    /// A tick.
+    Tick {
+        /// What went in.
+        inputs: RecordedInputs,
+        /// Check of what came out of all ticks since the last snapshot.
+        check: u8,
+    },
+}
+
+/// A log: blocks in the order of their numbers. Reading is total: whatever the blocks hold, it gives the records of those that are whole,
+/// from the first snapshot on.
+#[derive(Clone, Debug)]
+pub struct Log<'a> {
+    blocks: &'a [Block],
+    /// Where the next snapshot is looked for.
+    next: usize,
+    reader: Option<Reader<'a>>,
+    reference: Reference,
+}
+
+impl<'a> Log<'a> {
+    /// From the oldest block on.
+    pub fn new(blocks: &'a [Block]) -> Self {
+        Self { blocks, next: 0, reader: None, reference: Reference::default() }
+    }
+
+    /// Why the log ends, and number and state of its newest block; `None` when no block is whole.
+    pub fn end(&self) -> Option<(u32, LogState)> {
+        self.blocks.iter().rev().find_map(Whole::parse).map(|whole| (whole.sequence, whole.state))
+    }
+
+    /// The next snapshot behind what was read.
+    fn find(&mut self) -> Option<Reader<'a>> {
+        while let Some(rest) = self.blocks.get(self.next..).filter(|rest| !rest.is_empty()) {
+            self.next += 1;
+            if let Some(bit) = rest.first().and_then(Whole::parse).and_then(|whole| whole.snapshot) {
+                return Some(Reader::new(rest, bit));
+            }
+        }
+        None
+    }
+}
+
+impl Iterator for Log<'_> {
+    type Item = Record;
+
+    fn next(&mut self) -> Option<Record> {
+        loop {
+            let mut reader = match self.reader.take() {
+                Some(reader) => reader,
+                None => self.find()?,
+            };
+            let before = reader.block();
+            if reader.at_end() {
+                // Blocks may be missing here, or recording has rested: it goes on with a snapshot.
+                continue;
+            }
+            let record = if reader.take(1) != 0 {
+                self.reference = Reference::default();
+                Record::Snapshot(Snapshot::read(&mut reader))
+            } else {
+                let inputs = RecordedInputs::read(&mut self.reference, &mut reader);
+                Record::Tick { inputs, check: reader.take(8) as u8 }
+            };
+            self.next += reader.block() - before;
+            if reader.is_damaged() {
+                continue;
+            }
+            self.reader = Some(reader);
+            return Some(record);
+        }
+    }
+}
+
+/// How a tick of a replay compares with the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// What came out is what came out then.
+    Same,
+    /// It is not.
+    Differs,
+    /// What came out may differ, until the next snapshot, and why.
+    Unsure(Unsure),
+}
+
+/// Why a replay may differ from what was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsure {
+    /// Something that went in is not in the log: a long frame, parameters, or more frames than it has room for.
+    Input,
+    /// The arm is not the one of that time.
+    Arm,
+    /// The points of the trajectory of that time are not known.
+    Points,
+    /// There was no snapshot yet.
+    NoSnapshot,
+}
+
+/// A tick of a replay.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Everything that the controller computed.
+    pub telemetry: Telemetry,
+    /// Starts of the device.
+    pub boots: u32,
+    /// What went in; `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
+    pub inputs: Option<RecordedInputs>,
+    /// What came out; `None` alike.
+    pub outputs: Option<Outputs>,
+    /// How it compares.
+    pub outcome: Outcome,
+}
+
+/// Runs a log through a controller, which has the arm of that time and the points of its trajectory.
+pub struct Replay<'a, M> {
+    log: Log<'a>,
+    controller: Controller<M>,
+    /// The last snapshot was restored; `None` before the first.
+    boots: Option<u32>,
+    chain: u32,
+    outcome: Outcome,
+    arm: Option<u64>,
+    points_hash: Option<u32>,
+}
+
+impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
+    /// Of this log, by a controller that has an arm and, in its memory, the points of this hash.
+    pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
+        // In many more parts than an image has.
+        for _ in 0..IMAGE_MAX {
+            controller.hash_arm();
+        }
+        let arm = controller.extensions.hash;
+        let outcome = Outcome::Unsure(Unsure::NoSnapshot);
+        Self { log, controller, boots: None, chain: 0, outcome, arm, points_hash }
+    }
+
+    /// The points of this hash are in memory.
+    fn knows(&self, points_hash: u32) -> bool {
+        self.points_hash == Some(points_hash)
+    }
+
+    /// What a replay from this snapshot on is worth.
+    fn worth(&self, snapshot: &Snapshot) -> Outcome {
+        let Origin { arm, points_hash, .. } = snapshot.origin;
+        if arm != self.arm {
+            Outcome::Unsure(Unsure::Arm)
+        } else if snapshot.needs_points() && !self.knows(points_hash) {
+            Outcome::Unsure(Unsure::Points)
+        } else {
+            Outcome::Same
+        }
+    }
+
+    /// The controller after the last step.
+    pub fn controller(&self) -> &Controller<M> {
+        &self.controller
+    }
+
+    /// What differs in the state stays the same until a snapshot sets it right.
+    fn snapshot(&mut self, snapshot: &Snapshot) -> Option<Step> {
+        let follows = self.boots == Some(snapshot.origin.boots)
+            && self.controller.observed.tick == snapshot.tick()
+            && self.outcome == Outcome::Same;
+        if follows {
+            let (mut recorded, mut replayed) = (Digest::default(), Digest::default());
+            snapshot.dynamic.write(&mut recorded);
+            self.controller.write_state(&mut replayed);
+            self.chain = 0;
+            if recorded == replayed {
+                return None;
+            }
+        }
+        let next =
+            self.boots != Some(snapshot.origin.boots) || self.controller.observed.tick != snapshot.tick();
+        self.controller.restore(snapshot);
+        self.outcome = self.worth(snapshot);
+        (self.boots, self.chain) = (Some(snapshot.origin.boots), 0);
+        let outcome = if follows { Outcome::Differs } else { self.outcome };
+        // A tick that was replayed has been seen already.
+        (next || follows).then(|| self.step(None, None, outcome))
+    }
+
+    fn step(&self, inputs: Option<RecordedInputs>, outputs: Option<Outputs>, outcome: Outcome) -> Step {
+        let (telemetry, boots) = (self.controller.telemetry(), self.boots.unwrap_or(0));
+        Step { telemetry, boots, inputs, outputs, outcome }
+    }
+
+    fn tick(&mut self, recorded: &RecordedInputs, recorded_check: u8) -> Step {
+        let mut bus = [NO_FRAME; FRAMES_MAX];
+        let mut frames = 0;
+        for (slot, frame) in bus.iter_mut().zip(recorded.bus()) {
+            *slot = frame;
+            frames += 1;
+        }
+        let mut host = [NO_EVENT; EVENTS_MAX];
+        for (slot, event) in host.iter_mut().zip(recorded.host()) {
+            *slot = event.event();
+        }
+        let inputs = Inputs {
+            bus: bus.get(..frames).unwrap_or(&[]),
+            bus_state: recorded.bus_state,
+            safety_input: recorded.safety_input,
+            missed_ticks: recorded.missed_ticks,
+            urgent: recorded.urgent,
+            host: host.get(..recorded.host().len()).unwrap_or(&[]),
+            status_free: recorded.status_free,
+        };
+        let outputs = self.controller.tick(&inputs);
+        self.chain = chain(self.chain, &self.controller, &outputs);
+        let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
+        if !recorded.is_whole() {
+            self.outcome = Outcome::Unsure(Unsure::Input);
+        } else if self.outcome == Outcome::Same
+            && !self.knows(self.controller.points_hash())
+            && recorded.host().iter().any(executes)
+        {
+            self.outcome = Outcome::Unsure(Unsure::Points);
+        } else if self.outcome == Outcome::Same && check(self.chain) != u32::from(recorded_check) {
+            self.outcome = Outcome::Differs;
+        }
+        self.step(Some(*recorded), Some(outputs), self.outcome)
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Iterator for Replay<'_, M> {
+    type Item = Step;
+
+    fn next(&mut self) -> Option<Step> {
+        loop {
+            match self.log.next()? {
+                Record::Snapshot(snapshot) => {
+                    if let Some(step) = self.snapshot(&snapshot) {
+                        return Some(step);
+                    }
+                }
+                Record::Tick { inputs, check } => return Some(self.tick(&inputs, check)),
+            }
+        }
+    }
+}
+
+/// Fills the places that hold no frame.
+const NO_FRAME: Frame = match Frame::new(0, &[]) {
+    Some(frame) => frame,
+    None => unreachable!(),
+};
+
+/// Fills the places that hold no event.
+const NO_EVENT: HostEvent<'_> =
+    HostEvent { line: 0, overtaken: false, event: jtc_wire::LinkEvent::Noise(jtc_wire::Response::NONE) };
+
+/// Bits compared by what they come to.
+#[derive(Default, PartialEq)]
+struct Digest {
+    hash: u64,
+    bits: u64,
+}
+
+impl BitSink for Digest {
+    fn put(&mut self, value: u32, bits: u32) {
+        let mixed = (self.hash.rotate_left(5) ^ u64::from(value) ^ u64::from(bits) << 32)
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        (self.hash, self.bits) = (mixed, self.bits + u64::from(bits));
+    }
+}

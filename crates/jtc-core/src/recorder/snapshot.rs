@@ -1,0 +1,278 @@
+//! The state of the controller in a snapshot: all that decides how the arm moves and what is reported of it, without the arm and the
+//! points of the trajectory, which a log names by hash.
+//!
+//! The link's own bookkeeping (records that wait, frames to be sent, how far a long frame has been executed) is no part of it: a replay
+//! gives the same frames on the joint bus and the same states, not the same bytes on the lines.
+use jtc_dynamics::Payload;
+use jtc_wire::RawPoint;
+
+use crate::config::Config;
+use crate::controller::Controller;
+use crate::errors::Errors;
+use crate::execution::phase::Phase;
+use crate::host::overtaking::Overtaking;
+use crate::late::LateTicks;
+use crate::motion::Motion;
+use crate::nodes::Nodes;
+use crate::path::PathClock;
+use crate::received::ReceivedState;
+use crate::remembered::{BitSink, Remembered, remembered};
+use crate::response_queue::HOST_LINES;
+use crate::store::StoreState;
+use crate::telemetry::Observed;
+use crate::{ControllerState, JOINTS, TrajectoryState};
+
+/// Which log, device and arm a snapshot is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Starts of the device.
+    pub boots: u32,
+    /// Hash of the firmware's version and revision (FNV-1a, 64 bits).
+    pub firmware: u64,
+    /// Hash of the arm in use (J-52); `None` where it was not known yet.
+    pub arm: Option<u64>,
+    /// Gains, model and friction polynomial are the built-in ones: these have more digits than the arm image carries.
+    pub built_in: [bool; 3],
+    /// Hash of the points of the trajectory in memory, and how many there are.
+    pub points_hash: u32,
+    /// How many points that is.
+    pub points: u32,
+}
+
+remembered!(Origin { boots, firmware, arm, built_in, points_hash, points });
+
+/// Settings that are no part of the arm.
+#[derive(Clone, Copy, Debug)]
+struct LiveSettings {
+    speed: f64,
+    payload: Payload,
+    absent: [bool; JOINTS],
+    absent_position: [f64; JOINTS],
+}
+
+remembered!(LiveSettings { speed, payload, absent, absent_position });
+remembered!(Payload { mass, com, inertia });
+
+impl LiveSettings {
+    fn of(config: &Config) -> Self {
+        let Config { speed, payload, absent, absent_position, .. } = *config;
+        Self { speed, payload, absent, absent_position }
+    }
+
+    fn put_into(self, config: &mut Config) {
+        let Self { speed, payload, absent, absent_position } = self;
+        (config.speed, config.payload) = (speed, payload);
+        (config.absent, config.absent_position) = (absent, absent_position);
+    }
+}
+
+/// The state itself.
+#[derive(Clone, Debug)]
+pub(crate) struct Dynamic {
+    state: ControllerState,
+    errors: Errors,
+    nodes: Nodes,
+    parameters: ReceivedState,
+    live: LiveSettings,
+    teaching: bool,
+    teaching_waits_ms: u32,
+    pump: bool,
+    store: StoreState,
+    trajectory: TrajectoryState,
+    clock: PathClock,
+    phase: Phase,
+    braking_ms: Option<u16>,
+    motion: Motion,
+    overtaking: [Overtaking; HOST_LINES],
+    late_ticks: LateTicks,
+    observed: Observed,
+    hosts_silent_ms: u32,
+}
+
+remembered!(Dynamic {
+    state,
+    errors,
+    nodes,
+    parameters,
+    live,
+    teaching,
+    teaching_waits_ms,
+    pump,
+    store,
+    trajectory,
+    clock,
+    phase,
+    braking_ms,
+    motion,
+    overtaking,
+    late_ticks,
+    observed,
+    hosts_silent_ms,
+});
+
+/// The controller after a tick, as a log has it.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// What it is of.
+    pub origin: Origin,
+    pub(crate) dynamic: Dynamic,
+}
+
+remembered!(Snapshot { origin, dynamic });
+
+impl Snapshot {
+    /// Ticks since the start of the device.
+    pub fn tick(&self) -> u64 {
+        self.dynamic.observed.tick
+    }
+
+    /// State of the controller.
+    pub fn state(&self) -> ControllerState {
+        self.dynamic.state
+    }
+
+    /// A trajectory is being executed, or is paused.
+    pub fn needs_points(&self) -> bool {
+        matches!(self.dynamic.trajectory, TrajectoryState::Execute | TrajectoryState::Pause)
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// What a snapshot is of.
+    pub(crate) fn origin(&self) -> Origin {
+        let (points_hash, points) = self.store.points_hash();
+        Origin {
+            boots: self.extensions.identity.boots,
+            firmware: self.extensions.firmware_hash,
+            arm: self.extensions.hash,
+            built_in: self.parameters.built_in(),
+            points_hash,
+            points,
+        }
+    }
+
+    /// Appends the state in the order of [`Dynamic`].
+    pub(crate) fn write_state<S: BitSink>(&self, to: &mut S) {
+        // Every field is named: a new one has to be decided upon.
+        let Self {
+            config,
+            state,
+            errors,
+            nodes,
+            parameters,
+            teaching,
+            teaching_waits_ms,
+            pump,
+            store,
+            check: _,
+            violation: _,
+            trajectory,
+            clock,
+            phase,
+            braking_ms,
+            motion,
+            slice_progress: _,
+            overtaking,
+            records: _,
+            since_status_ms: _,
+            late_ticks,
+            status_frame: _,
+            observed,
+            extensions,
+        } = self;
+        state.write(to);
+        errors.write(to);
+        nodes.write(to);
+        parameters.state().write(to);
+        LiveSettings::of(config).write(to);
+        teaching.write(to);
+        teaching_waits_ms.write(to);
+        pump.write(to);
+        store.state().write(to);
+        trajectory.write(to);
+        clock.write(to);
+        phase.write(to);
+        braking_ms.write(to);
+        motion.write(to);
+        overtaking.write(to);
+        late_ticks.write(to);
+        observed.write(to);
+        extensions.hosts_silent_ms.write(to);
+    }
+
+    /// Goes on from a snapshot: this controller has the arm and, where it executes one, the trajectory of that time.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        let Dynamic {
+            state,
+            errors,
+            nodes,
+            parameters,
+            live,
+            teaching,
+            teaching_waits_ms,
+            pump,
+            store,
+            trajectory,
+            clock,
+            phase,
+            braking_ms,
+            motion,
+            overtaking,
+            late_ticks,
+            observed,
+            hosts_silent_ms,
+        } = snapshot.dynamic.clone();
+        (self.state, self.errors, self.nodes) = (state, errors, nodes);
+        live.put_into(&mut self.config);
+        self.parameters.use_built_in(snapshot.origin.built_in);
+        self.parameters.restore(&parameters, &self.config);
+        (self.teaching, self.teaching_waits_ms, self.pump) = (teaching, teaching_waits_ms, pump);
+        self.store.restore(&store);
+        (self.trajectory, self.clock, self.phase) = (trajectory, clock, phase);
+        (self.braking_ms, self.motion) = (braking_ms, motion);
+        (self.overtaking, self.late_ticks, self.observed) = (overtaking, late_ticks, observed);
+        self.extensions.hosts_silent_ms = hosts_silent_ms;
+    }
+
+    /// Hash of the points of a trajectory in memory.
+    pub fn points_hash(&self) -> u32 {
+        self.store.points_hash().0
+    }
+
+    /// Points of a trajectory from number `first` on, in the memory of a controller that replays a log.
+    pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
+        self.store.put_points(first, points);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::boxed::Box;
+
+    use super::*;
+    use crate::remembered::tests::Bits;
+    use crate::settings::{self, TABLE};
+
+    /// What the hash of the arm does not name is in the snapshot, each setting of it.
+    #[test]
+    fn j56_every_setting_that_is_no_part_of_the_arm_is_remembered() {
+        let points = || [RawPoint::default(); 4];
+        for row in TABLE.iter().filter(|row| !row.of_arm()) {
+            for joint in if row.of_joint() { 1..=JOINTS as u8 } else { 0..=0 } {
+                let mut controller = Box::new(Controller::new(Config::avena(), points()));
+                let before = row.get(&controller.config, joint).expect("a value");
+                let value = if before == row.high { row.low } else { row.high };
+                let set = jtc_wire::SettingValue { setting: row.number, joint, value };
+                settings::apply(&mut controller.config, set).expect("a value in its range");
+                let mut bits = Bits::default();
+                controller.origin().write(&mut bits);
+                controller.write_state(&mut bits);
+                let snapshot = Snapshot::read(&mut bits);
+                let mut next = Box::new(Controller::new(Config::avena(), points()));
+                next.restore(&snapshot);
+                assert_eq!(row.get(&next.config, joint), Some(value), "{} {joint}", row.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! What the controller remembers from tick to tick, as bits: written in a snapshot of the flight recorder (J-56), read by a replay.
+//!
+//! [`remembered!`] lists the fields of a type. The list is checked by the compiler: a field that is added to the type and not to the
+//! list does not compile, so that no snapshot lacks it. Reading is total: bits that no snapshot has give some value, and
+//! [`BitSource::is_damaged`] reports it.
+use jtc_bus::{JointReport, NodeState};
+use jtc_wire::{ControllerState, TrajectoryState};
+
+/// Takes bits.
+pub(crate) trait BitSink {
+    /// Appends the lowest `bits` (0 to 32) of `value`, which has none above them.
+    fn put(&mut self, value: u32, bits: u32);
+}
+
+/// Gives bits back in the order in which they were put.
+pub(crate) trait BitSource {
+    /// The next `bits` (0 to 32); zeros past the end.
+    fn take(&mut self, bits: u32) -> u32;
+    /// What was read cannot have been written.
+    fn damage(&mut self);
+    /// More was taken than there is, or something that was never written.
+    fn is_damaged(&self) -> bool;
+}
+
+/// A value that is part of a snapshot.
+pub(crate) trait Remembered: Sized {
+    /// Appends it.
+    fn write<S: BitSink>(&self, to: &mut S);
+    /// The same value again.
+    fn read<S: BitSource>(from: &mut S) -> Self;
+}
+
+/// Makes a structure part of a snapshot: all of its fields, in this order.
+macro_rules! remembered {
+    ($type:ty { $($field:ident),+ $(,)? }) => {
+        impl $crate::remembered::Remembered for $type {
+            fn write<S: $crate::remembered::BitSink>(&self, to: &mut S) {
+                let Self { $($field),+ } = self;
+                $($crate::remembered::Remembered::write($field, to);)+
+            }
+
+            fn read<S: $crate::remembered::BitSource>(from: &mut S) -> Self {
+                $(let $field = $crate::remembered::Remembered::read(from);)+
+                Self { $($field),+ }
+            }
+        }
+    };
+}
+pub(crate) use remembered;
+
+impl Remembered for bool {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        to.put((*self).into(), 1);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        from.take(1) != 0
+    }
+}
+
+macro_rules! whole {
+    ($($type:ty, $bits:literal;)+) => {$(
+        impl Remembered for $type {
+            fn write<S: BitSink>(&self, to: &mut S) {
+                to.put((*self).into(), $bits);
+            }
+
+            fn read<S: BitSource>(from: &mut S) -> Self {
+                from.take($bits) as $type
+            }
+        }
+    )+};
+}
+
+whole! { u8, 8; u16, 16; u32, 32; }
+
+impl Remembered for u64 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        // Many are zero: numbers of joints at rest.
+        to.put((*self != 0).into(), 1);
+        if *self != 0 {
+            to.put(*self as u32, 32);
+            to.put((*self >> 32) as u32, 32);
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        if from.take(1) == 0 {
+            return 0;
+        }
+        let low = from.take(32);
+        u64::from(low) | u64::from(from.take(32)) << 32
+    }
+}
+
+impl Remembered for u128 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        (*self as u64).write(to);
+        ((*self >> 64) as u64).write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let low = u64::read(from);
+        u128::from(low) | u128::from(u64::read(from)) << 64
+    }
+}
+
+impl Remembered for usize {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        // None here is larger.
+        to.put(*self as u32, 32);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        from.take(32) as usize
+    }
+}
+
+impl Remembered for f64 {
+    // Not inlined: a snapshot has hundreds of them.
+    #[inline(never)]
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.to_bits().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        f64::from_bits(u64::read(from))
+    }
+}
+
+impl Remembered for f32 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.to_bits().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        f32::from_bits(u32::read(from))
+    }
+}
+
+impl<A: Remembered, B: Remembered> Remembered for (A, B) {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.0.write(to);
+        self.1.write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let first = A::read(from);
+        (first, B::read(from))
+    }
+}
+
+impl<T: Remembered, const N: usize> Remembered for [T; N] {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        for value in self {
+            value.write(to);
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        core::array::from_fn(|_| T::read(from))
+    }
+}
+
+impl<T: Remembered> Remembered for Option<T> {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.is_some().write(to);
+        if let Some(value) = self {
+            value.write(to);
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        bool::read(from).then(|| T::read(from))
+    }
+}
+
+impl Remembered for NodeState {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.code().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        Self::new(u8::read(from))
+    }
+}
+
+/// A byte of a closed list of codes.
+macro_rules! code {
+    ($($type:ty),+) => {$(
+        impl Remembered for $type {
+            fn write<S: BitSink>(&self, to: &mut S) {
+                (*self as u8).write(to);
+            }
+
+            fn read<S: BitSource>(from: &mut S) -> Self {
+                Self::from_byte(u8::read(from)).unwrap_or_else(|| {
+                    from.damage();
+                    Self::default()
+                })
+            }
+        }
+    )+};
+}
+
+code!(ControllerState, TrajectoryState);
+
+remembered!(JointReport {
+    position,
+    velocity,
+    torque,
+    temperature,
+    state,
+    mc_current,
+    mc_occurred,
+    errors,
+    warnings,
+    motor_temperature,
+});
+
+#[cfg(test)]
+pub(crate) mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Bits in a list of words.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub(crate) struct Bits {
+        words: Vec<u32>,
+        len: usize,
+        at: usize,
+        damaged: bool,
+    }
+
+    impl BitSink for Bits {
+        fn put(&mut self, value: u32, bits: u32) {
+            for bit in 0..bits {
+                if self.len.is_multiple_of(32) {
+                    self.words.push(0);
+                }
+                *self.words.last_mut().unwrap() |= (value >> bit & 1) << (self.len % 32);
+                self.len += 1;
+            }
+        }
+    }
+
+    impl BitSource for Bits {
+        fn take(&mut self, bits: u32) -> u32 {
+            let mut value = 0;
+            for bit in 0..bits {
+                if self.at < self.len {
+                    value |= (self.words[self.at / 32] >> (self.at % 32) & 1) << bit;
+                } else {
+                    self.damaged = true;
+                }
+                self.at += 1;
+            }
+            value
+        }
+
+        fn damage(&mut self) {
+            self.damaged = true;
+        }
+
+        fn is_damaged(&self) -> bool {
+            self.damaged
+        }
+    }
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Mixed {
+        flag: bool,
+        count: u16,
+        value: f64,
+        list: [Option<u8>; 3],
+        history: u128,
+        place: usize,
+        state: ControllerState,
+    }
+
+    remembered!(Mixed { flag, count, value, list, history, place, state });
+
+    proptest! {
+        #[test]
+        fn j56_what_is_remembered_reads_back_bit_for_bit(
+            (flag, count, value) in (any::<bool>(), any::<u16>(), prop_oneof![Just(0.0f64), any::<f64>()]),
+            list in prop::array::uniform3(any::<Option<u8>>()),
+            (history, place, state) in (any::<u128>(), 0..1usize << 20, 0..6usize),
+        ) {
+            let state = ControllerState::ALL[state];
+            let mixed = Mixed { flag, count, value, list, history, place, state };
+            let mut bits = Bits::default();
+            mixed.write(&mut bits);
+            let read = Mixed::read(&mut bits);
+            prop_assert!(!bits.is_damaged() && bits.at == bits.len);
+            prop_assert_eq!(read.value.to_bits(), value.to_bits());
+            prop_assert_eq!(Mixed { value: 0.0, ..read }, Mixed { value: 0.0, ..mixed });
+        }
+    }
+
+    #[test]
+    fn j56_bits_that_were_never_written_are_seen() {
+        let mut bits = Bits::default();
+        bits.put(0xEE, 8);
+        assert_eq!(ControllerState::read(&mut bits), ControllerState::default());
+        assert!(bits.is_damaged());
+        let mut bits = Bits::default();
+        bits.put(1, 1);
+        assert_eq!(f64::read(&mut bits), 0.0);
+        assert!(bits.is_damaged());
+    }
+}

@@ -3,6 +3,7 @@
 
 mod arm;
 mod bench;
+mod log;
 mod maintain;
 mod motion;
 mod offline;
@@ -17,6 +18,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub use arm::{ArmCommand, ImportArgs};
 pub use bench::BenchCommand;
+pub use log::LogCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
@@ -137,6 +139,9 @@ pub enum Command {
     /// Teaching: move the arm by hand
     #[command(subcommand)]
     Teach(TeachCommand),
+    /// The flight recorder: what happened in the seconds before an error
+    #[command(subcommand)]
+    Log(LogCommand),
     /// Clear errors of the controller and all nodes
     #[command(after_help = "Examples:\n  jtc clear\n  jtc clear --occurred")]
     Clear(ClearArgs),

@@ -67,6 +67,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         due
     }
 
+    /// What a JtcStatus would report now, without a record.
+    pub fn current_status(&self) -> Status {
+        self.status(Response::NONE)
+    }
+
     pub(crate) fn status(&self, response: Response) -> Status {
         let (can_current, can_occurred) = self.errors.can();
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());

@@ -40,6 +40,13 @@ pub(crate) struct StoreState {
     hash: u32,
 }
 
+impl StoreState {
+    /// ms between points.
+    pub fn step_ms(&self) -> u16 {
+        self.step_ms
+    }
+}
+
 remembered!(StoreState { received, next_segment, segments, number, step_ms, speeds, held, hash });
 
 /// Begins a hash of points, and mixes a word into it: a multiplication for each, so that copying a segment stays cheap.

@@ -12,6 +12,7 @@ pub mod frame;
 #[cfg(any(test, feature = "fuzzing"))]
 #[doc(hidden)]
 pub mod fuzzing;
+pub mod log;
 pub mod plan;
 pub mod port;
 pub mod recording;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cli_kit::{Failure, Output};
 use jtc_host::words;
-use jtc_wire::{ControllerState, Info, Status, StoreState};
+use jtc_wire::{ControllerState, Info, LogState, Status, StoreState};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -56,6 +56,7 @@ fn as_json(info: &Info) -> Value {
         "lost_records": info.lost_records,
         "defaults": if info.defaults_stored { "stored" } else { "built-in" },
         "memory": info.store.name(),
+        "flight_recorder": info.log.name(),
         "stored_number": (info.store == StoreState::Stored).then_some(info.sequence),
     })
 }
@@ -78,7 +79,8 @@ fn as_text(info: &Info) -> String {
          defaults:  {defaults}; memory: {memory}\n\
          firmware:  {}{revision} on {}, extensions {}\n\
          started:   {}, the last by {}, {} ago\n\
-         records:   {} lost",
+         records:   {} lost\n\
+         recorder:  {}",
         info.arm,
         hash(info.hash),
         list(missing),
@@ -90,7 +92,18 @@ fn as_text(info: &Info) -> String {
         info.boot_cause,
         span(info.uptime_ms / 1000),
         info.lost_records,
+        recorder(info.log),
     )
+}
+
+/// The flight recorder, and what to do where it has stopped.
+fn recorder(state: LogState) -> String {
+    match state {
+        LogState::Error | LogState::Reset => {
+            format!("{state}: jtc log fetch reads it, jtc log clear begins anew")
+        }
+        state => state.to_string(),
+    }
 }
 
 /// A time in the unit that fits.

@@ -12,6 +12,7 @@ mod help;
 mod info;
 mod job;
 mod jog;
+mod log;
 mod maintain;
 mod monitor;
 mod params;
@@ -48,6 +49,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Payload(command) => payload::payload(&command, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),
+        Command::Log(command) => log::log(&command, out),
         Command::Clear(args) => maintain::clear(&args, out),
         Command::Reset(args) => reset::reset(&args, out),
         Command::Gripper(args) => maintain::gripper(&args, out),

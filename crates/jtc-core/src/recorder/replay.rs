@@ -173,6 +173,11 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         }
     }
 
+    /// Hash of the arm that the controller has.
+    pub fn arm(&self) -> Option<u64> {
+        self.arm
+    }
+
     /// The controller after the last step.
     pub fn controller(&self) -> &Controller<M> {
         &self.controller

@@ -131,6 +131,11 @@ impl Snapshot {
         self.dynamic.state
     }
 
+    /// Time since the first point along the path, ms, and ms between points.
+    pub fn path_ms(&self) -> (f64, u16) {
+        (self.dynamic.clock.time, self.dynamic.store.step_ms())
+    }
+
     /// A trajectory is being executed, or is paused.
     pub fn needs_points(&self) -> bool {
         matches!(self.dynamic.trajectory, TrajectoryState::Execute | TrajectoryState::Pause)

@@ -21,6 +21,8 @@ const STATES_TOPIC: &str = "/joint_states";
 const COMMANDS_TOPIC: &str = "/joint_commands";
 const CONTROL_TOPIC: &str = "/jtc/control";
 const STATE_TOPIC: &str = "/jtc/state";
+/// A log of a flight recorder as it was fetched (J-56).
+const LOG_TOPIC: &str = "/jtc/log";
 
 impl From<McapError> for RecordingError {
     fn from(e: McapError) -> Self {
@@ -67,6 +69,39 @@ impl<W: Write + Seek> McapWriter<W> {
             sequence: 0,
             cdr: Encoder::default(),
         })
+    }
+}
+
+impl<W: Write + Seek> McapWriter<W> {
+    /// A log of a flight recorder, as one message.
+    pub(super) fn write_log(&mut self, log: &[u8]) -> Result<(), RecordingError> {
+        let channel = self.out.add_channel(0, LOG_TOPIC, "openjtc", &BTreeMap::new())?;
+        let header = MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: self.start_ns,
+            publish_time: self.start_ns,
+        };
+        Ok(self.out.write_to_known_channel(&header, log)?)
+    }
+}
+
+/// The log of a flight recorder in a file; none in a recording of something else.
+pub(super) fn read_log(bytes: &[u8]) -> Result<Option<Vec<u8>>, RecordingError> {
+    let (mut channel, mut log) = (None, None);
+    let read = each_record(bytes, |record| {
+        match record {
+            records::Record::Channel(found) if found.topic == LOG_TOPIC => channel = Some(found.id),
+            records::Record::Message { header, data } if Some(header.channel_id) == channel => {
+                log = Some(data.into_owned());
+            }
+            _ => {}
+        }
+        Ok::<_, RecordingError>(())
+    });
+    match (read, log) {
+        (Err(error), None) => Err(error),
+        (_, log) => Ok(log),
     }
 }
 
@@ -173,6 +208,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
             records::Record::Message { header, data } => {
                 let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
                 let topic = topics.get(&header.channel_id).ok_or(unknown)?;
+                if topic == LOG_TOPIC {
+                    return Ok(());
+                }
                 let (sample, came) = samples.entry(header.log_time).or_default();
                 decode(topic, &data, sample).ok_or_else(|| RecordingError::Message {
                     path: PathBuf::new(),

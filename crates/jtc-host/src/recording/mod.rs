@@ -167,6 +167,51 @@ pub fn write_into(
     Recorder::on(file, path, info)?.finish_with(samples)
 }
 
+/// Writes a whole recording and the log of a flight recorder that it was made of, into an MCAP file that is open already.
+///
+/// # Errors
+///
+/// A file that cannot be written, or a program that was built without MCAP.
+pub fn write_with_log(
+    file: File,
+    path: &Path,
+    info: &RecordingInfo,
+    samples: &[Sample],
+    log: &[u8],
+) -> Result<(), RecordingError> {
+    #[cfg(feature = "mcap")]
+    {
+        let write = || {
+            let mut writer = Box::new(mcap::McapWriter::new(BufWriter::new(file), info)?);
+            samples.iter().try_for_each(|sample| writer.write(sample))?;
+            writer.write_log(log)?;
+            writer.finish()
+        };
+        write().map_err(|e| e.at(path))
+    }
+    #[cfg(not(feature = "mcap"))]
+    {
+        let _ = (file, info, samples, log);
+        Err(RecordingError::BuiltWithout { path: path.to_owned() })
+    }
+}
+
+/// The log of a flight recorder in an MCAP file; none in a recording of something else.
+///
+/// # Errors
+///
+/// A file that cannot be read.
+pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
+    if Format::of(path)? != Format::Mcap {
+        return Ok(None);
+    }
+    let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
+    #[cfg(feature = "mcap")]
+    return mcap::read_log(&bytes).map_err(|e| e.at(path));
+    #[cfg(not(feature = "mcap"))]
+    return Ok(bytes.is_empty().then_some(bytes));
+}
+
 /// A recording that was read back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {

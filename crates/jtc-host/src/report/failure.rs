@@ -56,6 +56,9 @@ pub struct RunFailure {
     pub within_ms: f64,
     /// Values around it.
     pub moments: Vec<Moment>,
+    /// It is of a log, whose times are those of the device: s since its start.
+    #[serde(skip)]
+    pub in_log: bool,
 }
 
 impl RunFailure {
@@ -92,6 +95,21 @@ impl RunFailure {
         Some(Self::ended_by(info, samples, reason))
     }
 
+    /// The first error of a log: at the sample of `time_s`, of what, and of which joint.
+    pub fn in_log(
+        info: &RecordingInfo,
+        samples: &[Sample],
+        time_s: f64,
+        causes: Vec<String>,
+        joint: Option<Joint>,
+    ) -> Self {
+        let at = samples.iter().position(|sample| sample.time_s >= time_s).unwrap_or(samples.len());
+        Self {
+            in_log: true,
+            ..Self::at(info, samples, at.min(samples.len().saturating_sub(1)), causes, joint)
+        }
+    }
+
     /// A run that ended without an error in its samples: at the last of them, for the reason given.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
         Self::at(info, samples, samples.len().saturating_sub(1), vec![reason], None)
@@ -106,6 +124,9 @@ impl RunFailure {
     /// The run failed here, of what: one line.
     pub fn headline(&self) -> String {
         let cause = self.causes.first().map_or("an error without a name", String::as_str);
+        if self.in_log {
+            return format!("FIRST, {:.3} s after the start of the device: {cause}", self.time_s);
+        }
         format!("FAILED {:.0} ms into the run: {cause}", self.at_ms)
     }
 
@@ -146,7 +167,7 @@ impl RunFailure {
                 .collect(),
         };
         let within_ms = (time(at) - time(at.saturating_sub(1))) * 1e3;
-        Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments }
+        Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments, in_log: false }
     }
 
     /// The table's head: words, then figures with their units.

@@ -69,7 +69,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Sends an extension request; an error when it is refused or not known.
-    fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
+    pub(super) fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         let request = frame_type(type_byte(frame));
         if self.extensions == Extensions::None {
             return Err(LinkError::NoExtension { request });
@@ -89,7 +89,11 @@ impl<P: Port> Session<P> {
     }
 
     /// Sends an extension request and waits for what it returns.
-    fn ask<T>(&mut self, frame: &[u8], take: impl Fn(Answer<'_>) -> Option<T>) -> Result<T, LinkError> {
+    pub(super) fn ask<T>(
+        &mut self,
+        frame: &[u8],
+        take: impl Fn(Answer<'_>) -> Option<T>,
+    ) -> Result<T, LinkError> {
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;

@@ -7,6 +7,7 @@ mod bench;
 mod commands;
 mod extension;
 mod follow;
+mod log;
 mod params;
 mod payload;
 mod recover;
@@ -24,6 +25,7 @@ use jtc_wire::{
 
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
+pub use log::LogStatus;
 pub use params::PushReport;
 pub use recover::{ParameterSource, RecoverStep};
 pub use run::Run;

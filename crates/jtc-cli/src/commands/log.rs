@@ -1,0 +1,252 @@
+//! `jtc log`: the flight recorder, what it holds, and running it again.
+
+use std::path::Path;
+
+use cli_kit::{ErrorKind, Failure, Output, OutputFile};
+use jtc_host::arm::Arm;
+use jtc_host::log::{FlightLog, Replayed, Story, Tick};
+use jtc_host::recording::{Ending, Format, RecordingInfo, write_with_log};
+use jtc_host::report::{Facts, ReportInput, RunFailure, html};
+use jtc_wire::{Hash, LogState};
+use serde_json::{Value, json};
+
+use super::info::hash;
+use super::run_report;
+use crate::args::{LinkArgs, LogCommand};
+use crate::failure::output_lost;
+
+/// Does one of the commands.
+pub fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
+    match command {
+        LogCommand::Fetch { out: file, report, arm, force, link } => {
+            let files = Files::open(file.as_deref(), report.as_deref(), arm.as_deref(), force.force)?;
+            fetch(files, arm.as_deref(), link, out)
+        }
+        LogCommand::Clear { link } => clear(link, out),
+        LogCommand::Replay { file, arm } => replay(file, arm.as_deref(), out),
+    }
+}
+
+/// What is written, opened before anything else is done.
+struct Files {
+    recording: Option<OutputFile>,
+    report: Option<OutputFile>,
+}
+
+impl Files {
+    fn open(
+        file: Option<&Path>,
+        report: Option<&Path>,
+        arm: Option<&Path>,
+        force: bool,
+    ) -> Result<Self, Failure> {
+        if let Some(file) = file
+            && Format::of(file)? != Format::Mcap
+        {
+            let message = format!("{}: a log is written as an .mcap file", file.display());
+            return Err(Failure::usage(message));
+        }
+        let inputs: Vec<&Path> = arm.into_iter().collect();
+        let recording = file.map(|file| OutputFile::open(file, force, &inputs)).transpose()?;
+        let others: Vec<&Path> = inputs.into_iter().chain(file).collect();
+        let report = report.map(|page| OutputFile::open(page, force, &others)).transpose()?;
+        Ok(Self { recording, report })
+    }
+}
+
+/// A log, and what it says.
+struct Read {
+    log: FlightLog,
+    replayed: Replayed,
+    story: Story,
+    info: RecordingInfo,
+    failure: Option<RunFailure>,
+}
+
+impl Read {
+    fn new(log: FlightLog, arm: Option<&Path>, source: &str) -> Result<Self, Failure> {
+        let other = arm.map(Arm::load).transpose()?;
+        let image = match &other {
+            None => None,
+            Some(arm) => Some(arm.image().map_err(Failure::usage)?.ok_or_else(|| {
+                Failure::usage(format!("{}: gains or friction are missing; name a whole arm file", arm.name))
+            })?),
+        };
+        let replayed = log.replay(image.as_deref());
+        let story = Story::of(&replayed);
+        let arm = other.or_else(|| Arm::from_image(&log.arm).ok()).unwrap_or_else(Arm::avena);
+        let mut info = run_report::info(&arm, source, "flight recorder", 0);
+        let failure = story.failure(&info, &replayed.samples());
+        if let Some(failure) = &failure {
+            info.ending = Ending { outcome: "fault".into(), reason: failure.causes.join(", ") };
+        }
+        Ok(Self { log, replayed, story, info, failure })
+    }
+
+    fn as_json(&self) -> Value {
+        let Self { log, replayed, story, .. } = self;
+        let time = |tick: Option<&Tick>| tick.map(|tick| tick.sample.time_s);
+        json!({
+            "state": log.state.name(),
+            "device": log.device,
+            "arm": self.info.arm,
+            "hash": hash(Hash::of_image(&log.arm)),
+            "ticks": replayed.ticks.len(),
+            "from_s": time(replayed.ticks.first()),
+            "to_s": time(replayed.ticks.last()),
+            "replayed": replayed.same,
+            "unsure": replayed.unsure,
+            "other_arm": replayed.other_arm,
+            "other_trajectory": replayed.other_points,
+            "difference": replayed.difference,
+            "gaps": replayed.gaps,
+            "first": story.first.map(|first| &story.events[first]),
+            "events": story.events,
+        })
+    }
+
+    /// How much of it was replayed: a line, and one for each reason why not all.
+    fn extent(&self) -> Vec<String> {
+        let replayed = &self.replayed;
+        let verdict = match &replayed.difference {
+            None => "no difference".to_owned(),
+            Some(difference) => format!(
+                "the first that differs is {} ({:.3} s), state {}: the replay gives {}",
+                difference.tick,
+                difference.tick as f64 * 1e-3,
+                difference.state,
+                difference.replayed
+            ),
+        };
+        let mut lines =
+            vec![format!("{} ticks, {} replayed, {verdict}", replayed.ticks.len(), replayed.same)];
+        if replayed.unsure > 0 {
+            lines.push(format!(
+                "{} ticks behind a frame that is not in the log (too long, or parameters): they may differ from what was",
+                replayed.unsure
+            ));
+        }
+        if replayed.other_arm > 0 {
+            let arms: Vec<String> = replayed.arms.iter().map(|arm| hash(*arm)).collect();
+            lines.push(format!(
+                "{} ticks are of an arm with hash {}, the one at hand has {}: only what was measured is known of them\n\
+                 next: name the file of that arm with --arm FILE",
+                replayed.other_arm,
+                arms.join(", "),
+                hash(Hash::of_image(&self.log.arm)),
+            ));
+        }
+        if replayed.other_points > 0 {
+            lines.push(format!(
+                "{} ticks are along a trajectory that is not in the controller any more: only what was measured is known of them",
+                replayed.other_points
+            ));
+        }
+        lines
+    }
+
+    fn text(&self) -> String {
+        let mut lines = self.story.lines();
+        lines.push(String::new());
+        lines.extend(self.extent());
+        lines.join("\n")
+    }
+
+    /// What happened, as a table of the page.
+    fn facts(&self) -> Vec<Facts> {
+        let rows =
+            self.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));
+        let about = [
+            ("device".to_owned(), self.log.device.clone()),
+            ("flight recorder".to_owned(), self.log.state.to_string()),
+            ("replay".to_owned(), self.extent().join("; ")),
+        ];
+        vec![
+            Facts { title: "What happened".into(), rows: rows.collect() },
+            Facts { title: "Log".into(), rows: about.to_vec() },
+        ]
+    }
+
+    fn write(&self, files: Files) -> Result<Vec<String>, Failure> {
+        let samples = self.replayed.samples();
+        let mut names = Vec::new();
+        if let Some(mut file) = files.recording {
+            let open = file.begin().map_err(output_lost)?;
+            write_with_log(open, file.path(), &self.info, &samples, &self.log.to_bytes())
+                .map_err(output_lost)?;
+            names.push(file.name());
+            file.is_written();
+        }
+        if let Some(page) = files.report {
+            names.push(page.name());
+            let facts = self.facts();
+            let input = ReportInput {
+                info: &self.info,
+                samples: &samples,
+                facts: &facts,
+                failure: self.failure.as_ref(),
+            };
+            page.write(html(&input)).map_err(output_lost)?;
+        }
+        Ok(names)
+    }
+}
+
+fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut session = link.session()?;
+    let mut bar = None;
+    let log = session.fetch_log(|here, all| {
+        let bar = bar.get_or_insert_with(|| out.bytes_bar(all as u64, "flight recorder"));
+        bar.set_length(all as u64);
+        bar.set_position(here as u64);
+    })?;
+    if let Some(bar) = bar {
+        bar.finish();
+    }
+    let read = Read::new(log, arm, &link.name()?)?;
+    if read.replayed.ticks.is_empty() {
+        let message =
+            "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
+        let failure = Failure::new(ErrorKind::Device, "empty-log", message);
+        return Err(failure.hint("`jtc log fetch` again after a second"));
+    }
+    let names = read.write(files)?;
+    let mut value = read.as_json();
+    value["files"] = json!(names);
+    out.result(&value, || {
+        let mut text = read.text();
+        for name in &names {
+            text += &format!("\n{name}");
+        }
+        match read.log.state {
+            LogState::Error | LogState::Reset => {
+                text + "\nthe recorder has stopped and keeps this log; next: jtc log clear, then jtc recover"
+            }
+            _ => text + "\nthe recorder goes on recording",
+        }
+    });
+    Ok(())
+}
+
+fn clear(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut session = link.session()?;
+    let before = session.log_status()?.state;
+    session.clear_log()?;
+    out.result(&json!({ "cleared": true, "before": before.name() }), || {
+        "the log is cleared; the flight recorder records anew".to_owned()
+    });
+    Ok(())
+}
+
+fn replay(file: &Path, arm: Option<&Path>, out: &Output) -> Result<(), Failure> {
+    let log = FlightLog::load(file)?;
+    let read = Read::new(log, arm, &file.display().to_string())?;
+    let fails = read.replayed.difference.is_some() || read.replayed.same == 0;
+    out.result(&read.as_json(), || {
+        let mut lines = read.extent();
+        lines.push(String::new());
+        lines.extend(read.story.lines());
+        lines.join("\n")
+    });
+    if fails { Err(Failure::printed(ErrorKind::Refused)) } else { Ok(()) }
+}

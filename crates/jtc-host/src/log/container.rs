@@ -1,0 +1,114 @@
+//! A log as bytes: what a recording carries of it, so that it can be replayed from the file.
+
+use std::path::{Path, PathBuf};
+
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use jtc_core::recorder::Block;
+use jtc_wire::{LogState, POINT_LEN, RawPoint};
+
+use super::{FlightLog, blocks_of};
+use crate::recording::{self, RecordingError};
+
+/// First bytes, with the version.
+const MAGIC: &[u8; 8] = b"JTCLOG\0\x01";
+
+/// What the parts are.
+mod part {
+    pub const STATE: u8 = 1;
+    pub const BLOCKS: u8 = 2;
+    pub const ARM: u8 = 3;
+    pub const FIRST_POINT: u8 = 4;
+    pub const POINTS: u8 = 5;
+    pub const POINTS_HASH: u8 = 6;
+    pub const DEVICE: u8 = 7;
+}
+
+/// Why a file gives no log.
+#[derive(Debug, thiserror::Error)]
+pub enum LogFileError {
+    /// It cannot be read, or is no recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// It is a recording of something else.
+    #[error("{}: it holds no log of a flight recorder", path.display())]
+    NoLog {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Diagnose for LogFileError {
+    fn diagnosis(&self) -> Diagnosis {
+        match self {
+            Self::Recording(error) => error.diagnosis(),
+            Self::NoLog { .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "no-log",
+                "`jtc log fetch -o FILE.mcap` writes one; `jtc report FILE` shows any recording",
+            ),
+        }
+    }
+}
+
+impl FlightLog {
+    /// As bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        let mut put = |kind: u8, data: &[u8]| {
+            bytes.push(kind);
+            bytes.extend((data.len() as u32).to_be_bytes());
+            bytes.extend(data);
+        };
+        put(part::STATE, &[self.state as u8]);
+        let words: Vec<u8> = self.blocks.iter().flatten().flat_map(|word| word.to_le_bytes()).collect();
+        put(part::BLOCKS, &words);
+        put(part::ARM, &self.arm);
+        put(part::FIRST_POINT, &(self.first_point as u32).to_be_bytes());
+        let points: Vec<u8> = self.points.iter().flat_map(RawPoint::emit).collect();
+        put(part::POINTS, &points);
+        put(part::POINTS_HASH, &self.points_hash.to_be_bytes());
+        put(part::DEVICE, self.device.as_bytes());
+        bytes
+    }
+
+    /// From a file that `jtc log fetch` wrote.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or that holds no log.
+    pub fn load(path: &Path) -> Result<Self, LogFileError> {
+        let bytes = recording::read_log(path)?;
+        let log = bytes.as_deref().and_then(Self::from_bytes);
+        log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
+    }
+
+    /// From bytes; what a later version adds is passed over. `None` when they are no log.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut rest = bytes.strip_prefix(MAGIC)?;
+        let mut log = Self::default();
+        while let Some((head, after)) = rest.split_first_chunk::<5>() {
+            let [kind, a, b, c, d] = *head;
+            let len = u32::from_be_bytes([a, b, c, d]) as usize;
+            let data = after.get(..len)?;
+            rest = &after[len..];
+            let number = || data.first_chunk().map(|bytes| u32::from_be_bytes(*bytes));
+            match kind {
+                part::STATE => log.state = LogState::from_byte(*data.first()?)?,
+                part::BLOCKS => log.blocks = blocks(data),
+                part::ARM => log.arm = data.to_vec(),
+                part::FIRST_POINT => log.first_point = number()? as usize,
+                part::POINTS => {
+                    log.points = data.as_chunks::<POINT_LEN>().0.iter().map(RawPoint::parse).collect();
+                }
+                part::POINTS_HASH => log.points_hash = number()?,
+                part::DEVICE => log.device = String::from_utf8_lossy(data).into_owned(),
+                _ => {}
+            }
+        }
+        rest.is_empty().then_some(log)
+    }
+}
+
+fn blocks(data: &[u8]) -> Vec<Block> {
+    blocks_of(data)
+}

@@ -1,0 +1,192 @@
+//! A log run through the controller again.
+
+use jtc_bus::{Answer, Scale};
+use jtc_core::recorder::{Outcome, Record, RecordedInputs, Replay, Step, Unsure};
+use jtc_core::{Config, Controller, JOINTS, POINTS_MAX};
+use jtc_wire::{Code, RawPoint, Status};
+use serde::Serialize;
+
+use super::FlightLog;
+use crate::sample::{JointSample, Sample};
+
+/// What a tick of a replay is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Worth {
+    /// What was, bit for bit.
+    Same,
+    /// The controller did something else then.
+    Differs,
+    /// Computed without something that went in: up to the next snapshot it may differ. What was measured is what was measured.
+    Unsure,
+    /// Not computed, for want of the arm or the trajectory of that time: what was measured, and nothing else.
+    Measured,
+}
+
+/// A tick of a log.
+#[derive(Clone, Debug)]
+pub struct Tick {
+    /// Ticks since the start of the device.
+    pub tick: u64,
+    /// Starts of the device.
+    pub boots: u32,
+    /// The values; time is that of `tick`.
+    pub sample: Sample,
+    /// What a status would have reported, with the errors of the drives; as far as it was computed.
+    pub status: Status,
+    /// What went in; none for the state at a snapshot.
+    pub inputs: Option<RecordedInputs>,
+    /// What it is worth.
+    pub worth: Worth,
+}
+
+/// Ticks that are not in a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Gap {
+    /// The tick before it.
+    pub after: u64,
+    /// The tick behind it.
+    pub before: u64,
+}
+
+/// The first tick that differs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// Ticks since the start of the device.
+    pub tick: u64,
+    /// State of the controller in the replay.
+    pub state: &'static str,
+    /// What the replay computes, and the log does not have.
+    pub replayed: String,
+}
+
+/// A log that was replayed.
+#[derive(Clone, Debug, Default)]
+pub struct Replayed {
+    /// In order.
+    pub ticks: Vec<Tick>,
+    /// Of a controller with the arm of the log.
+    pub config: Option<Box<Config>>,
+    /// Ticks that are known to be what was.
+    pub same: usize,
+    /// The first that is not.
+    pub difference: Option<Difference>,
+    /// Ticks that were computed without something that went in.
+    pub unsure: usize,
+    /// Ticks of another arm than the one at hand.
+    pub other_arm: usize,
+    /// Ticks along a trajectory that is not at hand.
+    pub other_points: usize,
+    /// Where ticks are missing.
+    pub gaps: Vec<Gap>,
+    /// Hashes of arms in the log that are not the one at hand.
+    pub arms: Vec<u64>,
+}
+
+impl FlightLog {
+    /// A controller with the arm of the log, and the points that came with it.
+    fn controller(&self, arm: &[u8]) -> Controller<Vec<RawPoint>> {
+        let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
+        controller.load_arm(arm);
+        controller.put_points(self.first_point, &self.points);
+        controller
+    }
+
+    /// Runs the log through the controller; `arm`: the image of another arm than the one that came with the log.
+    pub fn replay(&self, arm: Option<&[u8]>) -> Replayed {
+        let controller = self.controller(arm.unwrap_or(&self.arm));
+        let points = (!self.points.is_empty()).then_some(self.points_hash);
+        let mut replayed =
+            Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
+        let mut replay = Replay::new(self.log(), controller, points);
+        let own = replay.arm();
+        while let Some(step) = replay.next() {
+            let tick = tick(&step, &replay);
+            replayed.take(&step, tick);
+        }
+        for record in self.log() {
+            if let Record::Snapshot(snapshot) = record
+                && let Some(hash) = snapshot.origin.arm
+                && Some(hash) != own
+                && !replayed.arms.contains(&hash)
+            {
+                replayed.arms.push(hash);
+            }
+        }
+        replayed
+    }
+}
+
+impl Replayed {
+    fn take(&mut self, step: &Step, tick: Tick) {
+        match step.outcome {
+            Outcome::Same => self.same += 1,
+            Outcome::Differs => {}
+            Outcome::Unsure(Unsure::Arm) => self.other_arm += 1,
+            Outcome::Unsure(Unsure::Points) => self.other_points += 1,
+            Outcome::Unsure(_) => self.unsure += 1,
+        }
+        if step.outcome == Outcome::Differs && self.difference.is_none() {
+            self.difference = Some(difference(step));
+        }
+        if let Some(last) = self.ticks.last()
+            && (tick.boots != last.boots || tick.tick != last.tick + 1)
+        {
+            self.gaps.push(Gap { after: last.tick, before: tick.tick });
+        }
+        self.ticks.push(tick);
+    }
+
+    /// Its samples.
+    pub fn samples(&self) -> Vec<Sample> {
+        self.ticks.iter().map(|tick| tick.sample).collect()
+    }
+}
+
+fn difference(step: &Step) -> Difference {
+    let what = match (&step.outputs, step.telemetry.errors) {
+        (None, _) => "another state of the controller".to_owned(),
+        (Some(outputs), errors) => {
+            let frame = outputs.bus.map_or("no frame".to_owned(), |frame| frame.to_string());
+            format!("{frame}; errors {errors:#06x}, trajectory {}", step.telemetry.trajectory)
+        }
+    };
+    Difference { tick: step.telemetry.tick, state: step.telemetry.state.name(), replayed: what }
+}
+
+fn tick(step: &Step, replay: &Replay<'_, Vec<RawPoint>>) -> Tick {
+    let status = replay.controller().current_status();
+    let worth = match step.outcome {
+        Outcome::Same => Worth::Same,
+        Outcome::Differs => Worth::Differs,
+        Outcome::Unsure(Unsure::Arm | Unsure::Points) => Worth::Measured,
+        Outcome::Unsure(_) => Worth::Unsure,
+    };
+    let mut sample = Sample { can_current: status.can_current, ..Sample::from(&step.telemetry) };
+    if worth == Worth::Measured {
+        sample = measured(&sample, step.inputs.as_ref(), replay.controller().config());
+    }
+    Tick { tick: step.telemetry.tick, boots: step.boots, sample, status, inputs: step.inputs, worth }
+}
+
+/// What the answers of the drives say by themselves.
+fn measured(sample: &Sample, inputs: Option<&RecordedInputs>, config: &Config) -> Sample {
+    let mut joints = [JointSample::UNKNOWN; JOINTS];
+    let scale = Scale { velocity: config.velocity_full_scale };
+    for frame in inputs.iter().flat_map(|inputs| inputs.bus()) {
+        if let Ok(Answer::Joint { node, report }) = Answer::parse(&frame, scale)
+            && let Some(joint) = joints.get_mut(usize::from(node))
+        {
+            *joint = JointSample {
+                position: report.position,
+                velocity: report.velocity,
+                torque: report.torque,
+                temperature: f64::from(report.temperature),
+                state: report.state,
+                ..JointSample::UNKNOWN
+            };
+        }
+    }
+    let unknown = u8::MAX;
+    Sample { state: Code::new(unknown), trajectory: Code::new(unknown), errors: 0, joints, ..*sample }
+}

@@ -1,0 +1,301 @@
+//! What happened in a log, in order, what broke first in front.
+
+use std::fmt::Write;
+
+use jtc_core::Config;
+use jtc_core::recorder::RecordedKind;
+use jtc_wire::{Code, FrameType, Joint, Status, TrajectoryState, UrgentCommand, error, joint_error};
+use serde::Serialize;
+
+use super::replay::{Replayed, Tick, Worth};
+use crate::recording::RecordingInfo;
+use crate::report::RunFailure;
+use crate::sample::{JointSample, Sample};
+use crate::words;
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// Ticks since the start of the device.
+    pub tick: u64,
+    /// The same, s.
+    pub time_s: f64,
+    /// What.
+    pub text: String,
+    /// An error begins here.
+    pub error: bool,
+    /// Of this joint.
+    pub joint: Option<Joint>,
+}
+
+/// What happened.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Story {
+    /// In order.
+    pub events: Vec<Event>,
+    /// What broke first: one of the events; none in a log without an error.
+    pub first: Option<usize>,
+}
+
+impl Story {
+    /// Of a log that was replayed.
+    pub fn of(log: &Replayed) -> Self {
+        let mut events = Vec::new();
+        let mut teller = Teller { config: log.config.as_deref(), events: &mut events, silent: [0; 6] };
+        let mut last: Option<&Tick> = None;
+        for tick in &log.ticks {
+            if let Some(last) = last {
+                teller.between(last, tick);
+            } else {
+                teller.begin(tick);
+            }
+            last = Some(tick);
+        }
+        let first = events.iter().position(|event| event.error);
+        Self { events, first }
+    }
+
+    /// The first error and what came with it, for a report.
+    pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
+        let first = self.events.get(self.first?)?;
+        let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
+        let causes = with.map(|event| event.text.clone()).collect();
+        Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joint))
+    }
+
+    /// The first error and what followed, each with its time after it; then what had come before.
+    pub fn lines(&self) -> Vec<String> {
+        let Some(first) = self.first else {
+            return self
+                .events
+                .iter()
+                .map(|event| format!("{:.3} s: {}", event.time_s, event.text))
+                .collect();
+        };
+        let at = &self.events[first];
+        let mut lines = vec![format!("first: {:.3} s: {}", at.time_s, at.text)];
+        for event in &self.events[first + 1..] {
+            lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
+        }
+        if first > 0 {
+            lines.push("before it:".to_owned());
+        }
+        for event in &self.events[..first] {
+            lines.push(format!("{} before: {}", span(at.tick - event.tick), event.text));
+        }
+        lines
+    }
+}
+
+fn span(ms: u64) -> String {
+    if ms < 1_000 { format!("{ms} ms") } else { format!("{:.3} s", ms as f64 * 1e-3) }
+}
+
+fn after(ms: u64) -> String {
+    if ms == 0 { "in the same tick".to_owned() } else { format!("{} later", span(ms)) }
+}
+
+/// Ticks without an answer of a joint before it is worth a word.
+const SILENT: u32 = 3;
+
+struct Teller<'a> {
+    config: Option<&'a Config>,
+    events: &'a mut Vec<Event>,
+    /// Ticks for which each joint has not answered.
+    silent: [u32; 6],
+}
+
+impl Teller<'_> {
+    fn push(&mut self, tick: &Tick, error: bool, text: impl Into<String>) {
+        let time_s = tick.tick as f64 * 1e-3;
+        self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joint: None });
+    }
+
+    fn joint_fails(&mut self, tick: &Tick, joint: Joint, text: String) {
+        self.push(tick, true, text);
+        if let Some(event) = self.events.last_mut() {
+            event.joint = Some(joint);
+        }
+    }
+
+    fn begin(&mut self, tick: &Tick) {
+        if tick.worth == Worth::Measured {
+            return self.push(tick, false, "the log begins");
+        }
+        let s = &tick.sample;
+        let mut text =
+            format!("the log begins: state {}, trajectory {}", s.state.name(), s.trajectory.name());
+        if s.errors != 0 {
+            let _ = write!(text, "; {}", words::errors_line(&tick.status));
+        }
+        self.push(tick, false, text);
+    }
+
+    fn between(&mut self, last: &Tick, tick: &Tick) {
+        if tick.boots != last.boots {
+            self.push(tick, false, format!("start number {} of the device", tick.boots));
+        } else if tick.tick > last.tick + 1 {
+            let missing = tick.tick - last.tick - 1;
+            self.push(tick, false, format!("{missing} ticks before this one are not in the log"));
+        }
+        self.inputs(tick);
+        let known = |tick: &Tick| tick.worth != Worth::Measured;
+        if known(tick) && known(last) {
+            self.errors(last, tick);
+            self.states(last, tick);
+        }
+    }
+
+    /// What went in.
+    fn inputs(&mut self, tick: &Tick) {
+        let Some(inputs) = &tick.inputs else { return };
+        let mut answered = [false; 6];
+        for frame in inputs.bus() {
+            if let Some(joint) = frame.id.checked_sub(jtc_bus::id::MOVE_ANSWER)
+                && let Some(answered) = answered.get_mut(usize::from(joint))
+            {
+                *answered = true;
+            }
+        }
+        for (joint, answered) in Joint::ALL.into_iter().zip(answered) {
+            let silent = &mut self.silent[joint.index()];
+            let before = std::mem::replace(silent, if answered { 0 } else { *silent + 1 });
+            if answered && before >= SILENT {
+                self.push(tick, false, format!("{joint} answers again, after {before} ticks"));
+            } else if before + 1 == SILENT && !answered {
+                self.push(tick, false, format!("{joint} has not answered for {SILENT} ticks"));
+            }
+        }
+        if inputs.missed_ticks > 0 {
+            self.push(tick, false, format!("{} ticks late or missing before this one", inputs.missed_ticks));
+        }
+        for commands in &inputs.urgent {
+            for (command, _) in commands.iter() {
+                let name = if command == UrgentCommand::Stop { "stop" } else { "pause" };
+                self.push(tick, false, format!("a host sends: {name}"));
+            }
+        }
+        for event in inputs.host() {
+            match (event.kind, FrameType::from_byte(event.frame_type)) {
+                (RecordedKind::Bad(status), _) => {
+                    self.push(tick, false, format!("a bad frame of a host: {}", words::frame_status(status)));
+                }
+                (RecordedKind::Noise(_), _) | (_, None) => {}
+                // Requests that change nothing are no event.
+                (_, Some(kind)) if kind.is_extension() && kind < FrameType::SetSettings => {}
+                (_, Some(FrameType::GetArm | FrameType::GetLog | FrameType::GetPoints)) => {}
+                (_, Some(kind)) => self.push(tick, false, format!("a host sends: {}", words::request(kind))),
+            }
+        }
+    }
+
+    /// Errors that begin.
+    fn errors(&mut self, last: &Tick, tick: &Tick) {
+        for joint in Joint::ALL {
+            let bits =
+                tick.sample.joints[joint.index()].internal & !last.sample.joints[joint.index()].internal;
+            for bit in (0..16).map(|n| 1 << n).filter(|bit| bits & bit != 0) {
+                let text = self.joint_error(joint, bit, last, tick);
+                self.joint_fails(tick, joint, text);
+            }
+        }
+        let new = Status {
+            errors: tick.status.errors & !last.status.errors & error::EMERGENCY_INPUT,
+            can_current: tick.status.can_current & !last.status.can_current,
+            ..Status::default()
+        };
+        for cause in words::can_flags(new.can_current).into_iter().chain(emergency(new.errors)) {
+            self.push(tick, true, cause);
+        }
+        for joint in Joint::ALL {
+            let (before, now) = (&last.status.joints[joint.index()], &tick.status.joints[joint.index()]);
+            let faults = words::motor_faults(now.mc_current & !before.mc_current).into_iter();
+            let drive = words::node_errors(now.errors & !before.errors).into_iter();
+            for word in faults.chain(drive) {
+                self.joint_fails(tick, joint, format!("{joint}: {word}"));
+            }
+            if now.state.is_fault() && !before.state.is_fault() {
+                self.joint_fails(tick, joint, format!("{joint}: drive in its fault state"));
+            }
+            let line = jtc_bus::warning::SAFETY_LINE;
+            if now.warnings & !before.warnings & line != 0 && !words::is_awaited(&last.status, joint.index())
+            {
+                self.push(tick, false, format!("{joint}: safety line active"));
+            }
+        }
+        // What no joint, bus or input explains.
+        let begins = tick.sample.errors & !last.sample.errors;
+        if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
+            self.push(tick, true, words::errors(begins).join(", "));
+        }
+        let occurred =
+            words::occurred_since(&last.status.joints.map(|joint| joint.internal_occurred), &tick.status);
+        if !occurred.is_empty() && begins == 0 {
+            self.push(tick, false, format!("acted upon, no error: {occurred}"));
+        }
+    }
+
+    fn states(&mut self, last: &Tick, tick: &Tick) {
+        if tick.sample.state != last.sample.state {
+            self.push(
+                tick,
+                false,
+                format!("state {} \u{2192} {}", last.sample.state.name(), tick.sample.state.name()),
+            );
+        }
+        let silent = Code::from(TrajectoryState::Null);
+        if tick.sample.trajectory != last.sample.trajectory && tick.sample.trajectory != silent {
+            let point = tick.sample.point;
+            let text = format!("trajectory {} at {point} ms", tick.sample.trajectory.name());
+            self.push(tick, false, text);
+        }
+        for joint in Joint::ALL {
+            let (before, now) =
+                (last.status.joints[joint.index()].state, tick.status.joints[joint.index()].state);
+            if before != now && !now.is_fault() {
+                self.push(tick, false, format!("{joint}: {before} \u{2192} {now}"));
+            }
+        }
+    }
+
+    /// An error that the controller found in a joint, with its value and limit.
+    fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
+        let name = words::joint_errors(bit).first().copied().unwrap_or("an error without a name");
+        let j = joint.index();
+        // The tick of the error takes its torque away, and with it what was commanded.
+        let larger = |value: fn(&JointSample) -> f64| {
+            let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
+            if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
+        };
+        let state = last.sample.state.name();
+        let Some(limits) = self.config.and_then(|config| config.joints.get(j)) else {
+            return format!("{joint}: {name}, in {state}");
+        };
+        let overspeed = self.config.map_or(1.0, |config| config.overspeed_factor);
+        let (value, limit, unit) = match bit {
+            joint_error::POSITION_ERROR => {
+                (larger(|s| s.set_position - s.position), limits.position_error_max, "rad")
+            }
+            joint_error::POSITION => {
+                let value = larger(|s| s.set_position);
+                (value, if value < 0.0 { limits.position_min } else { limits.position_max }, "rad")
+            }
+            joint_error::VELOCITY => {
+                let (set, measured) = (larger(|s| s.set_velocity), larger(|s| s.velocity));
+                if set.abs() > limits.velocity_max {
+                    (set, limits.velocity_max, "rad/s")
+                } else {
+                    (measured, overspeed * limits.velocity_max, "rad/s")
+                }
+            }
+            joint_error::ACCELERATION => (larger(|s| s.set_acceleration), limits.acceleration_max, "rad/s²"),
+            joint_error::TORQUE => (larger(|s| s.torque), limits.torque_max, "N·m"),
+            _ => return format!("{joint}: {name}, in {state}"),
+        };
+        format!("{joint}: {name}: {value:.4} {unit} (limit {limit}), in {state}")
+    }
+}
+
+fn emergency(word: u16) -> Option<String> {
+    (word != 0).then(|| "safety input low (emergency stop)".to_owned())
+}

@@ -1,0 +1,121 @@
+//! The flight recorder of a device: its log is read page by page, with what a replay needs of the device (J-56).
+
+use jtc_core::recorder::BLOCK_BYTES;
+use jtc_wire::{Answer, LOG_NO_BLOCK, LogState, RawPoint, fixed};
+
+use super::Session;
+use crate::error::{Error, LinkError};
+use crate::log::{FlightLog, blocks_of};
+use crate::port::Port;
+
+/// What a flight recorder does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LogStatus {
+    /// What it does, or why it stopped.
+    pub state: LogState,
+    /// Number behind that of its newest block.
+    pub end: u32,
+}
+
+/// A page of a log.
+struct Page {
+    status: LogStatus,
+    block: u32,
+    offset: u16,
+    points: u16,
+    points_hash: u32,
+    bytes: Vec<u8>,
+}
+
+impl<P: Port> Session<P> {
+    /// What the flight recorder does. It goes on recording.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] by a device without a recorder; those of the line.
+    pub fn log_status(&mut self) -> Result<LogStatus, LinkError> {
+        self.log_page(LOG_NO_BLOCK, 0).map(|page| page.status)
+    }
+
+    /// Forgets the log; the recorder begins anew.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::log_status`].
+    pub fn clear_log(&mut self) -> Result<(), LinkError> {
+        self.extension(&fixed::CLEAR_LOG)
+    }
+
+    fn log_page(&mut self, block: u32, offset: u16) -> Result<Page, LinkError> {
+        self.ask(&fixed::get_log(block, offset), |answer| match answer {
+            Answer::Log(page) => Some(Page {
+                status: LogStatus { state: page.state, end: page.end },
+                block: page.block,
+                offset: page.offset,
+                points: page.points,
+                points_hash: page.points_hash,
+                bytes: page.bytes.to_vec(),
+            }),
+            _ => None,
+        })
+    }
+
+    /// Reads the whole log, the arm in use, and the points of the trajectory that the log needs. Recording rests meanwhile; the arm may
+    /// move. `done` learns of each part: bytes of the log that are here, and how many there are.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::log_status`] and [`Session::arm_image`].
+    pub fn fetch_log(&mut self, mut done: impl FnMut(usize, usize)) -> Result<FlightLog, Error> {
+        let mut log = FlightLog::default();
+        let mut bytes = Vec::new();
+        let mut first = None;
+        let points = loop {
+            // The first answer says where the log begins.
+            let (block, offset) =
+                (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);
+            let page = self.log_page(block, offset as u16)?;
+            (log.state, log.points_hash) = (page.status.state, page.points_hash);
+            if page.block != block || first.is_none() || usize::from(page.offset) != offset {
+                // The oldest of it, or what is left after it was cleared and begun anew.
+                bytes.clear();
+                first = Some(page.block);
+            }
+            let begin = first.unwrap_or(0);
+            done(bytes.len(), (page.status.end.saturating_sub(begin) as usize) * BLOCK_BYTES);
+            if page.bytes.is_empty() || page.block >= page.status.end {
+                break usize::from(page.points);
+            }
+            bytes.extend(page.bytes);
+        };
+        log.blocks = blocks_of(&bytes);
+        log.device = match self.info()? {
+            Some(info) => format!("{}, firmware {} ({})", info.board, info.firmware(), info.revision()),
+            None => String::new(),
+        };
+        log.arm = self.arm_image()?;
+        if let Some((first, count)) = log.needed_points(log.points_hash, points) {
+            log.first_point = first;
+            log.points = self.log_points(first, count)?;
+        }
+        Ok(log)
+    }
+
+    /// Points of the trajectory in the device's memory; fewer where it has not as many.
+    fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
+        let mut all = Vec::new();
+        while all.len() < count {
+            let from = (first + all.len()) as u16;
+            let page: Vec<RawPoint> = self.ask(&fixed::get_points(from), |answer| match answer {
+                Answer::Points { first, points, .. } if first == from => Some(points.iter().collect()),
+                _ => None,
+            })?;
+            if page.is_empty() {
+                break;
+            }
+            all.extend(page);
+        }
+        all.truncate(count);
+        Ok(all)
+    }
+}

@@ -81,6 +81,8 @@ pub struct Boot {
     pub cause: Cause,
     /// The how-manieth it is since power came on.
     pub boots: u32,
+    /// Power was off before it.
+    pub lost_power: bool,
     /// The last words of the last program, and its last tick if that was kept.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
@@ -92,12 +94,13 @@ pub struct Boot {
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    let lost_power = reset::lost_power(rsr);
     // SAFETY: nothing else refers to the three yet, and this is called once. After power-on they are random, with wrong check
     // bits: written before they are read. Otherwise they hold integers and floats, for which any bits are a value.
     let (words, flight, boots) = unsafe {
         let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
         let boots = &mut *BOOTS.0.get();
-        if reset::lost_power(rsr) {
+        if lost_power {
             words.write(LastWords::NONE);
             flight.write(Flight::new(0));
             boots.write(0);
@@ -109,7 +112,7 @@ pub fn boot() -> Boot {
     let cause = reset::cause(rsr, last_words.failure());
     let last_flight = flight.valid().then_some((flight.tick, flight.phase, flight.state));
     *flight = Flight::new(cause as u32);
-    Boot { cause, boots: *boots, last_words, last_flight, flight }
+    Boot { cause, boots: *boots, lost_power, last_words, last_flight, flight }
 }
 
 /// Writes it to the log.

@@ -60,7 +60,8 @@ async fn main(_spawner: Spawner) {
         VERSION.points,
     );
 
-    let memory::Memory { points, rings, statuses, receive, batch, arms } = memory::take();
+    let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
+        memory::take(boot.lost_power);
     let store = arm_store::load(arms);
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;
@@ -79,6 +80,7 @@ async fn main(_spawner: Spawner) {
         slot: slot_out,
         lines: [rs422_out, usb_out],
         watchdog,
+        recorder,
         boot,
     });
 

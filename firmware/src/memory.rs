@@ -6,6 +6,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 use embassy_stm32::pac;
 use jtc_core::POINTS_MAX;
+use jtc_core::recorder::Block;
 use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 
 use crate::arm_store;
@@ -35,7 +36,36 @@ impl<T> Place<T> {
         // SAFETY: zero bytes are a value, by the contract.
         unsafe { place.assume_init_mut() }
     }
+
+    /// The value as the last program left it, all bytes zero after a loss of power: until then the memory is random, with wrong check
+    /// bits.
+    ///
+    /// # Safety
+    /// Called once, any bytes are a value of `T`, and the linker keeps the place out of what is initialised.
+    #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
+    unsafe fn keep(&'static self, lost_power: bool) -> &'static mut T {
+        if lost_power {
+            // SAFETY: zero bytes are any bytes.
+            return unsafe { self.take() };
+        }
+        // SAFETY: the only reference there will ever be, to memory that was written since power came on, by the contract.
+        unsafe { (*self.0.get()).assume_init_mut() }
+    }
 }
+
+/// Blocks in each of the two pieces of the flight recorder's memory.
+const RECORDER_BLOCKS: usize = 63;
+
+/// Memory of the flight recorder (J-56): what DMA leaves of SRAM1, and SRAM4. Neither is cached: what is written is there at the next
+/// instruction, whatever resets the processor. Their names keep the compiler from knowing what they hold.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".sram1")]
+#[used]
+static RECORDER_SRAM1: Place<[Block; RECORDER_BLOCKS]> = Place::new();
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".sram4")]
+#[used]
+static RECORDER_SRAM4: Place<[Block; RECORDER_BLOCKS]> = Place::new();
 
 /// The trajectory.
 #[unsafe(link_section = ".axisram")]
@@ -70,14 +100,18 @@ pub struct Memory {
     pub batch: &'static mut EventBatch,
     /// For the stored arm and for one that is to be stored.
     pub arms: [&'static mut arm_store::Buffer; 2],
+    /// For the flight recorder; it holds what the last program recorded.
+    pub recorder: [&'static mut [Block]; 2],
 }
 
-/// Hands out the buffers, zeroed. Once; after [`init`].
-pub fn take() -> Memory {
+/// Hands out the buffers, zeroed; but for the flight recorder's, unless the device has `lost_power`. Once; after [`init`].
+pub fn take(lost_power: bool) -> Memory {
     // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `EventBatch`, which consists of
     // integers, too.
     let (points, rings, statuses, receive, batch, arms) =
         unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
+    // SAFETY: as above; both stand in sections that nobody loads or clears, and integers may be any bytes.
+    let recorder = unsafe { [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM4.keep(lost_power)] };
     Memory {
         points,
         rings: rings.each_mut(),
@@ -85,11 +119,12 @@ pub fn take() -> Memory {
         receive: receive.each_mut(),
         batch,
         arms: arms.each_mut(),
+        recorder: recorder.map(|blocks| &mut blocks[..]),
     }
 }
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
-const REGIONS: [(u32, u32, u32); 5] = [
+const REGIONS: [(u32, u32, u32); 6] = [
     // External memory that is not there: without this the core may read it speculatively and hang. The lowest three
     // eighths and the highest of the 4 GB are left out.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
@@ -99,13 +134,15 @@ const REGIONS: [(u32, u32, u32); 5] = [
     (0x1FFC_0000, 18, NO_ACCESS),
     // What DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
+    // What the flight recorder writes.
+    (0x3800_0000, 16, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     // The second bank of the flash halts whoever reads it while it is busy: opened by [`bank2`] only.
     (BANK2, 20, NO_ACCESS),
 ];
 /// Flash bank 2.
 pub const BANK2: u32 = 0x0810_0000;
 /// Number of its region.
-const BANK2_REGION: u32 = 4;
+const BANK2_REGION: u32 = 5;
 const NO_ACCESS: u32 = NO_EXECUTE;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const NO_EXECUTE: u32 = 1 << 28;

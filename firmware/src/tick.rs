@@ -9,6 +9,7 @@ use embassy_stm32::peripherals::{IWDG1, TIM7};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, pac, rcc};
 use embassy_time::Instant;
+use jtc_core::recorder::{Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, Outputs};
 use jtc_wire::{
     BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, StoreState, UrgentWatch,
@@ -53,6 +54,8 @@ pub struct Parts {
     pub lines: [Transmitter; lines::LINES],
     /// Reset unless a tick completes.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
+    /// Memory of the flight recorder, with what it held before this start.
+    pub recorder: [&'static mut [Block]; 2],
     /// How this start came about.
     pub boot: Boot,
 }
@@ -68,6 +71,7 @@ struct Tick {
     lines: [Transmitter; lines::LINES],
     watchdog: IndependentWatchdog<'static, IWDG1>,
     flight: &'static mut Flight,
+    recorder: Recorder<&'static mut [Block], 2>,
     links: Links,
     left_out: u32,
     /// What became of the last arm that was stored, and its number.
@@ -108,7 +112,7 @@ fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
-    let Parts { points, can, pins, ahead, slot, lines, watchdog, boot } = parts;
+    let Parts { points, can, pins, ahead, slot, lines, watchdog, recorder, boot } = parts;
     let tick = PLACE.init_with(|| Tick {
         controller: controller(points),
         can,
@@ -120,6 +124,7 @@ pub fn start(parts: Parts) {
         lines,
         watchdog,
         flight: boot.flight,
+        recorder: Recorder::new(recorder, boot.cause.failed()),
         links: Links::default(),
         left_out: 0,
         stored: arm_store::Progress::Idle,
@@ -209,6 +214,8 @@ impl Tick {
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
+        // Before the frames that it executed are given back, and with nothing left that the arm waits for.
+        self.recorder.record(self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
             send(&mut self.lines, outputs.record_line, self.controller.status_frame());

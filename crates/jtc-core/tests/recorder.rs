@@ -7,8 +7,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use jtc_core::recorder::{
     AFTER_ERROR_MS, BLOCK_WORDS, Block, Log, Outcome, Record, Recorder, Replay, SNAPSHOT_MS,
 };
-use jtc_core::{Config, ControllerState};
-use jtc_wire::{Answer, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState};
+use jtc_core::{Config, ControllerState, Payload, settings};
+use jtc_wire::{Answer, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState};
 use rig::Rig;
 
 const BLOCKS: usize = 24;
@@ -349,4 +349,28 @@ fn j56_snapshots_come_in_time_whatever_hosts_send() {
     let since: Vec<_> = snapshots.iter().copied().filter(|tick| *tick > begin).collect();
     assert!(since.len() >= 3, "{snapshots:?}");
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
+}
+
+/// A payload that is on its way into the model when a snapshot is taken goes on its way in the replay (J-60): from the first snapshot after
+/// it each tick is the same to the bit.
+#[test]
+fn j56_a_payload_on_its_way_is_replayed() {
+    let mut rig = holding();
+    let body: Vec<u8> =
+        settings::payload_values(&Payload { mass: 1.5, com: [0.02, -0.01, 0.05], ..Payload::NONE })
+            .flat_map(|value| value.emit())
+            .collect();
+    assert_eq!(rig.ask(FrameType::SetSettings, &body), DataStatus::NoError);
+    let given = rig.controller.telemetry().tick;
+    rig.run(1_500);
+    let blocks = blocks(&rig);
+    let first = contents(&blocks).1.into_iter().find(|tick| *tick > given).expect("a snapshot");
+    assert!(first < given + 300, "it comes while the payload is on its way: {given} {first}");
+    // By a controller that was given no payload.
+    let mut other = Rig::new(Config::avena());
+    other.defaults();
+    let replay = Replay::new(Log::new(&blocks), other.controller, None);
+    let same = replay.filter(|step| step.telemetry.tick > first && step.outcome == Outcome::Same).count();
+    assert_eq!(same as u64, rig.controller.telemetry().tick - first);
+    assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }

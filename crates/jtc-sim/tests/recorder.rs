@@ -1,11 +1,14 @@
 //! The flight recorder in whole sessions: what it holds, and that a replay gives the same again (J-56).
 use std::collections::HashMap;
 
-use jtc_core::Telemetry;
-use jtc_core::recorder::{Block, Log, Outcome, Replay, Unsure};
-use jtc_sim::World;
+use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
+use jtc_core::{Telemetry, TrajectoryState};
 use jtc_sim::soak::Soak;
-use jtc_wire::LogState;
+use jtc_sim::{Operator, SimConfig, World, host};
+use jtc_wire::{ExecCommand, LogState, fixed};
+
+const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
+const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 
 /// What became of the ticks of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,4 +77,94 @@ fn j56_random_sessions_with_faults_replay_bit_for_bit() {
     }
     println!("{all:?}");
     assert!(all.same > 100_000, "{all:?}");
+}
+
+/// A controller that holds the arm, and the path that it has.
+fn loaded() -> Operator {
+    let config = SimConfig { start: FROM, baud: None, ..SimConfig::default() };
+    let mut operator = Operator::new(config);
+    operator.bring_up().unwrap();
+    operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+    operator
+}
+
+/// What a run along the path commands, tick by tick; `sends`: what a host sends in each.
+fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
+    let mut operator = loaded();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    let mut all = Vec::new();
+    for ms in 0..8_000 {
+        operator.world.host_write(&sends(ms));
+        operator.step();
+        all.push(Telemetry { records_lost: 0, ..*operator.world.telemetry() });
+    }
+    assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Finish);
+    (operator, all)
+}
+
+#[test]
+fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
+    let (_, undisturbed) = run(|_| Vec::new());
+    // One page after the other, as fast as they come.
+    let (_, read) =
+        run(
+            |ms| {
+                if ms % 3 == 0 { fixed::get_log(0, (232 * (ms / 3 % 5)) as u16).to_vec() } else { Vec::new() }
+            },
+        );
+    assert!(undisturbed == read, "a torque differs");
+}
+
+/// Two seconds before an error and what follows it, with more traffic than a controller executes, whatever part of a snapshot's time is
+/// lost at the beginning.
+#[test]
+fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
+    let mut operator = loaded();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    for ms in 0..3_500u32 {
+        // Frames that take a few instructions each, and parameters, which call for a snapshot.
+        for n in 0..12 {
+            operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
+        }
+        operator.world.host_write(&fixed::GET_INFO);
+        operator.world.host_write(&fixed::PID_PARAM_USE_DEFAULT);
+        operator.step();
+    }
+    let blocks = blocks(&operator.world);
+    let kept = ticks(&blocks);
+    println!("{kept} ticks in {} blocks", blocks.len());
+    assert!(kept >= 2_300 + usize::from(SNAPSHOT_MS), "{kept} ticks");
+}
+
+/// Ticks in these blocks.
+fn ticks(blocks: &[Block]) -> usize {
+    Log::new(blocks).filter(|record| matches!(record, Record::Tick { .. })).count()
+}
+
+/// One point of the trajectory is another: what was the same up to there is not the same from there on.
+#[test]
+fn j56_the_first_tick_that_differs_is_named() {
+    const POINT: usize = 120;
+    let mut operator = loaded();
+    operator.world.clear_log();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    operator.run(2_500);
+    let mut seen = HashMap::new();
+    let blocks = blocks(&operator.world);
+    let mut controller = operator.world.controller().clone();
+    let hash = Some(controller.points_hash());
+    for step in Replay::new(Log::new(&blocks), controller.clone(), hash) {
+        assert_eq!(step.outcome, Outcome::Same, "tick {}", step.telemetry.tick);
+        seen.insert(step.telemetry.point, step.telemetry.tick);
+    }
+    let mut points = host::there_and_back(&FROM, &TO, 3.0, 1, 10);
+    points[POINT].velocity[1] += 40;
+    controller.put_points(POINT, &points[POINT..=POINT]);
+    let differs = Replay::new(Log::new(&blocks), controller, hash)
+        .find(|step| step.outcome == Outcome::Differs)
+        .expect("a tick differs");
+    // The point acts from the point before it on; what it changes reaches the torque on the bus within some ticks.
+    let acts = seen[&(10 * (POINT as u32 - 1))];
+    let tick = differs.telemetry.tick;
+    assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");
 }

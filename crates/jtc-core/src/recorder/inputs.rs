@@ -15,7 +15,9 @@ use crate::{JOINTS, NODES};
 /// Longest frame of a host that is recorded with its bytes.
 pub const HOST_BYTES: usize = 48;
 /// Bytes of frames of hosts that are recorded, on average in a tick and at once.
-const ALLOWANCE: (u16, u16) = (2, 400);
+const ALLOWANCE: (u16, u16) = (2, 500);
+/// What an event takes beside its bytes.
+const EVENT_BYTES: u16 = 2;
 /// Words of a payload.
 const WORDS: usize = MAX_LEN / 4;
 
@@ -240,31 +242,41 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // Those that were done, and the one that was worked on or had no turn.
-        let count = inputs.host.len().min(done + 1).min(EVENTS_MAX);
+        // Those that were done, and the one that was worked on or had no turn; as many as there is room for.
+        let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
+        let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
+        let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));
+        to.put(left.is_some().into(), 1);
         to.put(count as u32, 5);
-        let mut whole = true;
-        for event in inputs.host.iter().take(count) {
+        let mut whole = left.is_none();
+        for event in looked_at.iter().take(count) {
             whole &= self.write_event(event, to);
         }
         whole
     }
 
+    /// Takes what an event needs off the allowance, if there is as much.
+    fn allows(&mut self, event: &HostEvent<'_>) -> bool {
+        let bytes = match event.event {
+            LinkEvent::Frame(frame) if has_bytes(frame) => EVENT_BYTES + frame.bytes.len() as u16,
+            _ => EVENT_BYTES,
+        };
+        let rest = self.allowance.checked_sub(bytes);
+        self.allowance = rest.unwrap_or(self.allowance);
+        rest.is_some()
+    }
+
     /// One event; false when its bytes were left out.
-    fn write_event<S: BitSink>(&mut self, event: &HostEvent<'_>, to: &mut S) -> bool {
+    fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);
         let (kind, response) = match event.event {
             LinkEvent::Frame(frame) => {
                 to.put(frame.frame_type as u32, 8);
-                let len = frame.bytes.len();
-                // Parameters change the arm, whatever their length: a snapshot after them says which it is.
-                let fits =
-                    len <= HOST_BYTES && len <= self.allowance.into() && !changes_arm(frame.frame_type);
+                let fits = has_bytes(frame);
                 to.put(if fits { 0 } else { 1 }, 2);
                 if fits {
-                    self.allowance -= len as u16;
-                    to.put(len as u32, 6);
+                    to.put(frame.bytes.len() as u32, 6);
                     for byte in frame.bytes {
                         to.put((*byte).into(), 8);
                     }
@@ -279,6 +291,11 @@ impl Reference {
         to.put(response.status as u32, 3);
         true
     }
+}
+
+/// The frame is recorded with its bytes. Parameters change the arm, whatever their length: a snapshot after them says which it is.
+fn has_bytes(frame: FrameRef<'_>) -> bool {
+    frame.bytes.len() <= HOST_BYTES && !changes_arm(frame.frame_type)
 }
 
 /// Frames that change the parameters, which a log has by hash only.
@@ -382,6 +399,7 @@ pub struct RecordedInputs {
     bus: [Option<Frame>; FRAMES_MAX],
     host: [RecordedEvent; EVENTS_MAX],
     host_len: usize,
+    left_out: bool,
 }
 
 impl RecordedInputs {
@@ -397,7 +415,7 @@ impl RecordedInputs {
 
     /// Every input is there: a replay of this tick does what the controller did.
     pub fn is_whole(&self) -> bool {
-        self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
+        !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
     }
 
     pub(super) fn read<S: BitSource>(reference: &mut Reference, from: &mut S) -> Self {
@@ -411,6 +429,7 @@ impl RecordedInputs {
             bus: [None; FRAMES_MAX],
             host: [RecordedEvent::NONE; EVENTS_MAX],
             host_len: 0,
+            left_out: false,
         };
         if from.take(1) == 0 {
             inputs.read_rest(from);
@@ -432,6 +451,7 @@ impl RecordedInputs {
                 commands.add(command, from.take(8) as u8);
             }
         }
+        self.left_out = from.take(1) != 0;
         self.host_len = (from.take(5) as usize).min(EVENTS_MAX);
         for event in self.host.iter_mut().take(self.host_len) {
             *event = RecordedEvent::read(from);

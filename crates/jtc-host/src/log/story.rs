@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use jtc_core::Config;
 use jtc_core::recorder::RecordedKind;
-use jtc_wire::{Code, FrameType, Joint, Status, TrajectoryState, UrgentCommand, error, joint_error};
+use jtc_wire::{Code, FrameType, Joint, TrajectoryState, UrgentCommand, can_flag, error, joint_error};
 use serde::Serialize;
 
 use super::replay::{Replayed, Tick, Worth};
@@ -24,8 +24,8 @@ pub struct Event {
     pub text: String,
     /// An error begins here.
     pub error: bool,
-    /// Of this joint.
-    pub joint: Option<Joint>,
+    /// Of these joints.
+    pub joints: Vec<Joint>,
 }
 
 /// What happened.
@@ -51,6 +51,9 @@ impl Story {
             }
             last = Some(tick);
         }
+        for event in events.iter_mut().filter(|event| !event.joints.is_empty()) {
+            event.text = format!("{}: {}", names(&event.joints), event.text);
+        }
         let first = events.iter().position(|event| event.error);
         Self { events, first }
     }
@@ -60,7 +63,7 @@ impl Story {
         let first = self.events.get(self.first?)?;
         let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
         let causes = with.map(|event| event.text.clone()).collect();
-        Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joint))
+        Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
 
     /// The first error and what followed, each with its time after it; then what had come before.
@@ -77,15 +80,22 @@ impl Story {
         for event in &self.events[first + 1..] {
             lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
         }
-        if first > 0 {
-            lines.push("before it:".to_owned());
+        // The nearest first, and no more than a person reads.
+        let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
+        let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
+        if !before.is_empty() {
+            lines.push("before it, the latest first:".to_owned());
         }
-        for event in &self.events[..first] {
+        for event in before {
             lines.push(format!("{} before: {}", span(at.tick - event.tick), event.text));
         }
         lines
     }
 }
+
+/// What came before an error is listed as far back as this, and no more than so many.
+const BEFORE_MS: u64 = 3_000;
+const BEFORE: usize = 20;
 
 fn span(ms: u64) -> String {
     if ms < 1_000 { format!("{ms} ms") } else { format!("{:.3} s", ms as f64 * 1e-3) }
@@ -93,6 +103,18 @@ fn span(ms: u64) -> String {
 
 fn after(ms: u64) -> String {
     if ms == 0 { "in the same tick".to_owned() } else { format!("{} later", span(ms)) }
+}
+
+/// Joints by name.
+fn names(joints: &[Joint]) -> String {
+    match joints {
+        [joint] => joint.to_string(),
+        all if all.len() == Joint::ALL.len() => "all joints".to_owned(),
+        some => {
+            let numbers: Vec<String> = some.iter().map(|joint| joint.number().to_string()).collect();
+            format!("joints {}", numbers.join(", "))
+        }
+    }
 }
 
 /// Ticks without an answer of a joint before it is worth a word.
@@ -108,13 +130,22 @@ struct Teller<'a> {
 impl Teller<'_> {
     fn push(&mut self, tick: &Tick, error: bool, text: impl Into<String>) {
         let time_s = tick.tick as f64 * 1e-3;
-        self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joint: None });
+        self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
     }
 
-    fn joint_fails(&mut self, tick: &Tick, joint: Joint, text: String) {
-        self.push(tick, true, text);
+    /// Something of a joint; what is the same for several joints in a tick is one event.
+    fn push_joint(&mut self, tick: &Tick, error: bool, joint: Joint, text: impl Into<String>) {
+        let text = text.into();
+        let same =
+            |event: &&mut Event| event.error == error && event.text == text && !event.joints.is_empty();
+        let now = self.events.iter_mut().rev().take_while(|event| event.tick == tick.tick);
+        if let Some(event) = now.into_iter().find(same) {
+            event.joints.push(joint);
+            return;
+        }
+        self.push(tick, error, text);
         if let Some(event) = self.events.last_mut() {
-            event.joint = Some(joint);
+            event.joints.push(joint);
         }
     }
 
@@ -161,9 +192,9 @@ impl Teller<'_> {
             let silent = &mut self.silent[joint.index()];
             let before = std::mem::replace(silent, if answered { 0 } else { *silent + 1 });
             if answered && before >= SILENT {
-                self.push(tick, false, format!("{joint} answers again, after {before} ticks"));
+                self.push_joint(tick, false, joint, format!("answers again, after {before} ticks"));
             } else if before + 1 == SILENT && !answered {
-                self.push(tick, false, format!("{joint} has not answered for {SILENT} ticks"));
+                self.push_joint(tick, false, joint, format!("no answer for {SILENT} ticks"));
             }
         }
         if inputs.missed_ticks > 0 {
@@ -196,31 +227,36 @@ impl Teller<'_> {
                 tick.sample.joints[joint.index()].internal & !last.sample.joints[joint.index()].internal;
             for bit in (0..16).map(|n| 1 << n).filter(|bit| bits & bit != 0) {
                 let text = self.joint_error(joint, bit, last, tick);
-                self.joint_fails(tick, joint, text);
+                self.push_joint(tick, true, joint, text);
             }
         }
-        let new = Status {
-            errors: tick.status.errors & !last.status.errors & error::EMERGENCY_INPUT,
-            can_current: tick.status.can_current & !last.status.can_current,
-            ..Status::default()
-        };
-        for cause in words::can_flags(new.can_current).into_iter().chain(emergency(new.errors)) {
-            self.push(tick, true, cause);
+        let flags = tick.status.can_current & !last.status.can_current;
+        for joint in Joint::ALL.into_iter().filter(|joint| flags & can_flag::no_answer(joint.index()) != 0) {
+            self.push_joint(tick, true, joint, "does not answer");
+        }
+        if flags & can_flag::no_answer(jtc_bus::GRIPPER) != 0 {
+            self.push(tick, false, "the gripper does not answer");
+        }
+        if flags & can_flag::TRANSMIT_TIMEOUT != 0 {
+            self.push(tick, true, "no acknowledge on the joint bus");
+        }
+        if tick.status.errors & !last.status.errors & error::EMERGENCY_INPUT != 0 {
+            self.push(tick, true, "the safety input is low (emergency stop)");
         }
         for joint in Joint::ALL {
             let (before, now) = (&last.status.joints[joint.index()], &tick.status.joints[joint.index()]);
             let faults = words::motor_faults(now.mc_current & !before.mc_current).into_iter();
             let drive = words::node_errors(now.errors & !before.errors).into_iter();
             for word in faults.chain(drive) {
-                self.joint_fails(tick, joint, format!("{joint}: {word}"));
+                self.push_joint(tick, true, joint, word);
             }
             if now.state.is_fault() && !before.state.is_fault() {
-                self.joint_fails(tick, joint, format!("{joint}: drive in its fault state"));
+                self.push_joint(tick, true, joint, "drive in its fault state");
             }
             let line = jtc_bus::warning::SAFETY_LINE;
             if now.warnings & !before.warnings & line != 0 && !words::is_awaited(&last.status, joint.index())
             {
-                self.push(tick, false, format!("{joint}: safety line active"));
+                self.push_joint(tick, false, joint, "safety line active");
             }
         }
         // What no joint, bus or input explains.
@@ -253,7 +289,7 @@ impl Teller<'_> {
             let (before, now) =
                 (last.status.joints[joint.index()].state, tick.status.joints[joint.index()].state);
             if before != now && !now.is_fault() {
-                self.push(tick, false, format!("{joint}: {before} \u{2192} {now}"));
+                self.push_joint(tick, false, joint, format!("{before} \u{2192} {now}"));
             }
         }
     }
@@ -269,7 +305,7 @@ impl Teller<'_> {
         };
         let state = last.sample.state.name();
         let Some(limits) = self.config.and_then(|config| config.joints.get(j)) else {
-            return format!("{joint}: {name}, in {state}");
+            return format!("{name}, in {state}");
         };
         let overspeed = self.config.map_or(1.0, |config| config.overspeed_factor);
         let (value, limit, unit) = match bit {
@@ -290,12 +326,8 @@ impl Teller<'_> {
             }
             joint_error::ACCELERATION => (larger(|s| s.set_acceleration), limits.acceleration_max, "rad/s²"),
             joint_error::TORQUE => (larger(|s| s.torque), limits.torque_max, "N·m"),
-            _ => return format!("{joint}: {name}, in {state}"),
+            _ => return format!("{name}, in {state}"),
         };
-        format!("{joint}: {name}: {value:.4} {unit} (limit {limit}), in {state}")
+        format!("{name}: {value:.4} {unit} (limit {limit}), in {state}")
     }
-}
-
-fn emergency(word: u16) -> Option<String> {
-    (word != 0).then(|| "safety input low (emergency stop)".to_owned())
 }

@@ -2,10 +2,10 @@
 use std::collections::HashMap;
 
 use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
-use jtc_core::{Telemetry, TrajectoryState};
+use jtc_core::{Controller, POINTS_MAX, Telemetry, TrajectoryState};
 use jtc_sim::soak::Soak;
 use jtc_sim::{Operator, SimConfig, World, host};
-use jtc_wire::{ExecCommand, LogState, fixed};
+use jtc_wire::{ExecCommand, LogState, RawPoint, fixed};
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
@@ -26,8 +26,11 @@ fn blocks(world: &World) -> Vec<Block> {
 /// Replays the log and compares each tick with what was computed then.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    let controller = world.controller().clone();
-    let hash = Some(controller.points_hash());
+    // Nothing but settings and points comes from the controller of the session: what it remembers is in the snapshots.
+    let then = world.controller();
+    let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
+    controller.put_points(0, then.points());
+    let hash = Some(then.points_hash());
     let mut counts = Counts::default();
     for step in Replay::new(Log::new(&blocks), controller, hash) {
         counts.ticks += 1;

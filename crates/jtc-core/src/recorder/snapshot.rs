@@ -244,6 +244,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.store.points_hash().0
     }
 
+    /// The points of a trajectory in memory.
+    pub fn points(&self) -> &[RawPoint] {
+        self.store.held_points(0)
+    }
+
     /// Points of a trajectory from number `first` on, in the memory of a controller that replays a log.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         self.store.put_points(first, points);

@@ -65,12 +65,20 @@ fn run() -> Result<(), Box<dyn Error>> {
         let and = if status { " and a status" } else { "" };
         println!("    {state}{and}: {} to {} in {} steps", steps.min, steps.max, steps.count);
     }
-    let Steps { min, max, count } = session.on_path();
+    let Steps { min, max, count, .. } = session.on_path();
     println!("    Operate, on the path at full speed: {min} to {max} in {count} steps");
     println!("  control step that works at what a host sent, instructions:");
     for (name, state, steps) in session.serving() {
         println!("    {name} in {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
     }
+    let recorded = session.recorded();
+    println!(
+        "  flight recorder, behind each control step, instructions: {} to {}, {} in the mean of {}",
+        recorded.min,
+        recorded.max,
+        recorded.mean(),
+        recorded.count
+    );
     let mask = session.longest_mask(MASK_MS);
     let mut machine = session.into_machine();
     let observers = &machine.chip().observers;

@@ -30,6 +30,9 @@ use crate::uart::{self, Lookahead, Transmitter};
 /// The controller with its trajectory elsewhere.
 type Jtc = Controller<&'static mut [RawPoint]>;
 
+/// The flight recorder, with its memory elsewhere.
+type FlightRecorder = Recorder<&'static mut [Block], 2>;
+
 /// Bytes of a line that a tick looks through at most: more than two ticks bring at 15 MBd.
 const LOOK_MAX: usize = 4096;
 
@@ -71,7 +74,7 @@ struct Tick {
     lines: [Transmitter; lines::LINES],
     watchdog: IndependentWatchdog<'static, IWDG1>,
     flight: &'static mut Flight,
-    recorder: Recorder<&'static mut [Block], 2>,
+    recorder: FlightRecorder,
     links: Links,
     left_out: u32,
     /// What became of the last arm that was stored, and its number.
@@ -215,7 +218,7 @@ impl Tick {
             self.can.send(frame);
         }
         // Before the frames that it executed are given back, and with nothing left that the arm waits for.
-        self.recorder.record(self.controller, &inputs, &outputs);
+        record_step(&mut self.recorder, self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
             send(&mut self.lines, outputs.record_line, self.controller.status_frame());
@@ -295,6 +298,13 @@ impl Tick {
 #[inline(never)]
 fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
+}
+
+/// What the flight recorder does behind it; likewise.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inputs<'_>, outputs: &Outputs) {
+    recorder.record(controller, inputs, outputs);
 }
 
 /// Fills the places that hold no event.

@@ -23,13 +23,20 @@ pub struct Steps {
     pub count: u64,
     pub min: u64,
     pub max: u64,
+    sum: u64,
 }
 
 impl Steps {
     fn add(&mut self, instructions: u64) {
         self.min = if self.count == 0 { instructions } else { self.min.min(instructions) };
         self.max = self.max.max(instructions);
+        self.sum += instructions;
         self.count += 1;
+    }
+
+    /// Of one step, in the mean.
+    pub fn mean(&self) -> u64 {
+        self.sum / self.count.max(1)
     }
 }
 
@@ -40,7 +47,10 @@ const RAMP: u32 = 250;
 pub struct Session {
     pub rig: Rig,
     counter: openjtc_emulator::Counter,
+    recorder: openjtc_emulator::Counter,
     calls: u64,
+    /// The flight recorder behind each control step.
+    recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
     /// Steps on the path at full speed, with nothing beside them.
@@ -56,6 +66,7 @@ impl Session {
     /// Before the first tick.
     pub fn new(mut rig: Rig) -> Result<Self, Box<dyn Error>> {
         let counter = rig.board.machine.count("control_step")?;
+        let recorder = rig.board.machine.count("record_step")?;
         let mut long = vec![0; 60_000];
         let n = trajectory(&mut long, (1, 0, 1), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
@@ -69,7 +80,9 @@ impl Session {
         Ok(Self {
             rig,
             counter,
+            recorder,
             calls: 0,
+            recorded: Steps::default(),
             steps: BTreeMap::new(),
             serving: BTreeMap::new(),
             on_path: Steps::default(),
@@ -140,6 +153,7 @@ impl Session {
         if count.calls > self.calls {
             assert_eq!(count.calls, self.calls + 1, "one control step a millisecond");
             self.calls = count.calls;
+            self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
             // The costliest of those served together; the default is none.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
@@ -183,6 +197,11 @@ impl Session {
     /// Steps on the path at full speed, without a status and without anything from a host.
     pub fn on_path(&self) -> Steps {
         self.on_path
+    }
+
+    /// The flight recorder behind each control step.
+    pub fn recorded(&self) -> Steps {
+        self.recorded
     }
 
     /// Steps that work at something from a host: what it is, in which state.

@@ -24,7 +24,7 @@ pub use elf::{BOARDS, Version, elf, fast_elf, version};
 pub use flight::{FLIGHT_SIZE, Flight};
 pub use host::Host;
 pub use shadow::Shadow;
-use shadow::Start;
+use shadow::{LogMemory, Start, no_log};
 
 /// Both lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
@@ -53,6 +53,8 @@ pub struct Rig {
     pub may_hang: bool,
     /// Ticks seen since the board started.
     pub ticks: u64,
+    /// What the flight recorder held when the board was reset.
+    log: LogMemory,
     invariants: Invariants,
     flight_at: u32,
     mailbox_at: u32,
@@ -85,6 +87,7 @@ impl Rig {
             bus: Vec::new(),
             may_hang: false,
             ticks: 0,
+            log: no_log(),
             invariants: Invariants::default(),
             flight_at,
             mailbox_at,
@@ -99,8 +102,10 @@ impl Rig {
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // A new program begins, and so does everything beside it.
-            self.shadow = None;
+            // A new program begins, and so does everything beside it but for the log.
+            if let Some(shadow) = self.shadow.take() {
+                self.log = shadow.into_log();
+            }
             self.ticks = 0;
             self.to_pass.clear();
             for host in &mut self.hosts {
@@ -170,7 +175,7 @@ impl Rig {
             (image, sequence)
         });
         let version = version(self.board.machine.elf()).expect("the record of the version");
-        Start { cause, boots: self.resets as u32, version, arm }
+        Start { cause, boots: self.resets as u32, version, arm, log: self.log.clone() }
     }
 
     /// What the controller sent passes unchanged and in order, or not at all.

@@ -1,6 +1,7 @@
 //! The same controller on this machine.
+use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
-use jtc_sim::Worked;
+use jtc_sim::{RECORDER_BLOCKS, Worked};
 use jtc_wire::{BootCause, FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status, StoreState};
 
 use super::elf::Version;
@@ -10,9 +11,18 @@ use super::host::Host;
 /// Causes of a start after which the controller reports that it failed (J-12): watchdog, hard fault, panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
+/// Memory of the flight recorder, in the two pieces that the board has it in.
+pub type LogMemory = [Vec<Block>; 2];
+
+/// As it is after a loss of power.
+pub fn no_log() -> LogMemory {
+    [(); 2].map(|()| vec![[0; BLOCK_WORDS]; RECORDER_BLOCKS])
+}
+
 /// The controller beside the board.
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
+    recorder: Recorder<Vec<Block>, 2>,
     /// What the last tick executed.
     pub worked: Vec<Worked>,
 }
@@ -27,12 +37,14 @@ pub struct Start {
     pub version: Version,
     /// The arm that it found in its flash, and its number.
     pub arm: Option<(Vec<u8>, u32)>,
+    /// What the flight recorder held before.
+    pub log: LogMemory,
 }
 
 impl Shadow {
     /// Beside a board that has just started.
     pub fn new(start: Start) -> Self {
-        let Start { cause, boots, version, arm } = start;
+        let Start { cause, boots, version, arm, log } = start;
         let points = vec![RawPoint::default(); POINTS_MAX];
         let mut controller = Controller::new(Config::default(), points);
         controller.set_identity(Identity {
@@ -53,12 +65,28 @@ impl Shadow {
         if FAILED.contains(&cause) {
             controller.raise_internal();
         }
-        Self { controller, worked: Vec::new() }
+        let recorder = Recorder::new(log, FAILED.contains(&cause));
+        Self { controller, recorder, worked: Vec::new() }
     }
 
     /// What has become of the arm that was to be stored, as the board's mailbox has it after the tick.
     pub fn stored(&mut self, state: StoreState, sequence: u32) {
         self.controller.set_store_state(state, sequence);
+    }
+
+    /// The flight recorder.
+    pub fn recorder(&self) -> &Recorder<Vec<Block>, 2> {
+        &self.recorder
+    }
+
+    /// What the flight recorder leaves to the next start.
+    pub fn into_log(self) -> LogMemory {
+        self.recorder.into_memory()
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
+        &self.controller
     }
 
     /// What the last tick computed.
@@ -83,7 +111,7 @@ impl Shadow {
             .collect();
         let host: Vec<HostEvent<'_>> =
             flight.events.iter().zip(&bytes).map(|(event, bytes)| host_event(event, bytes)).collect();
-        let outputs = self.controller.tick(&Inputs {
+        let inputs = Inputs {
             bus: &flight.received,
             bus_state: flight.bus(),
             safety_input: flight.safety_input,
@@ -91,7 +119,9 @@ impl Shadow {
             urgent: flight.urgent,
             host: &host,
             status_free: flight.status_free,
-        });
+        };
+        let outputs = self.controller.tick(&inputs);
+        self.recorder.record(&mut self.controller, &inputs, &outputs);
         self.worked.clear();
         for (event, received) in flight.events.iter().zip(&host).take(outputs.host_done) {
             self.worked.push(Worked::from(&received.event));

@@ -40,7 +40,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     assert!(fetched["from_s"].as_f64().unwrap() < at - 2.0);
     assert!((fetched["to_s"].as_f64().unwrap() - at - 0.3).abs() < 1e-9);
     assert!(fetched["difference"].is_null() && fetched["gaps"].as_array().unwrap().is_empty());
-    assert!(count(&fetched, "replayed") >= count(&fetched, "ticks") - 300, "{fetched}");
+    assert!(count(&fetched, "replayed") > 2_300, "{fetched}");
     assert_eq!((count(&fetched, "other_arm"), count(&fetched, "other_trajectory")), (0, 0));
 
     // The page leads with it; the recording is one like any other, and holds the log.

@@ -21,6 +21,9 @@ use crate::remembered::{BitSink, Remembered};
 use inputs::Reference;
 use memory::Writer;
 
+#[doc(hidden)]
+pub use memory::sealed_block;
+
 pub use inputs::{RecordedEvent, RecordedInputs, RecordedKind};
 pub use replay::{Log, Outcome, Record, Replay, Step, Unsure};
 pub use snapshot::{Origin, Snapshot};

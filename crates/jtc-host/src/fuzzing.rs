@@ -1,7 +1,10 @@
 //! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
 
+use jtc_core::recorder::{Log, sealed_block};
+
 use crate::arm::{Arm, ParameterFile};
 use crate::file::FileError;
+use crate::log::FlightLog;
 use crate::port::read_capture;
 use crate::trajectory::{Loaded, Trajectory};
 
@@ -105,4 +108,29 @@ pub fn parameter_table(data: &[u8]) {
 /// Raw captures.
 pub fn capture(data: &[u8]) {
     let _ = read_capture(data);
+}
+
+/// Logs of flight recorders: their file form, and any bits in blocks that are whole.
+pub fn flight_log(data: &[u8]) {
+    if let Some(log) = FlightLog::from_bytes(data) {
+        assert_eq!(FlightLog::from_bytes(&log.to_bytes()).as_ref(), Some(&log));
+    }
+    let Some((head, bits)) = data.split_first_chunk::<3>() else { return };
+    let words: Vec<u32> = bits
+        .chunks(4)
+        .map(|bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte)))
+        .collect();
+    // A snapshot at one bit, and as many blocks as it takes.
+    let snapshot = u16::from_be_bytes([head[0], head[1]]);
+    let blocks: Vec<_> = words
+        .chunks(251)
+        .enumerate()
+        .map(|(n, words)| {
+            sealed_block(u32::from(head[2]) + n as u32, if n == 0 { snapshot } else { u16::MAX }, words)
+        })
+        .collect();
+    let records = Log::new(&blocks).count();
+    assert!(records <= 32 * words.len() + 1);
+    let log = FlightLog { blocks, ..FlightLog::default() };
+    let _ = log.needed_points(0, 12_000);
 }

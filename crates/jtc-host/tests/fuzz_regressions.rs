@@ -4,7 +4,7 @@ use jtc_host::fuzzing;
 use proptest::prelude::*;
 use test_kit::Target;
 
-const TARGETS: [Target; 8] = [
+const TARGETS: [Target; 9] = [
     ("trajectory_csv", fuzzing::trajectory_csv),
     ("trajectory_table", fuzzing::trajectory_table),
     ("trajectory_json", fuzzing::trajectory_json),
@@ -13,6 +13,7 @@ const TARGETS: [Target; 8] = [
     ("arm_urdf", fuzzing::arm_urdf),
     ("parameter_table", fuzzing::parameter_table),
     ("capture", fuzzing::capture),
+    ("flight_log", fuzzing::flight_log),
 ];
 
 #[test]

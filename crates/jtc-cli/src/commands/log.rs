@@ -120,6 +120,9 @@ impl Read {
         };
         let mut lines =
             vec![format!("{} ticks, {} replayed, {verdict}", replayed.ticks.len(), replayed.same)];
+        if replayed.broken {
+            lines.push("the log holds a state that no controller reaches; the replay ends there".to_owned());
+        }
         if replayed.unsure > 0 {
             lines.push(format!(
                 "{} ticks behind a frame that is not in the log (too long, or parameters): they may differ from what was",
@@ -241,7 +244,7 @@ fn clear(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 fn replay(file: &Path, arm: Option<&Path>, out: &Output) -> Result<(), Failure> {
     let log = FlightLog::load(file)?;
     let read = Read::new(log, arm, &file.display().to_string())?;
-    let fails = read.replayed.difference.is_some() || read.replayed.same == 0;
+    let fails = read.replayed.difference.is_some() || read.replayed.broken || read.replayed.same == 0;
     out.result(&read.as_json(), || {
         let mut lines = read.extent();
         lines.push(String::new());

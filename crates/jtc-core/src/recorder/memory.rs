@@ -93,6 +93,23 @@ impl<'a> Whole<'a> {
     }
 }
 
+/// A block with these bits, as the recorder writes it: for tests of what reads a log.
+#[doc(hidden)]
+pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    let count = bits.len().min(BLOCK_WORDS - HEAD);
+    for (to, word) in block.iter_mut().skip(HEAD).zip(bits) {
+        *to = *word;
+    }
+    let hash = bits.iter().take(count).fold(mix(MAGIC, sequence), |hash, word| mix(hash, *word));
+    block[head::MAGIC] = MAGIC;
+    block[head::SEQUENCE] = sequence;
+    block[head::COMMIT] = commit(hash, 0, 32 * count as u32);
+    block[head::SNAPSHOT] = doubled(snapshot);
+    block[head::FLAGS] = flags(LogState::Error, true);
+    block
+}
+
 /// Memory in one or more pieces, as one ring.
 pub(super) struct Ring<P, const N: usize> {
     pieces: [P; N],

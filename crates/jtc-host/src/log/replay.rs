@@ -81,6 +81,8 @@ pub struct Replayed {
     pub gaps: Vec<Gap>,
     /// Hashes of arms in the log that are not the one at hand.
     pub arms: Vec<u64>,
+    /// The log holds a state that no controller reaches: the replay ends there.
+    pub broken: bool,
 }
 
 impl FlightLog {
@@ -100,10 +102,15 @@ impl FlightLog {
             Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
         let mut replay = Replay::new(self.log(), controller, points);
         let own = replay.arm();
-        while let Some(step) = replay.next() {
-            let tick = tick(&step, &replay);
-            replayed.take(&step, tick);
-        }
+        // A file that was made up may hold a state that no controller reaches: its replay ends there.
+        let all = std::panic::AssertUnwindSafe(|| {
+            while let Some(step) = replay.next() {
+                let tick = tick(&step, &replay);
+                replayed.take(&step, tick);
+            }
+        });
+        let whole = std::panic::catch_unwind(all).is_ok();
+        replayed.broken = !whole;
         for record in self.log() {
             if let Record::Snapshot(snapshot) = record
                 && let Some(hash) = snapshot.origin.arm

@@ -140,6 +140,8 @@ pub struct Replay<'a, M> {
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
+    /// Something that went in is not in the log, and what came out is the same all the same.
+    follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,
 }
@@ -153,7 +155,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         }
         let arm = controller.extensions.hash;
         let outcome = Outcome::Unsure(Unsure::NoSnapshot);
-        Self { log, controller, boots: None, chain: 0, outcome, arm, points_hash }
+        Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
     }
 
     /// The points of this hash are in memory.
@@ -200,7 +202,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         let next =
             self.boots != Some(snapshot.origin.boots) || self.controller.observed.tick != snapshot.tick();
         self.controller.restore(snapshot);
-        self.outcome = self.worth(snapshot);
+        (self.outcome, self.follows) = (self.worth(snapshot), false);
         (self.boots, self.chain) = (Some(snapshot.origin.boots), 0);
         let outcome = if follows { Outcome::Differs } else { self.outcome };
         // A tick that was replayed has been seen already.
@@ -235,17 +237,22 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         let outputs = self.controller.tick(&inputs);
         self.chain = chain(self.chain, &self.controller, &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
-        if !recorded.is_whole() {
+        let same = check(self.chain) == u32::from(recorded_check);
+        if !recorded.is_whole() && self.outcome == Outcome::Same {
             self.outcome = Outcome::Unsure(Unsure::Input);
+            self.follows = true;
         } else if self.outcome == Outcome::Same
             && !self.knows(self.controller.points_hash())
             && recorded.host().iter().any(executes)
         {
             self.outcome = Outcome::Unsure(Unsure::Points);
-        } else if self.outcome == Outcome::Same && check(self.chain) != u32::from(recorded_check) {
+        } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        self.step(Some(*recorded), Some(outputs), self.outcome)
+        // What is missing may have changed nothing: as long as the same comes out, it has not.
+        self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
+        let outcome = if self.follows { Outcome::Same } else { self.outcome };
+        self.step(Some(*recorded), Some(outputs), outcome)
     }
 }
 

@@ -41,13 +41,14 @@ impl Story {
     /// Of a log that was replayed.
     pub fn of(log: &Replayed) -> Self {
         let mut events = Vec::new();
-        let mut teller = Teller { config: log.config.as_deref(), events: &mut events, silent: [0; 6] };
+        let mut narrator =
+            Narrator { config: log.config.as_deref(), events: &mut events, silent: [0; 6], sent: None };
         let mut last: Option<&Tick> = None;
         for tick in &log.ticks {
             if let Some(last) = last {
-                teller.between(last, tick);
+                narrator.between(last, tick);
             } else {
-                teller.begin(tick);
+                narrator.begin(tick);
             }
             last = Some(tick);
         }
@@ -117,17 +118,21 @@ fn names(joints: &[Joint]) -> String {
     }
 }
 
+/// Frames of one kind that follow each other within this time are one event, ms.
+const SAME_MS: u64 = 50;
 /// Ticks without an answer of a joint before it is worth a word.
 const SILENT: u32 = 3;
 
-struct Teller<'a> {
+struct Narrator<'a> {
     config: Option<&'a Config>,
     events: &'a mut Vec<Event>,
     /// Ticks for which each joint has not answered.
     silent: [u32; 6],
+    /// The last frame of a host, and when it was.
+    sent: Option<(FrameType, u64)>,
 }
 
-impl Teller<'_> {
+impl Narrator<'_> {
     fn push(&mut self, tick: &Tick, error: bool, text: impl Into<String>) {
         let time_s = tick.tick as f64 * 1e-3;
         self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
@@ -146,6 +151,15 @@ impl Teller<'_> {
         self.push(tick, error, text);
         if let Some(event) = self.events.last_mut() {
             event.joints.push(joint);
+        }
+    }
+
+    /// A frame of a host. A long one is executed over some ticks, and one often follows another of its kind.
+    fn host_sends(&mut self, tick: &Tick, kind: FrameType) {
+        let before = self.sent.replace((kind, tick.tick));
+        let goes_on = before.is_some_and(|(last, at)| last == kind && tick.tick - at <= SAME_MS);
+        if !goes_on {
+            self.push(tick, false, format!("a host sends: {}", words::request(kind)));
         }
     }
 
@@ -215,7 +229,7 @@ impl Teller<'_> {
                 // Requests that change nothing are no event.
                 (_, Some(kind)) if kind.is_extension() && kind < FrameType::SetSettings => {}
                 (_, Some(FrameType::GetArm | FrameType::GetLog | FrameType::GetPoints)) => {}
-                (_, Some(kind)) => self.push(tick, false, format!("a host sends: {}", words::request(kind))),
+                (_, Some(kind)) => self.host_sends(tick, kind),
             }
         }
     }
@@ -325,9 +339,14 @@ impl Teller<'_> {
                 }
             }
             joint_error::ACCELERATION => (larger(|s| s.set_acceleration), limits.acceleration_max, "rad/s²"),
-            joint_error::TORQUE => (larger(|s| s.torque), limits.torque_max, "N·m"),
+            joint_error::TORQUE => (larger(computed), limits.torque_max, "N·m"),
             _ => return format!("{name}, in {state}"),
         };
         format!("{name}: {value:.4} {unit} (limit {limit}), in {state}")
     }
+}
+
+/// The torque that the control law wanted, which the limit has cut.
+fn computed(s: &JointSample) -> f64 {
+    s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
 }

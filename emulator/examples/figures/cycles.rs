@@ -1,4 +1,4 @@
-//! Cycles of one control step: the instructions that were executed, one after another, through llvm-mca's model of the core.
+//! Cycles of one control step, and of the flight recorder behind it: the instructions that were executed, one after another, through llvm-mca's model of the core.
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
@@ -10,8 +10,9 @@ use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 use crate::rig::{Rig, Version};
 use crate::session::Session;
 
-/// Cycles that a control step should take at most.
-const AIM: u64 = 12_000;
+/// What is measured: its name, its symbol, and the cycles that it should take at most.
+const PARTS: [(&str, &str, u64); 2] =
+    [("control step in Operate", "control_step", 12_000), ("tick of the flight recorder", "record_step", 500)];
 
 /// Measures a step in Operate and prints it.
 pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
@@ -22,20 +23,22 @@ pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     session.execute();
     session.run_ms(700);
     assert_eq!(session.rig.state(), ControllerState::Operate);
-    let trace = trace(&mut session.rig)?;
-    let lines = straight(&trace, &disassembly(path)?)?;
-    let cycles = simulate(&lines.join("\n"))?;
-    println!(
-        "  one control step in Operate: {} instructions, {cycles} cycles = {:.1} µs by llvm-mca; the aim is {AIM}",
-        lines.len(),
-        cycles as f64 * 1e6 / f64::from(version.core_hz)
-    );
+    let text = disassembly(path)?;
+    for (name, symbol, aim) in PARTS {
+        let lines = straight(&trace(&mut session.rig, symbol)?, &text)?;
+        let cycles = simulate(&lines.join("\n"))?;
+        println!(
+            "  one {name}: {} instructions, {cycles} cycles = {:.1} µs by llvm-mca; the aim is {aim}",
+            lines.len(),
+            cycles as f64 * 1e6 / f64::from(version.core_hz)
+        );
+    }
     Ok(())
 }
 
-/// Addresses of the instructions of the next control step.
-fn trace(rig: &mut Rig) -> Result<Vec<u32>, Box<dyn Error>> {
-    let entry = rig.board.machine.elf().symbol("control_step")?.address;
+/// Addresses of the instructions of the next call of a function of the tick.
+fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
+    let entry = rig.board.machine.elf().symbol(symbol)?.address;
     let flight = rig.board.machine.elf().symbol("FLIGHT")?.address;
     let machine = &mut rig.board.machine;
     let cycle = machine.chip().cycle();
@@ -51,7 +54,7 @@ fn trace(rig: &mut Rig) -> Result<Vec<u32>, Box<dyn Error>> {
     while machine.pc() & !1 != entry {
         steps(machine, 1);
         if phase(machine) != Some(1) {
-            return Err("the control step was missed".into());
+            return Err(format!("{symbol} was missed").into());
         }
     }
     let back = machine.register(RegisterARM::LR) & !1;
@@ -60,7 +63,7 @@ fn trace(rig: &mut Rig) -> Result<Vec<u32>, Box<dyn Error>> {
         addresses.push(machine.pc() & !1);
         steps(machine, 1);
         if addresses.len() > 100_000 {
-            return Err("the control step does not return".into());
+            return Err(format!("{symbol} does not return").into());
         }
     }
     Ok(addresses)

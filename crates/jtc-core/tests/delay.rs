@@ -160,7 +160,13 @@ impl ExactArm {
             if done(&self.rig) {
                 return;
             }
-            for (j, joint) in self.tick(led).iter().enumerate() {
+            let joints = self.tick(led);
+            let taught = self.rig.state() == ControllerState::Teaching;
+            for (j, joint) in joints.iter().enumerate() {
+                assert!(
+                    !taught || joint.position_error() == 0.0,
+                    "an arm that is led is where it is to be: {joint:?}"
+                );
                 let pid = [joint.torque_p, joint.torque_i, joint.torque_d];
                 // Velocities come over the bus in steps of 61 µrad/s.
                 let quiet = pid.iter().all(|part| part.abs() < 0.05);

@@ -178,8 +178,11 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     let mut motion = holding([true; JOINTS], true);
     motion.law.torque[2].friction = 7.0;
     motion.set.catch[1] = Catch::begin(&Config::avena());
+    motion.set.begin_at(&[0.1; JOINTS]);
     motion.release(&nodes);
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
+    // J-62: nor has it an error.
+    assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
     assert_eq!((motion.set.holding, motion.law.yielding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());
 }

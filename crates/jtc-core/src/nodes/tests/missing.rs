@@ -1,4 +1,6 @@
 //! Moves without answer, without a possible answer, and without acknowledge (J-14, J-35, J-63).
+extern crate std;
+
 use super::*;
 
 #[test]
@@ -60,6 +62,34 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     (nodes.unacknowledged, nodes.nodes[GRIPPER].missed) = (1, 4);
     tick(&mut nodes, &[], lost);
     assert!(!nodes.node(GRIPPER).misbehaved);
+}
+
+/// Of two answers in a tick the first was late: that the second is ahead of it is no motion. In the next tick one answer is again
+/// what it is.
+#[test]
+fn j63_the_second_answer_of_a_tick_makes_no_step() {
+    let mut nodes = ready();
+    tick(&mut nodes, &all(NodeState::READY), GOOD);
+    let answer = |position: f64| {
+        let report = JointReport { state: NodeState::READY, position, ..JointReport::default() };
+        Answer::Joint { node: 2, report }.emit(SCALE)
+    };
+    let mut bus: std::vec::Vec<Frame> = all(NodeState::READY).into();
+    bus[2] = answer(0.001);
+    tick(&mut nodes, &bus, GOOD);
+    let before = nodes.positions()[2];
+    // Where it would be by now, and a millirad further.
+    bus.push(answer(0.003));
+    tick(&mut nodes, &bus, GOOD);
+    let carried = nodes.positions()[2] - before;
+    assert!(carried < 0.5e-3, "{carried} rad in a tick");
+    assert!((nodes.node(2).report.position - 0.003).abs() < 1e-6, "the last one counts");
+    bus.pop();
+    bus[2] = answer(0.004);
+    let (offset, before) = (0.003 - nodes.positions()[2], nodes.positions()[2]);
+    tick(&mut nodes, &bus, GOOD);
+    let step = nodes.positions()[2] - before;
+    assert!((step - 0.001).abs() < 0.1 * offset, "{step} rad");
 }
 
 #[test]

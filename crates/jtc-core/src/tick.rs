@@ -50,8 +50,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// The answers of the nodes, and whether this tick comes in time.
     fn take_answers(&mut self, inputs: &Inputs<'_>) {
-        self.motion.set.next_tick();
+        let found_moving = self.motion.set.next_tick();
         let commanded = self.motion.set.due_velocity(&self.config);
+        if found_moving != [false; JOINTS] {
+            self.nodes.go_on_moving(&found_moving, commanded);
+        }
         self.nodes.take(inputs, &self.config, self.goal(), commanded);
         self.pump &= !self.nodes.gripper_lost();
         if self.late_ticks.count(inputs.missed_ticks) {

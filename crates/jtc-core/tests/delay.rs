@@ -372,3 +372,34 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }
+
+/// Measurements that are lost while a joint begins to be held in motion are predicted as ever: that its set values begin to move is
+/// no change of its motion.
+#[test]
+fn j63_a_loss_over_the_end_of_teaching_makes_no_step() {
+    for late in [2, 5] {
+        for led in [0.4, -0.8] {
+            for begin in 0..8 {
+                let mut arm = ExactArm::holding(late);
+                arm.rig.send(FrameType::TeachingModeEnable, &[]);
+                for _ in 0..200 {
+                    arm.tick(0.0);
+                }
+                for _ in 0..200 {
+                    arm.tick(led);
+                }
+                arm.rig.send(FrameType::TeachingModeDisable, &[]);
+                for tick in 0..200 {
+                    arm.rig.nodes[0].silent = (begin..begin + 4).contains(&tick);
+                    let joint = arm.tick(led)[0];
+                    assert_eq!(arm.rig.errors(), 0);
+                    let error = joint.position_error().abs();
+                    assert!(
+                        error < 1e-4,
+                        "{late} ticks late, {led} rad/s, lost from {begin}, tick {tick}: {error} rad"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -22,6 +22,8 @@ pub(crate) struct SetValues {
     pub(super) holding: [bool; JOINTS],
     /// The joint is set absent (J-53): there is nothing to hold.
     absent: [bool; JOINTS],
+    /// Joints whose set values began to move because they were found in motion, since the last tick.
+    found_moving: [bool; JOINTS],
     /// Joints whose load is being caught.
     pub(super) catch: [Catch; JOINTS],
     /// Joints that decelerate to rest.
@@ -30,16 +32,15 @@ pub(crate) struct SetValues {
     jog: Option<Jog>,
 }
 
-remembered!(SetValues { point, commanded, holding, absent, catch, deceleration, jog });
+remembered!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, jog });
 
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { point, commanded, holding, absent, catch, deceleration, jog } = self;
+        let Self { point, commanded, holding, absent, found_moving, catch, deceleration, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         commanded.rest(nodes.positions());
-        *holding = [false; JOINTS];
-        *absent = [false; JOINTS];
+        (*holding, *absent, *found_moving) = ([false; JOINTS], [false; JOINTS], [false; JOINTS]);
         *catch = [Catch::default(); JOINTS];
         *deceleration = [None; JOINTS];
         *jog = None;
@@ -59,9 +60,11 @@ impl SetValues {
         self.commanded.rest(nodes.positions());
     }
 
-    /// The next tick begins.
-    pub fn next_tick(&mut self) {
+    /// The next tick begins. Returns joints whose set values began to move in the last one, without a change of their motion: they
+    /// were found in it.
+    pub fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
+        core::mem::take(&mut self.found_moving)
     }
 
     /// Positions (rad) that are due in the measurement of this tick (J-62).
@@ -118,6 +121,7 @@ impl SetValues {
         // J-62: it has gone on since.
         deceleration.shift(self.commanded.position(0)[j] - from);
         self.deceleration[j] = Some(deceleration);
+        self.found_moving[j] = true;
     }
 
     /// A joint that comes to rest because a hand has led it is stopped like one with a falling load.

@@ -146,6 +146,11 @@ impl Measurement {
         self.known = false;
     }
 
+    /// What is commanded is from now on relative to this velocity, rad/s.
+    pub fn go_on_moving(&mut self, commanded: f64) {
+        self.commanded = commanded;
+    }
+
     /// One tick; false when the answer is not usable, or there is none.
     pub fn step(&mut self, tick: &Tick, config: &Config) -> bool {
         let change = tick.commanded - self.commanded;

@@ -278,6 +278,15 @@ impl Nodes {
         }
     }
 
+    /// Joints were found in motion, and what is commanded began with it (rad/s): that is no change of their motion (J-63).
+    pub fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
+        for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
+            if *found {
+                node.measured.go_on_moving(*commanded);
+            }
+        }
+    }
+
     /// Positions and velocities from the nodes that `answered`, so long after the last tick; returns those whose answers are usable.
     fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], elapsed_ms: u32, config: &Config) -> u8 {
         let (mut usable, mut still) = (answered, true);

@@ -10,6 +10,12 @@ use jtc_wire::{ControllerState, TrajectoryState};
 pub(crate) trait BitSink {
     /// Appends the lowest `bits` (0 to 32) of `value`, which has none above them.
     fn put(&mut self, value: u32, bits: u32);
+
+    /// Appends two whole words.
+    fn put_pair(&mut self, first: u32, second: u32) {
+        self.put(first, 32);
+        self.put(second, 32);
+    }
 }
 
 /// Gives bits back in the order in which they were put.
@@ -79,8 +85,7 @@ impl Remembered for u64 {
         // Many are zero: numbers of joints at rest.
         to.put((*self != 0).into(), 1);
         if *self != 0 {
-            to.put(*self as u32, 32);
-            to.put((*self >> 32) as u32, 32);
+            to.put_pair(*self as u32, (*self >> 32) as u32);
         }
     }
 

@@ -120,6 +120,13 @@ impl Read {
         };
         let mut lines =
             vec![format!("{} ticks, {} replayed, {verdict}", replayed.ticks.len(), replayed.same)];
+        if replayed.difference.is_some() {
+            lines.push(format!(
+                "a replay is exact with a program of the same version only: this is jtc {}, the log is of {}",
+                env!("CARGO_PKG_VERSION"),
+                self.log.device
+            ));
+        }
         if replayed.broken {
             lines.push("the log holds a state that no controller reaches; the replay ends there".to_owned());
         }

@@ -18,8 +18,6 @@ pub const HOST_BYTES: usize = 48;
 const ALLOWANCE: (u16, u16) = (2, 500);
 /// What an event takes beside its bytes.
 const EVENT_BYTES: u16 = 2;
-/// Words of a payload.
-const WORDS: usize = MAX_LEN / 4;
 
 /// How a number is written, by its size: not at all when 0, else in so many bits.
 struct Code(u32, u32, u32);
@@ -39,17 +37,18 @@ fn straight(code: u32) -> i32 {
 }
 
 impl Code {
+    /// The bits of a number, and how many they are.
     #[inline]
-    fn write<S: BitSink>(&self, value: i32, to: &mut S) {
+    fn bits(&self, value: i32) -> (u32, u32) {
         let code = zigzag(value);
         if code == 0 {
-            to.put(0, 1);
+            (0, 1)
         } else if code >> self.0 == 0 {
-            to.put(0b01 | code << 2, 2 + self.0);
+            (0b01 | code << 2, 2 + self.0)
         } else if code >> self.1 == 0 {
-            to.put(0b011 | code << 3, 3 + self.1);
+            (0b011 | code << 3, 3 + self.1)
         } else {
-            to.put(0b111 | code << 3, 3 + self.2);
+            (0b111 | code << 3, 3 + self.2)
         }
     }
 
@@ -68,18 +67,18 @@ fn prefix<S: BitSource>(from: &mut S) -> u32 {
     (0..3).find(|_| from.take(1) == 0).unwrap_or(3)
 }
 
+/// The bits of a change of position, and how many they are; of a large one the change follows.
 #[inline]
-fn write_position<S: BitSink>(change: i32, to: &mut S) {
+fn position_bits(change: i32) -> (u32, u32) {
     let (code, steps) = (zigzag(change), zigzag(change >> 16));
     if change == 0 {
-        to.put(0, 1);
+        (0, 1)
     } else if change as u16 == 0 && steps >> STEPS == 0 {
-        to.put(0b01 | steps << 2, 2 + STEPS);
+        (0b01 | steps << 2, 2 + STEPS)
     } else if code >> FINE == 0 {
-        to.put(0b011 | code << 3, 3 + FINE);
+        (0b011 | code << 3, 3 + FINE)
     } else {
-        to.put(0b111, 3);
-        to.put(change as u32, 32);
+        (0b111, 3)
     }
 }
 
@@ -97,7 +96,8 @@ fn read_position<S: BitSource>(from: &mut S) -> i32 {
 pub(super) struct Reference {
     /// The last answer to a Move of each node: bytes, and big-endian words.
     len: [u8; NODES],
-    words: [[u32; WORDS]; NODES],
+    words: [[u32; 4]; NODES],
+    tails: [[u32; 2]; NODES],
     /// How many nodes answer.
     expected: u8,
     /// Bytes of frames of hosts that may still be recorded.
@@ -106,19 +106,41 @@ pub(super) struct Reference {
 
 impl Default for Reference {
     fn default() -> Self {
-        Self { len: [16; NODES], words: [[0; WORDS]; NODES], expected: NODES as u8, allowance: ALLOWANCE.1 }
+        Self {
+            len: [16; NODES],
+            words: [[0; 4]; NODES],
+            tails: [[0; 2]; NODES],
+            expected: NODES as u8,
+            allowance: ALLOWANCE.1,
+        }
     }
 }
 
-/// Bytes of a frame as big-endian words; `None` where that leaves a rest.
+/// Big-endian words.
 #[inline]
-fn words(frame: &Frame) -> Option<[u32; WORDS]> {
-    let (chunks, rest) = frame.data().as_chunks::<4>();
-    let mut words = [0; WORDS];
-    for (to, from) in words.iter_mut().zip(chunks) {
+fn words(bytes: &[u8; 16]) -> [u32; 4] {
+    let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *bytes;
+    [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_be_bytes)
+}
+
+/// What is behind the first 16 bytes of a payload, and zeros.
+fn tail(bytes: &[u8]) -> [u32; 2] {
+    let mut words = [0; 2];
+    for (to, from) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
         *to = u32::from_be_bytes(*from);
     }
-    rest.is_empty().then_some(words)
+    words
+}
+
+/// Words that have changed.
+#[inline(never)]
+fn write_words<S: BitSink>(now: &[u32], before: &[u32], to: &mut S) {
+    for (now, before) in now.iter().zip(before) {
+        to.put((now != before).into(), 1);
+        if now != before {
+            to.put(*now, 32);
+        }
+    }
 }
 
 fn is_move_answer(frame: &Frame) -> bool {
@@ -201,28 +223,46 @@ impl Reference {
     /// An answer of node `n` to a Move, of the length that is known.
     #[inline]
     fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
-        let (Some(before), Some(now)) = (self.words.get_mut(n), words(frame)) else { return };
-        let count = frame.data().len() / 4;
-        let first = if n < JOINTS {
-            write_position(now[0].wrapping_sub(before[0]) as i32, to);
-            let velocity = |word: u32| i32::from((word >> 16) as i16);
-            VELOCITY.write(velocity(now[1]) - velocity(before[1]), to);
-            TORQUE.write(i32::from(now[1] as i16) - i32::from(before[1] as i16), to);
-            2
-        } else {
-            0
-        };
-        let same = now.get(first..) == before.get(first..);
-        to.put((!same).into(), 1);
-        if !same {
-            for (now, before) in now.iter().zip(&*before).take(count).skip(first) {
-                to.put((now != before).into(), 1);
-                if now != before {
-                    to.put(*now, 32);
+        let Some((before, tail_before)) = self.words.get_mut(n).zip(self.tails.get_mut(n)) else { return };
+        let Some((head, rest)) = frame.data().split_first_chunk() else { return };
+        let now = words(head);
+        let tail = if rest.is_empty() { [0; 2] } else { tail(rest) };
+        let mut changes = (now[2] ^ before[2])
+            | (now[3] ^ before[3])
+            | (tail[0] ^ tail_before[0])
+            | (tail[1] ^ tail_before[1]);
+        if n < JOINTS {
+            let change = now[0].wrapping_sub(before[0]) as i32;
+            let half = |word: u32| (i32::from((word >> 16) as i16), i32::from(word as i16));
+            let ((velocity, torque), last) = (half(now[1]), half(before[1]));
+            let (position, a) = position_bits(change);
+            let ((velocity, b), (torque, c)) =
+                (VELOCITY.bits(velocity - last.0), TORQUE.bits(torque - last.1));
+            // As a rule all of it goes in one.
+            if a + b + c < 32 && position != 0b111 {
+                let rest = u32::from(changes != 0);
+                to.put(position | velocity << a | torque << (a + b) | rest << (a + b + c), a + b + c + 1);
+            } else {
+                to.put(position, a);
+                if position == 0b111 {
+                    to.put(change as u32, 32);
                 }
+                to.put(velocity, b);
+                to.put(torque, c);
+                to.put((changes != 0).into(), 1);
+            }
+        } else {
+            changes |= (now[0] ^ before[0]) | (now[1] ^ before[1]);
+            to.put((changes != 0).into(), 1);
+            if changes != 0 {
+                write_words(&now[..2], &before[..2], to);
             }
         }
-        *before = now;
+        if changes != 0 {
+            write_words(&now[2..], &before[2..], to);
+            write_words(tail.get(..rest.len() / 4).unwrap_or(&[]), tail_before, to);
+        }
+        (*before, *tail_before) = (now, tail);
     }
 
     /// What is not as ever, but for the joint bus.
@@ -495,8 +535,9 @@ impl Reference {
     }
 
     fn read_answer<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
-        let (words, len) = (self.words.get_mut(n)?, usize::from(*self.len.get(n)?));
-        let mut now = *words;
+        let (head, tail) = (self.words.get_mut(n)?, self.tails.get_mut(n)?);
+        let len = usize::from(*self.len.get(n)?);
+        let mut now = [head[0], head[1], head[2], head[3], tail[0], tail[1]];
         let first = if n < JOINTS {
             now[0] = now[0].wrapping_add(read_position(from) as u32);
             let velocity = i32::from((now[1] >> 16) as i16).wrapping_add(VELOCITY.read(from)) as u16;
@@ -515,7 +556,8 @@ impl Reference {
         }
         // What is behind a payload that has become shorter is zero on the other side.
         now.iter_mut().skip(len / 4).for_each(|word| *word = 0);
-        *words = now;
+        let [a, b, c, d, e, f] = now;
+        (*head, *tail) = ([a, b, c, d], [e, f]);
         let mut bytes = [0; MAX_LEN];
         for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now) {
             *to = word.to_be_bytes();

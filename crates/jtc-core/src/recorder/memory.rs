@@ -110,6 +110,13 @@ pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
     block
 }
 
+/// Where a block is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Place {
+    piece: usize,
+    block: usize,
+}
+
 /// Memory in one or more pieces, as one ring.
 pub(super) struct Ring<P, const N: usize> {
     pieces: [P; N],
@@ -132,16 +139,22 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         None
     }
 
-    fn block_mut(&mut self, sequence: u32) -> Option<&mut Block> {
-        let mut at = sequence.checked_rem(self.len())? as usize;
-        for piece in &mut self.pieces {
-            let len = piece.as_ref().len();
+    /// Where the block of this number is: its piece, and its place in that.
+    fn place(&self, sequence: u32) -> Place {
+        let mut at = sequence.checked_rem(self.len()).unwrap_or(0) as usize;
+        for (piece, blocks) in self.pieces.iter().enumerate() {
+            let len = blocks.as_ref().len();
             if at < len {
-                return piece.as_mut().get_mut(at);
+                return Place { piece, block: at };
             }
             at -= len;
         }
-        None
+        Place { piece: N, block: 0 }
+    }
+
+    #[inline]
+    fn at_mut(&mut self, place: Place) -> Option<&mut Block> {
+        self.pieces.get_mut(place.piece)?.as_mut().get_mut(place.block)
     }
 
     /// The block of this number, if it is there and whole.
@@ -168,6 +181,8 @@ pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
     /// Number of the open block; `None` before the first.
     open: Option<u32>,
+    /// Where it is.
+    place: Place,
     /// Number of the next block.
     next: u32,
     /// The head of the open block has been written.
@@ -190,9 +205,10 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         let (state, powered) = newest
             .and_then(|sequence| ring.whole(sequence))
             .map_or((LogState::Recording, false), |whole| (whole.state, whole.powered));
-        Self {
+        let mut writer = Self {
             ring,
             open: newest,
+            place: Place::default(),
             next: newest.map_or(0, |newest| newest.wrapping_add(1)),
             begun: true,
             word: HEAD,
@@ -202,7 +218,9 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
             snapshot: NONE,
             state,
             powered,
-        }
+        };
+        writer.place = writer.ring.place(newest.unwrap_or(0));
+        writer
     }
 
     pub fn into_memory(self) -> [P; N] {
@@ -245,7 +263,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         let sequence = self.next;
         self.next = sequence.wrapping_add(1);
         self.open = Some(sequence);
-        if let Some(block) = self.ring.block_mut(sequence) {
+        self.place = self.ring.place(sequence);
+        if let Some(block) = self.ring.at_mut(self.place) {
             block[head::MAGIC] = 0;
         }
         (self.begun, self.word, self.rest, self.fill, self.snapshot) = (false, HEAD, 0, 0, NONE);
@@ -254,8 +273,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
 
     /// Everything that was put counts from now on.
     pub fn commit(&mut self) {
-        let Self { rest, fill, hash, word, snapshot, state, powered, begun, open, .. } = *self;
-        let Some(block) = open.and_then(|sequence| self.ring.block_mut(sequence)) else { return };
+        let Self { rest, fill, hash, word, snapshot, state, powered, begun, open, place, .. } = *self;
+        let Some(block) = self.ring.at_mut(place).filter(|_| open.is_some()) else { return };
         if let Some(place) = block.get_mut(word) {
             *place = rest;
         }
@@ -276,7 +295,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     pub fn freeze(&mut self, state: LogState) {
         self.state = state;
         let flags = flags(state, self.powered);
-        if let Some(block) = self.open.and_then(|sequence| self.ring.block_mut(sequence)) {
+        let open = self.open.is_some();
+        if let Some(block) = self.ring.at_mut(self.place).filter(|_| open) {
             block[head::FLAGS] = flags;
         }
     }
@@ -309,7 +329,24 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         read
     }
 
+    /// A word is full; what `rest` and `fill` hold follows it.
+    #[inline]
+    fn full(&mut self, word: u32) {
+        if let Some(place) = self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word)) {
+            *place = word;
+        }
+        self.hash = mix(self.hash, word);
+        self.word += 1;
+        if self.word == BLOCK_WORDS {
+            let (rest, fill) = (self.rest, self.fill);
+            (self.rest, self.fill) = (0, 0);
+            self.next_block();
+            (self.rest, self.fill) = (rest, fill);
+        }
+    }
+
     #[cold]
+    #[inline(never)]
     fn next_block(&mut self) {
         // What is full counts as it is: its end may be in the middle of a tick, whose rest follows.
         self.commit();
@@ -336,21 +373,19 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             return;
         }
         let word = self.rest;
-        if let Some(place) = self.open.and_then(|n| self.ring.block_mut(n)).and_then(|b| b.get_mut(self.word))
-        {
-            *place = word;
-        }
-        self.hash = mix(self.hash, word);
-        self.word += 1;
         // What did not fit; nothing where all of it did.
         let used = 32 - self.fill;
         (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
-        if self.word == BLOCK_WORDS {
-            let (rest, fill) = (self.rest, self.fill);
-            (self.rest, self.fill) = (0, 0);
-            self.next_block();
-            (self.rest, self.fill) = (rest, fill);
-        }
+        self.full(word);
+    }
+
+    #[inline]
+    fn put_pair(&mut self, first: u32, second: u32) {
+        let (rest, fill) = (self.rest, self.fill);
+        let over = |value: u32| value.checked_shr(32 - fill).unwrap_or(0);
+        self.rest = over(second);
+        self.full(rest | first << fill);
+        self.full(over(first) | second << fill);
     }
 }
 

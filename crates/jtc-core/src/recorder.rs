@@ -252,10 +252,14 @@ fn chain<M>(chain: u32, controller: &Controller<M>, outputs: &Outputs) -> u32 {
         | u32::from(outputs.safety_output);
     let hash = mix(chain, states);
     let Some(frame) = &outputs.bus else { return hash };
-    let (words, rest) = frame.data().as_chunks::<4>();
-    let hash =
-        words.iter().fold(mix(hash, frame.id.into()), |hash, word| mix(hash, u32::from_le_bytes(*word)));
-    rest.iter().fold(hash, |hash, byte| mix(hash, (*byte).into()))
+    let hash = mix(hash, frame.id.into());
+    match frame.data().first_chunk::<16>() {
+        // A Move: all of its torques, and the pump.
+        Some(bytes) => {
+            bytes.as_chunks::<4>().0.iter().fold(hash, |hash, word| mix(hash, u32::from_le_bytes(*word)))
+        }
+        None => frame.data().iter().fold(hash, |hash, byte| mix(hash, (*byte).into())),
+    }
 }
 
 /// The part of it that is recorded: enough, because each check contains all ticks before it.

@@ -24,8 +24,7 @@ struct Code(u32, u32, u32);
 
 const VELOCITY: Code = Code(6, 11, 17);
 const TORQUE: Code = Code(5, 10, 17);
-/// Positions of a 16-bit encoder change the upper half only.
-const STEPS: u32 = 5;
+/// Bits of a change of position that is no whole number of encoder steps.
 const FINE: u32 = 22;
 
 fn zigzag(value: i32) -> u32 {
@@ -37,18 +36,16 @@ fn straight(code: u32) -> i32 {
 }
 
 impl Code {
-    /// The bits of a number, and how many they are.
-    #[inline]
-    fn bits(&self, value: i32) -> (u32, u32) {
+    fn write<S: BitSink>(&self, value: i32, to: &mut S) {
         let code = zigzag(value);
         if code == 0 {
-            (0, 1)
+            to.put(0, 1);
         } else if code >> self.0 == 0 {
-            (0b01 | code << 2, 2 + self.0)
+            to.put(0b01 | code << 2, 2 + self.0);
         } else if code >> self.1 == 0 {
-            (0b011 | code << 3, 3 + self.1)
+            to.put(0b011 | code << 3, 3 + self.1);
         } else {
-            (0b111 | code << 3, 3 + self.2)
+            to.put(0b111 | code << 3, 3 + self.2);
         }
     }
 
@@ -65,30 +62,6 @@ impl Code {
 /// How many ones there are in front of a zero, at most 3.
 fn prefix<S: BitSource>(from: &mut S) -> u32 {
     (0..3).find(|_| from.take(1) == 0).unwrap_or(3)
-}
-
-/// The bits of a change of position, and how many they are; of a large one the change follows.
-#[inline]
-fn position_bits(change: i32) -> (u32, u32) {
-    let (code, steps) = (zigzag(change), zigzag(change >> 16));
-    if change == 0 {
-        (0, 1)
-    } else if change as u16 == 0 && steps >> STEPS == 0 {
-        (0b01 | steps << 2, 2 + STEPS)
-    } else if code >> FINE == 0 {
-        (0b011 | code << 3, 3 + FINE)
-    } else {
-        (0b111, 3)
-    }
-}
-
-fn read_position<S: BitSource>(from: &mut S) -> i32 {
-    match prefix(from) {
-        0 => 0,
-        1 => straight(from.take(STEPS)) << 16,
-        2 => straight(from.take(FINE)),
-        _ => from.take(32) as i32,
-    }
 }
 
 /// What the next inputs are written against.
@@ -116,20 +89,71 @@ impl Default for Reference {
     }
 }
 
-/// Big-endian words.
+/// The first 16 bytes of a payload: position, velocity and torque as numbers, the rest as it is in memory.
 #[inline]
 fn words(bytes: &[u8; 16]) -> [u32; 4] {
     let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *bytes;
-    [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_be_bytes)
+    [
+        u32::from_be_bytes([a, b, c, d]),
+        u32::from_be_bytes([e, f, g, h]),
+        u32::from_le_bytes([i, j, k, l]),
+        u32::from_le_bytes([m, n, o, p]),
+    ]
 }
 
 /// What is behind the first 16 bytes of a payload, and zeros.
+#[inline]
 fn tail(bytes: &[u8]) -> [u32; 2] {
-    let mut words = [0; 2];
-    for (to, from) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
-        *to = u32::from_be_bytes(*from);
+    let word = |at: usize| {
+        bytes.get(at..).and_then(|bytes| bytes.first_chunk()).copied().map_or(0, u32::from_le_bytes)
+    };
+    [word(0), word(4)]
+}
+
+/// Bits of changes that are as small as those of most ticks: of the position in steps of a 16-bit encoder, of velocity and torque.
+const STEP_BITS: u32 = 5;
+const SPEED_BITS: u32 = 8;
+const TORQUE_BITS: u32 = 9;
+const SMALL_BITS: u32 = STEP_BITS + SPEED_BITS + TORQUE_BITS;
+
+/// The changes of a joint in one number, where each is small.
+#[inline]
+fn small(position: i32, velocity: i32, torque: i32) -> Option<u32> {
+    let a = ((position >> 16) + (1 << (STEP_BITS - 1))) as u32;
+    let b = (velocity + (1 << (SPEED_BITS - 1))) as u32;
+    let c = (torque + (1 << (TORQUE_BITS - 1))) as u32;
+    let beyond = (a >> STEP_BITS) | (b >> SPEED_BITS) | (c >> TORQUE_BITS) | (position as u32) << 16;
+    (beyond == 0).then_some(a | b << STEP_BITS | c << (STEP_BITS + SPEED_BITS))
+}
+
+/// The same back.
+fn small_parts(all: u32) -> (i32, i32, i32) {
+    let part = |from: u32, bits: u32| ((all >> from) & ((1 << bits) - 1)) as i32 - (1 << (bits - 1));
+    (part(0, STEP_BITS) << 16, part(STEP_BITS, SPEED_BITS), part(STEP_BITS + SPEED_BITS, TORQUE_BITS))
+}
+
+/// Changes of a joint of which one is large.
+#[inline(never)]
+fn write_large<S: BitSink>(position: i32, velocity: i32, torque: i32, to: &mut S) {
+    let code = zigzag(position);
+    if code >> FINE == 0 {
+        to.put(code << 1, 1 + FINE);
+    } else {
+        to.put(1, 1);
+        to.put(position as u32, 32);
     }
-    words
+    VELOCITY.write(velocity, to);
+    TORQUE.write(torque, to);
+}
+
+/// Changes of a joint as they were written.
+fn read_changes<S: BitSource>(is_small: bool, from: &mut S) -> (i32, i32, i32) {
+    if is_small {
+        return small_parts(from.take(SMALL_BITS));
+    }
+    let position = if from.take(1) == 0 { straight(from.take(FINE)) } else { from.take(32) as i32 };
+    let velocity = VELOCITY.read(from);
+    (position, velocity, TORQUE.read(from))
 }
 
 /// Words that have changed.
@@ -235,21 +259,14 @@ impl Reference {
             let change = now[0].wrapping_sub(before[0]) as i32;
             let half = |word: u32| (i32::from((word >> 16) as i16), i32::from(word as i16));
             let ((velocity, torque), last) = (half(now[1]), half(before[1]));
-            let (position, a) = position_bits(change);
-            let ((velocity, b), (torque, c)) =
-                (VELOCITY.bits(velocity - last.0), TORQUE.bits(torque - last.1));
-            // As a rule all of it goes in one.
-            if a + b + c < 32 && position != 0b111 {
-                let rest = u32::from(changes != 0);
-                to.put(position | velocity << a | torque << (a + b) | rest << (a + b + c), a + b + c + 1);
-            } else {
-                to.put(position, a);
-                if position == 0b111 {
-                    to.put(change as u32, 32);
+            let other = u32::from(changes != 0) << 1;
+            let (velocity, torque) = (velocity - last.0, torque - last.1);
+            match small(change, velocity, torque) {
+                Some(all) => to.put(1 | other | all << 2, 2 + SMALL_BITS),
+                None => {
+                    to.put(other, 2);
+                    write_large(change, velocity, torque, to);
                 }
-                to.put(velocity, b);
-                to.put(torque, c);
-                to.put((changes != 0).into(), 1);
             }
         } else {
             changes |= (now[0] ^ before[0]) | (now[1] ^ before[1]);
@@ -258,11 +275,12 @@ impl Reference {
                 write_words(&now[..2], &before[..2], to);
             }
         }
+        [before[0], before[1]] = [now[0], now[1]];
         if changes != 0 {
             write_words(&now[2..], &before[2..], to);
             write_words(tail.get(..rest.len() / 4).unwrap_or(&[]), tail_before, to);
+            (*before, *tail_before) = (now, tail);
         }
-        (*before, *tail_before) = (now, tail);
     }
 
     /// What is not as ever, but for the joint bus.
@@ -538,16 +556,19 @@ impl Reference {
         let (head, tail) = (self.words.get_mut(n)?, self.tails.get_mut(n)?);
         let len = usize::from(*self.len.get(n)?);
         let mut now = [head[0], head[1], head[2], head[3], tail[0], tail[1]];
-        let first = if n < JOINTS {
-            now[0] = now[0].wrapping_add(read_position(from) as u32);
-            let velocity = i32::from((now[1] >> 16) as i16).wrapping_add(VELOCITY.read(from)) as u16;
-            let torque = i32::from(now[1] as i16).wrapping_add(TORQUE.read(from)) as u16;
+        let changed = if n < JOINTS {
+            let (is_small, changed) = (from.take(1) != 0, from.take(1) != 0);
+            let (position, velocity, torque) = read_changes(is_small, from);
+            now[0] = now[0].wrapping_add(position as u32);
+            let velocity = i32::from((now[1] >> 16) as i16).wrapping_add(velocity) as u16;
+            let torque = i32::from(now[1] as i16).wrapping_add(torque) as u16;
             now[1] = u32::from(velocity) << 16 | u32::from(torque);
-            2
+            changed
         } else {
-            0
+            from.take(1) != 0
         };
-        if from.take(1) != 0 {
+        let first = if n < JOINTS { 2 } else { 0 };
+        if changed {
             for word in now.iter_mut().take(len / 4).skip(first) {
                 if from.take(1) != 0 {
                     *word = from.take(32);
@@ -559,8 +580,8 @@ impl Reference {
         let [a, b, c, d, e, f] = now;
         (*head, *tail) = ([a, b, c, d], [e, f]);
         let mut bytes = [0; MAX_LEN];
-        for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now) {
-            *to = word.to_be_bytes();
+        for (n, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now).enumerate() {
+            *to = if n < 2 { word.to_be_bytes() } else { word.to_le_bytes() };
         }
         Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..len)?)
     }

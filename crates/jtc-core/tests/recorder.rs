@@ -11,7 +11,7 @@ use jtc_core::{Config, ControllerState, Payload, settings};
 use jtc_wire::{Answer, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState};
 use rig::Rig;
 
-const BLOCKS: usize = 24;
+const BLOCKS: usize = 32;
 
 fn memory() -> [Vec<Block>; 2] {
     // Not of one size, and not clean: memory after power-up holds anything.

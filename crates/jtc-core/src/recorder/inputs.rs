@@ -7,7 +7,7 @@ use jtc_wire::{
 };
 
 use crate::io::{BusState, HostEvent, Inputs};
-use crate::nodes::FRAMES_MAX;
+use crate::nodes::{FRAMES_MAX, GRIPPER};
 use crate::remembered::{BitSink, BitSource};
 use crate::response_queue::HOST_LINES;
 use crate::{JOINTS, NODES};
@@ -116,14 +116,17 @@ const SPEED_BITS: u32 = 8;
 const TORQUE_BITS: u32 = 9;
 const SMALL_BITS: u32 = STEP_BITS + SPEED_BITS + TORQUE_BITS;
 
-/// The changes of a joint in one number, where each is small.
+/// Bits of the last word of six of them.
+const PACKED_REST: u32 = SMALL_BITS * JOINTS as u32 - 4 * 32;
+
+/// The changes of a joint in one number, and 0 where each is small.
 #[inline]
-fn small(position: i32, velocity: i32, torque: i32) -> Option<u32> {
+fn small(position: i32, velocity: i32, torque: i32) -> (u32, u32) {
     let a = ((position >> 16) + (1 << (STEP_BITS - 1))) as u32;
     let b = (velocity + (1 << (SPEED_BITS - 1))) as u32;
     let c = (torque + (1 << (TORQUE_BITS - 1))) as u32;
     let beyond = (a >> STEP_BITS) | (b >> SPEED_BITS) | (c >> TORQUE_BITS) | (position as u32) << 16;
-    (beyond == 0).then_some(a | b << STEP_BITS | c << (STEP_BITS + SPEED_BITS))
+    (a | b << STEP_BITS | c << (STEP_BITS + SPEED_BITS), beyond)
 }
 
 /// The same back.
@@ -189,24 +192,77 @@ impl Reference {
 
     fn write_bus<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
         let bus = bus.get(..FRAMES_MAX).unwrap_or(bus);
-        let ordered = bus.len() == usize::from(self.expected)
-            && bus
-                .iter()
-                .enumerate()
-                .all(|(n, frame)| frame.id == id::MOVE_ANSWER + n as u16 && self.has_len(n, frame));
+        let in_place = |(n, (frame, len)): (usize, (&Frame, &u8))| {
+            frame.id == id::MOVE_ANSWER + n as u16 && frame.data().len() == usize::from(*len)
+        };
+        let ordered =
+            bus.len() == usize::from(self.expected) && bus.iter().zip(&self.len).enumerate().all(in_place);
         to.put(ordered.into(), 1);
-        if ordered {
-            for (n, frame) in bus.iter().enumerate() {
-                self.write_answer(n, frame, to);
+        if !ordered {
+            return self.write_frames(bus, to);
+        }
+        // As a rule each joint has moved a little, and nothing else has changed.
+        let packed = self.packed(bus);
+        to.put(packed.is_some().into(), 1);
+        match packed {
+            Some(words) => {
+                to.put_pair(words[0], words[1]);
+                to.put_pair(words[2], words[3]);
+                to.put(words[4], PACKED_REST);
             }
-        } else {
-            self.write_frames(bus, to);
+            None => {
+                for (n, frame) in bus.iter().enumerate() {
+                    self.write_answer(n, frame, to);
+                }
+            }
         }
     }
 
+    /// What the joints have moved, in one number of 132 bits, where all moved little and nothing else has changed. Keeps the answers as
+    /// those that the next are written against, but only then.
     #[inline]
-    fn has_len(&self, n: usize, frame: &Frame) -> bool {
-        self.len.get(n).is_some_and(|len| usize::from(*len) == frame.data().len())
+    fn packed(&mut self, bus: &[Frame]) -> Option<[u32; 5]> {
+        let mut moved = [0u32; JOINTS];
+        let mut now = [[0u32; 2]; JOINTS];
+        let mut changes = 0;
+        let joints = bus.iter().zip(self.words.iter().zip(&self.tails));
+        for ((frame, (before, tail_before)), (moved, now)) in joints.zip(moved.iter_mut().zip(&mut now)) {
+            let (head, rest) = frame.data().split_first_chunk()?;
+            let words = words(head);
+            let tail = if rest.is_empty() { [0; 2] } else { tail(rest) };
+            changes |= (words[2] ^ before[2])
+                | (words[3] ^ before[3])
+                | (tail[0] ^ tail_before[0])
+                | (tail[1] ^ tail_before[1]);
+            let half = |word: u32| (i32::from((word >> 16) as i16), i32::from(word as i16));
+            let ((velocity, torque), last) = (half(words[1]), half(before[1]));
+            let change = words[0].wrapping_sub(before[0]) as i32;
+            let (all, beyond) = small(change, velocity - last.0, torque - last.1);
+            changes |= beyond;
+            *moved = all;
+            *now = [words[0], words[1]];
+        }
+        if let (Some(frame), Some(before), Some(tail_before)) =
+            (bus.get(GRIPPER), self.words.get(GRIPPER), self.tails.get(GRIPPER))
+        {
+            let (head, rest) = frame.data().split_first_chunk()?;
+            let (now, tail) = (words(head), tail(rest));
+            // Not compared as arrays: that would be a call.
+            changes |= (now[0] ^ before[0])
+                | (now[1] ^ before[1])
+                | (now[2] ^ before[2])
+                | (now[3] ^ before[3])
+                | (tail[0] ^ tail_before[0])
+                | (tail[1] ^ tail_before[1]);
+        }
+        if changes != 0 {
+            return None;
+        }
+        for (before, now) in self.words.iter_mut().zip(now) {
+            [before[0], before[1]] = now;
+        }
+        let [a, b, c, d, e, f] = moved;
+        Some([a | b << 22, b >> 10 | c << 12, c >> 20 | d << 2 | e << 24, e >> 8 | f << 14, f >> 18])
     }
 
     /// Frames in any order.
@@ -262,8 +318,8 @@ impl Reference {
             let other = u32::from(changes != 0) << 1;
             let (velocity, torque) = (velocity - last.0, torque - last.1);
             match small(change, velocity, torque) {
-                Some(all) => to.put(1 | other | all << 2, 2 + SMALL_BITS),
-                None => {
+                (all, 0) => to.put(1 | other | all << 2, 2 + SMALL_BITS),
+                _ => {
                     to.put(other, 2);
                     write_large(change, velocity, torque, to);
                 }
@@ -520,8 +576,9 @@ impl RecordedInputs {
 impl Reference {
     fn read_bus<S: BitSource>(&mut self, bus: &mut [Option<Frame>; FRAMES_MAX], from: &mut S) {
         if from.take(1) != 0 {
+            let packed = from.take(1) != 0;
             for (n, slot) in bus.iter_mut().enumerate().take(self.expected.into()) {
-                *slot = self.read_answer(n, from);
+                *slot = if packed { self.read_packed(n, from) } else { self.read_answer(n, from) };
             }
             return;
         }
@@ -552,17 +609,22 @@ impl Reference {
         self.expect(answers);
     }
 
+    /// An answer of which nothing but the motion has changed, and that little.
+    fn read_packed<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
+        if n < JOINTS {
+            let words = self.words.get_mut(n)?;
+            (words[0], words[1]) = moved(words[0], words[1], read_changes(true, from));
+        }
+        self.answer(n)
+    }
+
     fn read_answer<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
         let (head, tail) = (self.words.get_mut(n)?, self.tails.get_mut(n)?);
         let len = usize::from(*self.len.get(n)?);
         let mut now = [head[0], head[1], head[2], head[3], tail[0], tail[1]];
         let changed = if n < JOINTS {
             let (is_small, changed) = (from.take(1) != 0, from.take(1) != 0);
-            let (position, velocity, torque) = read_changes(is_small, from);
-            now[0] = now[0].wrapping_add(position as u32);
-            let velocity = i32::from((now[1] >> 16) as i16).wrapping_add(velocity) as u16;
-            let torque = i32::from(now[1] as i16).wrapping_add(torque) as u16;
-            now[1] = u32::from(velocity) << 16 | u32::from(torque);
+            (now[0], now[1]) = moved(now[0], now[1], read_changes(is_small, from));
             changed
         } else {
             from.take(1) != 0
@@ -579,10 +641,24 @@ impl Reference {
         now.iter_mut().skip(len / 4).for_each(|word| *word = 0);
         let [a, b, c, d, e, f] = now;
         (*head, *tail) = ([a, b, c, d], [e, f]);
+        self.answer(n)
+    }
+
+    /// The last answer of node `n` as a frame.
+    fn answer(&self, n: usize) -> Option<Frame> {
+        let ([a, b, c, d], [e, f]) = (*self.words.get(n)?, *self.tails.get(n)?);
+        let len = usize::from(*self.len.get(n)?);
         let mut bytes = [0; MAX_LEN];
-        for (n, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now).enumerate() {
+        for (n, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip([a, b, c, d, e, f]).enumerate() {
             *to = if n < 2 { word.to_be_bytes() } else { word.to_le_bytes() };
         }
         Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..len)?)
     }
+}
+
+/// Position, velocity and torque after these changes.
+fn moved(position: u32, other: u32, changes: (i32, i32, i32)) -> (u32, u32) {
+    let velocity = i32::from((other >> 16) as i16).wrapping_add(changes.1) as u16;
+    let torque = i32::from(other as i16).wrapping_add(changes.2) as u16;
+    (position.wrapping_add(changes.0 as u32), u32::from(velocity) << 16 | u32::from(torque))
 }

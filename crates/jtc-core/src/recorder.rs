@@ -10,6 +10,8 @@
 //! gives way to a new one as soon as torque comes on: an error at the start of a day is not to take the place of the one that matters.
 mod inputs;
 mod memory;
+mod reader;
+mod recorded;
 mod replay;
 mod snapshot;
 
@@ -24,7 +26,7 @@ use memory::Writer;
 #[doc(hidden)]
 pub use memory::sealed_block;
 
-pub use inputs::{RecordedEvent, RecordedInputs, RecordedKind};
+pub use recorded::{RecordedEvent, RecordedInputs, RecordedKind};
 pub use replay::{Log, Outcome, Record, Replay, Step, Unsure};
 pub use snapshot::{Origin, Snapshot};
 

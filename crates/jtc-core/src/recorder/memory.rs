@@ -8,14 +8,14 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
-use crate::remembered::{BitSink, BitSource};
+use crate::remembered::BitSink;
 
 /// "JTCF" and the version of the layout.
 const MAGIC: u32 = 0x4A46_0001;
 /// Words in front of the bits.
 const HEAD: usize = 5;
 /// Bits of a block.
-const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
+pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
 
 /// Where the words of the head are.
 mod head {
@@ -67,7 +67,7 @@ pub(super) struct Whole<'a> {
     pub snapshot: Option<u32>,
     pub state: LogState,
     pub powered: bool,
-    words: &'a [u32],
+    pub words: &'a [u32],
 }
 
 impl<'a> Whole<'a> {
@@ -386,74 +386,5 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         self.rest = over(second);
         self.full(rest | first << fill);
         self.full(over(first) | second << fill);
-    }
-}
-
-/// Reads the bits of blocks that follow each other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Reader<'a> {
-    blocks: &'a [Block],
-    /// Block in the list, and bit in it.
-    block: usize,
-    bit: u32,
-    current: Option<Whole<'a>>,
-    damaged: bool,
-}
-
-impl<'a> Reader<'a> {
-    /// From bit `bit` of the first of `blocks` on.
-    pub fn new(blocks: &'a [Block], bit: u32) -> Self {
-        let current = blocks.first().and_then(Whole::parse);
-        Self { blocks, block: 0, bit, current, damaged: false }
-    }
-
-    /// Block in the list that is read.
-    pub fn block(&self) -> usize {
-        self.block
-    }
-
-    /// Nothing is left, or the next bits are in a block that does not follow.
-    pub fn at_end(&mut self) -> bool {
-        self.advance();
-        self.current.is_none_or(|whole| self.bit >= whole.bits)
-    }
-
-    /// To the next block where this one is used up and another follows.
-    fn advance(&mut self) {
-        let Some(whole) = self.current else { return };
-        if self.bit < whole.bits || whole.bits < BITS {
-            return;
-        }
-        let next = self.blocks.get(self.block + 1).and_then(Whole::parse);
-        if let Some(next) = next.filter(|next| next.sequence == whole.sequence.wrapping_add(1)) {
-            (self.current, self.block, self.bit) = (Some(next), self.block + 1, 0);
-        }
-    }
-}
-
-impl BitSource for Reader<'_> {
-    fn take(&mut self, bits: u32) -> u32 {
-        let (mut value, mut got) = (0u64, 0);
-        while got < bits {
-            if self.at_end() {
-                self.damaged = true;
-                return 0;
-            }
-            let Some(whole) = self.current else { return 0 };
-            let (word, at) = ((self.bit / 32) as usize, self.bit % 32);
-            let here = (bits - got).min(32 - at).min(whole.bits - self.bit);
-            let word = u64::from(whole.words.get(word).copied().unwrap_or(0));
-            value |= ((word >> at) & ((1 << here) - 1)) << got;
-            (self.bit, got) = (self.bit + here, got + here);
-        }
-        value as u32
-    }
-
-    fn damage(&mut self) {
-        self.damaged = true;
-    }
-
-    fn is_damaged(&self) -> bool {
-        self.damaged
     }
 }

@@ -1,0 +1,73 @@
+//! The bits of blocks that follow each other, read back.
+use super::Block;
+use super::memory::{BITS, Whole};
+use crate::remembered::BitSource;
+
+/// Reads the bits of blocks that follow each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reader<'a> {
+    blocks: &'a [Block],
+    /// Block in the list, and bit in it.
+    block: usize,
+    bit: u32,
+    current: Option<Whole<'a>>,
+    damaged: bool,
+}
+
+impl<'a> Reader<'a> {
+    /// From bit `bit` of the first of `blocks` on.
+    pub fn new(blocks: &'a [Block], bit: u32) -> Self {
+        let current = blocks.first().and_then(Whole::parse);
+        Self { blocks, block: 0, bit, current, damaged: false }
+    }
+
+    /// Block in the list that is read.
+    pub fn block(&self) -> usize {
+        self.block
+    }
+
+    /// Nothing is left, or the next bits are in a block that does not follow.
+    pub fn at_end(&mut self) -> bool {
+        self.advance();
+        self.current.is_none_or(|whole| self.bit >= whole.bits)
+    }
+
+    /// To the next block where this one is used up and another follows.
+    fn advance(&mut self) {
+        let Some(whole) = self.current else { return };
+        if self.bit < whole.bits || whole.bits < BITS {
+            return;
+        }
+        let next = self.blocks.get(self.block + 1).and_then(Whole::parse);
+        if let Some(next) = next.filter(|next| next.sequence == whole.sequence.wrapping_add(1)) {
+            (self.current, self.block, self.bit) = (Some(next), self.block + 1, 0);
+        }
+    }
+}
+
+impl BitSource for Reader<'_> {
+    fn take(&mut self, bits: u32) -> u32 {
+        let (mut value, mut got) = (0u64, 0);
+        while got < bits {
+            if self.at_end() {
+                self.damaged = true;
+                return 0;
+            }
+            let Some(whole) = self.current else { return 0 };
+            let (word, at) = ((self.bit / 32) as usize, self.bit % 32);
+            let here = (bits - got).min(32 - at).min(whole.bits - self.bit);
+            let word = u64::from(whole.words.get(word).copied().unwrap_or(0));
+            value |= ((word >> at) & ((1 << here) - 1)) << got;
+            (self.bit, got) = (self.bit + here, got + here);
+        }
+        value as u32
+    }
+
+    fn damage(&mut self) {
+        self.damaged = true;
+    }
+
+    fn is_damaged(&self) -> bool {
+        self.damaged
+    }
+}

@@ -1,0 +1,257 @@
+//! The inputs of a tick as a log gives them back.
+use jtc_bus::{Frame, MAX_LEN, id};
+use jtc_wire::{
+    EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
+};
+
+use super::inputs::{HOST_BYTES, Reference, read_changes};
+use crate::JOINTS;
+use crate::io::{BusState, HostEvent, Inputs};
+use crate::nodes::FRAMES_MAX;
+use crate::remembered::BitSource;
+use crate::response_queue::HOST_LINES;
+
+/// An event of a host as it was recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedEvent {
+    /// Line.
+    pub line: usize,
+    /// An urgent command has overtaken it (J-04).
+    pub overtaken: bool,
+    /// Type byte, 0 where unknown.
+    pub frame_type: u8,
+    /// What it was.
+    pub kind: RecordedKind,
+    bytes: [u8; HOST_BYTES],
+    len: usize,
+}
+
+/// Kinds of [`RecordedEvent`]s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RecordedKind {
+    /// A good frame with its bytes.
+    Frame,
+    /// A good frame whose bytes are not in the log: too long, too many, or parameters.
+    Unrecorded,
+    /// A bad frame, and its status.
+    Bad(FrameStatus),
+    /// Noise, and its status.
+    Noise(FrameStatus),
+}
+
+impl RecordedEvent {
+    const NONE: Self = Self {
+        line: 0,
+        overtaken: false,
+        frame_type: 0,
+        kind: RecordedKind::Unrecorded,
+        bytes: [0; HOST_BYTES],
+        len: 0,
+    };
+
+    /// The bytes of a recorded frame.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&[])
+    }
+
+    /// As the controller gets it. In place of a frame that was not recorded: one that changes nothing.
+    pub fn event(&self) -> HostEvent<'_> {
+        let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
+            (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
+            (RecordedKind::Noise(status), _) => LinkEvent::Noise(Response::bad(self.frame_type, status, 0)),
+            (_, Some(frame_type)) => LinkEvent::Frame(FrameRef { frame_type, bytes: self.bytes() }),
+            (_, None) => LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0)),
+        };
+        HostEvent { line: self.line, overtaken: self.overtaken, event }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let mut event = Self { line: from.take(2) as usize, overtaken: from.take(1) != 0, ..Self::NONE };
+        event.frame_type = from.take(8) as u8;
+        let kind = from.take(2);
+        event.kind = match kind {
+            0 => {
+                event.len = (from.take(6) as usize).min(HOST_BYTES);
+                for byte in event.bytes.iter_mut().take(event.len) {
+                    *byte = from.take(8) as u8;
+                }
+                RecordedKind::Frame
+            }
+            1 => {
+                event.bytes = [0; HOST_BYTES];
+                RecordedKind::Unrecorded
+            }
+            kind => {
+                let status = FrameStatus::from_byte(from.take(3) as u8).unwrap_or_default();
+                if kind == 2 { RecordedKind::Bad(status) } else { RecordedKind::Noise(status) }
+            }
+        };
+        event
+    }
+}
+
+/// The inputs of a tick as they were recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedInputs {
+    /// State of the joint bus.
+    pub bus_state: BusState,
+    /// Level of the safety input.
+    pub safety_input: bool,
+    /// Ticks that did not come before this one.
+    pub missed_ticks: u16,
+    /// Stop and Pause that arrived.
+    pub urgent: [UrgentCommands; HOST_LINES],
+    /// The lines could take a status.
+    pub status_free: bool,
+    bus: [Option<Frame>; FRAMES_MAX],
+    host: [RecordedEvent; EVENTS_MAX],
+    host_len: usize,
+    left_out: bool,
+}
+
+impl RecordedInputs {
+    /// Frames of the joint bus.
+    pub fn bus(&self) -> impl Iterator<Item = Frame> + '_ {
+        self.bus.iter().map_while(|frame| *frame)
+    }
+
+    /// What hosts sent, as far as it was looked at.
+    pub fn host(&self) -> &[RecordedEvent] {
+        self.host.get(..self.host_len).unwrap_or(&[])
+    }
+
+    /// Every input is there: a replay of this tick does what the controller did.
+    pub fn is_whole(&self) -> bool {
+        !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
+    }
+
+    pub(super) fn read<S: BitSource>(reference: &mut Reference, from: &mut S) -> Self {
+        let status_free = from.take(1) != 0;
+        let mut inputs = Self {
+            bus_state: Inputs::QUIET.bus_state,
+            safety_input: true,
+            missed_ticks: 0,
+            urgent: [UrgentCommands::NONE; HOST_LINES],
+            status_free,
+            bus: [None; FRAMES_MAX],
+            host: [RecordedEvent::NONE; EVENTS_MAX],
+            host_len: 0,
+            left_out: false,
+        };
+        if from.take(1) == 0 {
+            inputs.read_rest(from);
+        }
+        reference.read_bus(&mut inputs.bus, from);
+        inputs
+    }
+
+    fn read_rest<S: BitSource>(&mut self, from: &mut S) {
+        self.safety_input = from.take(1) != 0;
+        self.bus_state = BusState { acknowledged: from.take(1) != 0, bus_off: from.take(1) != 0 };
+        if from.take(1) != 0 {
+            self.missed_ticks = from.take(16) as u16;
+        }
+        for commands in &mut self.urgent {
+            for _ in 0..from.take(2) {
+                let pause = from.take(1) != 0;
+                let command = if pause { UrgentCommand::Pause } else { UrgentCommand::Stop };
+                commands.add(command, from.take(8) as u8);
+            }
+        }
+        self.left_out = from.take(1) != 0;
+        self.host_len = (from.take(5) as usize).min(EVENTS_MAX);
+        for event in self.host.iter_mut().take(self.host_len) {
+            *event = RecordedEvent::read(from);
+        }
+    }
+}
+
+impl Reference {
+    fn read_bus<S: BitSource>(&mut self, bus: &mut [Option<Frame>; FRAMES_MAX], from: &mut S) {
+        if from.take(1) != 0 {
+            let packed = from.take(1) != 0;
+            for (n, slot) in bus.iter_mut().enumerate().take(self.expected.into()) {
+                *slot = if packed { self.read_packed(n, from) } else { self.read_answer(n, from) };
+            }
+            return;
+        }
+        let count = from.take(6) as usize;
+        let mut answers = 0;
+        for slot in bus.iter_mut().take(count) {
+            *slot = if from.take(1) != 0 {
+                let n = from.take(3) as usize;
+                answers |= 1u32 << n;
+                let len = 4 * (from.take(2) as u8 + 4);
+                if let Some(place) = self.len.get_mut(n) {
+                    *place = len;
+                }
+                self.read_answer(n, from)
+            } else {
+                let (id, len) = (from.take(11) as u16, from.take(5) as usize);
+                let mut data = [0; MAX_LEN];
+                for byte in data.iter_mut().take(len) {
+                    *byte = from.take(8) as u8;
+                }
+                data.get(..len).and_then(|data| Frame::new(id, data))
+            };
+            if slot.is_none() {
+                from.damage();
+                return;
+            }
+        }
+        self.expect(answers);
+    }
+
+    /// An answer of which nothing but the motion has changed, and that little.
+    fn read_packed<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
+        if n < JOINTS {
+            let words = self.words.get_mut(n)?;
+            (words[0], words[1]) = moved(words[0], words[1], read_changes(true, from));
+        }
+        self.answer(n)
+    }
+
+    fn read_answer<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
+        let (head, tail) = (self.words.get_mut(n)?, self.tails.get_mut(n)?);
+        let len = usize::from(*self.len.get(n)?);
+        let mut now = [head[0], head[1], head[2], head[3], tail[0], tail[1]];
+        let changed = if n < JOINTS {
+            let (is_small, changed) = (from.take(1) != 0, from.take(1) != 0);
+            (now[0], now[1]) = moved(now[0], now[1], read_changes(is_small, from));
+            changed
+        } else {
+            from.take(1) != 0
+        };
+        let first = if n < JOINTS { 2 } else { 0 };
+        if changed {
+            for word in now.iter_mut().take(len / 4).skip(first) {
+                if from.take(1) != 0 {
+                    *word = from.take(32);
+                }
+            }
+        }
+        // What is behind a payload that has become shorter is zero on the other side.
+        now.iter_mut().skip(len / 4).for_each(|word| *word = 0);
+        let [a, b, c, d, e, f] = now;
+        (*head, *tail) = ([a, b, c, d], [e, f]);
+        self.answer(n)
+    }
+
+    /// The last answer of node `n` as a frame.
+    fn answer(&self, n: usize) -> Option<Frame> {
+        let ([a, b, c, d], [e, f]) = (*self.words.get(n)?, *self.tails.get(n)?);
+        let len = usize::from(*self.len.get(n)?);
+        let mut bytes = [0; MAX_LEN];
+        for (n, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip([a, b, c, d, e, f]).enumerate() {
+            *to = if n < 2 { word.to_be_bytes() } else { word.to_le_bytes() };
+        }
+        Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..len)?)
+    }
+}
+
+/// Position, velocity and torque after these changes.
+fn moved(position: u32, other: u32, changes: (i32, i32, i32)) -> (u32, u32) {
+    let velocity = i32::from((other >> 16) as i16).wrapping_add(changes.1) as u16;
+    let torque = i32::from(other as i16).wrapping_add(changes.2) as u16;
+    (position.wrapping_add(changes.0 as u32), u32::from(velocity) << 16 | u32::from(torque))
+}

@@ -1,11 +1,11 @@
 //! The extensions of the protocol (J-50 to J-59): who the device is, its settings, the arm as one thing, jogging.
 mod answers;
 mod image;
+mod log;
 
 use jtc_wire::{
     Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, LogState, Name,
-    PAGE_BYTES, PAGE_POINTS, PAGE_VALUES, POINT_LEN, Points, RawPoint, StoreState, VALUE_LEN, Values,
-    capability,
+    PAGE_BYTES, PAGE_VALUES, RawPoint, StoreState, VALUE_LEN, Values, capability,
 };
 
 use crate::controller::Controller;
@@ -17,6 +17,7 @@ use crate::settings::{self, Live};
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use answers::Answers;
 use image::{ImageSource, StoredArm};
+pub use log::firmware_hash;
 
 /// Bytes of an arm image that are hashed or written in one tick.
 const IMAGE_PER_TICK: usize = 256;
@@ -89,36 +90,7 @@ impl Extensions {
     }
 }
 
-impl Extensions {
-    /// The arm in use has changed.
-    pub fn forget_hash(&mut self) {
-        (self.hash, self.hashed) = (None, (0, Hash::new()));
-    }
-}
-
-/// Hash of a firmware's version and revision, by which a log names it (FNV-1a, 64 bits).
-pub fn firmware_hash(version: &str, revision: &str) -> u64 {
-    Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
-}
-
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Another part of the hash of the arm, where it is not known.
-    pub(crate) fn hash_arm(&mut self) {
-        if self.extensions.hash.is_none() {
-            self.hash_more();
-        }
-    }
-
-    #[inline(never)]
-    fn hash_more(&mut self) {
-        let (offset, hash) = self.extensions.hashed;
-        let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
-        self.extensions.hashed = (offset, hash);
-        if self.image().hashed(offset) {
-            self.extensions.hash = Some(hash.value());
-        }
-    }
-
     /// Gives the controller its identity. For the board to call before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
@@ -362,21 +334,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let (read, total) = (self.image().read(offset.into(), &mut bytes), self.image().len() as u16);
         let bytes = bytes.get(..read).unwrap_or(&[]);
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
-    }
-
-    /// Points in memory, also of a trajectory that was given up (J-56).
-    fn get_points(&mut self, line: usize, first: u16) {
-        let held = self.store.held_points(first.into());
-        let mut bytes = [[0; POINT_LEN]; PAGE_POINTS];
-        let count = held.len().min(PAGE_POINTS);
-        for (slot, point) in bytes.iter_mut().zip(held) {
-            *slot = point.emit();
-        }
-        let page = bytes.get(..count).unwrap_or(&[]);
-        if let Some(points) = Points::parse(page.as_flattened()) {
-            let (_, total) = self.store.points_hash();
-            self.extensions.answers.put(line, &Answer::Points { first, total: total as u16, points });
-        }
     }
 
     /// All values or none (J-53). Where friction tables are in use, one is checked a tick.

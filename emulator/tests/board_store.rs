@@ -162,6 +162,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     rig.ask(HOST, &fixed::STORE_ARM);
     rig.wait("the arm is stored", 4_000, |rig| !working(rig));
     assert_eq!(mailbox(&rig.board.machine).state, DONE);
+    // The tick sees in its next turn what the links have done.
+    rig.run(2);
     rig.ask(HOST, &fixed::GET_INFO);
     rig.run(60);
     let given = rig.hosts[1].info.expect("an Info");

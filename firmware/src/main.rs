@@ -16,6 +16,7 @@
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_stm32::wdg::IndependentWatchdog;
+use jtc_core::recorder::Recorder;
 use openjtc_firmware::{BAUD, lines, version::Version};
 
 mod arm_store;
@@ -63,6 +64,8 @@ async fn main(_spawner: Spawner) {
     let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
         memory::take(boot.lost_power);
     let store = arm_store::load(arms);
+    // All of its memory is looked at, and that is slow memory: before the watchdog runs.
+    let recorder = Recorder::new(recorder, boot.cause.failed());
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;
     let [status_rs422, status_usb] = statuses;

@@ -31,7 +31,7 @@ use crate::uart::{self, Lookahead, Transmitter};
 type Jtc = Controller<&'static mut [RawPoint]>;
 
 /// The flight recorder, with its memory elsewhere.
-type FlightRecorder = Recorder<&'static mut [Block], 2>;
+pub type FlightRecorder = Recorder<&'static mut [Block], 2>;
 
 /// Bytes of a line that a tick looks through at most: more than two ticks bring at 15 MBd.
 const LOOK_MAX: usize = 4096;
@@ -57,8 +57,8 @@ pub struct Parts {
     pub lines: [Transmitter; lines::LINES],
     /// Reset unless a tick completes.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
-    /// Memory of the flight recorder, with what it held before this start.
-    pub recorder: [&'static mut [Block]; 2],
+    /// The flight recorder, with what it held before this start.
+    pub recorder: FlightRecorder,
     /// How this start came about.
     pub boot: Boot,
 }
@@ -127,7 +127,7 @@ pub fn start(parts: Parts) {
         lines,
         watchdog,
         flight: boot.flight,
-        recorder: Recorder::new(recorder, boot.cause.failed()),
+        recorder,
         links: Links::default(),
         left_out: 0,
         stored: arm_store::Progress::Idle,

@@ -11,8 +11,10 @@ use crate::rig::{Rig, Version};
 use crate::session::Session;
 
 /// What is measured: its name, its symbol, and the cycles that it should take at most.
-const PARTS: [(&str, &str, u64); 2] =
-    [("control step in Operate", "control_step", 12_000), ("tick of the flight recorder", "record_step", 500)];
+const PARTS: [(&str, &str, u64); 2] = [
+    ("control step in Operate", "control_step", 12_000),
+    ("tick of the flight recorder", "record_step", 500),
+];
 
 /// Measures a step in Operate and prints it.
 pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {

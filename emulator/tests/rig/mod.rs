@@ -12,7 +12,7 @@ mod shadow;
 
 use openjtc_emulator::clock::MICROSECOND;
 use openjtc_emulator::fdcan::{BusEntry, Outcome};
-use openjtc_emulator::{Board, BoardConfig, Port};
+use openjtc_emulator::{Board, BoardConfig, FIRST_LINE, Port};
 
 use jtc_core::{ControllerState, Telemetry};
 use jtc_sim::invariants::{Invariants, Moment};
@@ -25,6 +25,9 @@ pub use flight::{FLIGHT_SIZE, Flight};
 pub use host::Host;
 pub use shadow::Shadow;
 use shadow::{LogMemory, Start, no_log};
+
+/// Exception of the tick.
+const TIM7: usize = FIRST_LINE + 55;
 
 /// Both lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
@@ -200,13 +203,18 @@ impl Rig {
         // The longest takes a third of a millisecond: a model with all that follows from it.
         for _ in 0..80 {
             let flight = self.read_flight()?;
-            if flight.phase != Flight::PHASE_INPUTS {
+            if flight.phase != Flight::PHASE_INPUTS && !self.in_tick() {
                 return Some(flight);
             }
             let next = self.board.machine.now() + 5 * MICROSECOND;
             self.board.machine.run_until(next);
         }
         self.read_flight()
+    }
+
+    /// The interrupt of the tick is being executed.
+    fn in_tick(&mut self) -> bool {
+        self.board.machine.chip().core.contexts.contains(&TIM7)
     }
 
     /// The flight record as it is now; `None` when there is none.

@@ -164,9 +164,20 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
 
     /// The newest block.
     fn newest(&self) -> Option<u32> {
-        let all = self.pieces.iter().flat_map(|piece| piece.as_ref()).filter_map(Whole::parse);
-        // In its place: others are left from memory of another size.
-        all.map(|whole| whole.sequence).filter(|sequence| self.whole(*sequence).is_some()).max()
+        // By their heads first: the memory is slow, and drives wait for the first frame after a reset.
+        let mut below = None;
+        for _ in 0..self.len() {
+            let blocks = self.pieces.iter().flat_map(|piece| piece.as_ref());
+            let numbers =
+                blocks.filter(|block| block[head::MAGIC] == MAGIC).map(|block| block[head::SEQUENCE]);
+            let next = numbers.filter(|number| below.is_none_or(|below| *number < below)).max()?;
+            // In its place: others are left from memory of another size.
+            if self.whole(next).is_some() {
+                return Some(next);
+            }
+            below = Some(next);
+        }
+        None
     }
 
     fn wipe(&mut self) {

@@ -95,6 +95,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Phase::Waiting { elapsed_ms } => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.set.hold(&self.config);
+                if self.parameters.blend_left_ms() > 0 {
+                    self.motion.law.payload_comes();
+                }
                 self.parameters.blend_payload();
                 // On the path the model does not change (J-60).
                 if !self.motion.set.all_holding() || self.parameters.blend_left_ms() > 0 {

@@ -362,7 +362,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         if standing {
             if reloaded {
-                self.parameters.change_payload(&config);
+                // Nothing at another place, or in place of nothing, is no payload that comes or goes.
+                if config.payload.is_there() || self.config.payload.is_there() {
+                    self.parameters.change_payload(&config);
+                }
                 self.config.payload = config.payload;
             }
             self.set_speed(config.speed);

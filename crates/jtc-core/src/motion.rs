@@ -69,7 +69,8 @@ impl Motion {
     /// The arm is held at rest. What it carries is known, or is none of it: an arm that gives way has more likely a contact
     /// against it.
     pub fn may_be_taught(&self, config: &Config) -> bool {
-        self.set.all_holding() && (self.law.yielding || self.law.payload.is_known(config))
+        self.set.all_holding()
+            && (self.law.yielding || self.law.unwinds_ms > 0 || self.law.payload.is_known(config))
     }
 
     /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.

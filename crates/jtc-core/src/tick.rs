@@ -92,6 +92,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // The wait ends: the operator no longer expects the arm to go soft then.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
+        if self.parameters.blend_left_ms() > 0 {
+            self.motion.law.payload_comes();
+        }
         self.parameters.blend_payload();
         self.motion.latch(&self.nodes, &self.config);
         let jogged = self.motion.set.jogging();

@@ -291,3 +291,74 @@ fn j06_j60_a_model_is_held_with_its_payload() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body(low + 1.99)), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ArmModel, &body(low + 2.01)), DataStatus::IncorrectValue);
 }
+
+/// The farthest that a joint moves within `ms`, rad.
+fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
+    let from = arm.q;
+    let mut farthest = 0.0f64;
+    for _ in 0..ms {
+        arm.tick(rig);
+        farthest = arm.q.iter().zip(from).map(|(q, from)| (q - from).abs()).fold(farthest, f64::max);
+    }
+    farthest
+}
+
+fn taught(arm: &mut Plant, rig: &mut Rig) {
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    for _ in 0..5_000 {
+        if rig.state() == ControllerState::Teaching {
+            return;
+        }
+        arm.tick(rig);
+    }
+    panic!("no Teaching: {:?}", rig.controller.telemetry());
+}
+
+/// What the integral had found for a load is not a second one, when the load has just been given as the payload, or in a new model: an
+/// arm that nobody leads stays where it is.
+#[test]
+fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
+    for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {
+        for (friction, by_model, wait) in
+            [(1.0, false, 0), (0.3, false, 0), (0.3, false, 600), (0.3, true, 0)]
+        {
+            if by_model && mass > 3.0 {
+                continue;
+            }
+            let model = loaded(Parameters::avena().model, mass);
+            let mut arm = Plant::new(&model, LuGre::of_avena_times(friction), POSES[pose]);
+            let mut rig = arm.holding(Config::avena());
+            arm.run(&mut rig, 4_000);
+            if by_model {
+                rig.send(FrameType::ArmModel, &model_body(&model));
+            } else {
+                let body: Vec<u8> =
+                    settings::payload_values(&point_mass(mass)).flat_map(|v| v.emit()).collect();
+                rig.send(FrameType::SetSettings, &body);
+            }
+            arm.run(&mut rig, 2 + wait);
+            taught(&mut arm, &mut rig);
+            let way = drift(&mut arm, &mut rig, 3_000);
+            let state = rig.state();
+            let case =
+                format!("{mass} kg, pose {pose}, friction {friction}, by model {by_model}, after {wait} ms");
+            assert!(way < 0.005 && state == ControllerState::Teaching, "{case}: {way} rad, {state:?}");
+        }
+    }
+}
+
+/// A centre of mass without a mass is no payload: it takes nothing of what Teaching carries.
+#[test]
+fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
+    let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);
+    let mut rig = arm.holding(Config::avena());
+    arm.run(&mut rig, 4_000);
+    taught(&mut arm, &mut rig);
+    arm.run(&mut rig, 1_000);
+    let nowhere = Payload { com: [0.1, 0.0, 0.0], ..Payload::NONE };
+    let body: Vec<u8> = settings::payload_values(&nowhere).flat_map(|value| value.emit()).collect();
+    rig.send(FrameType::SetSettings, &body);
+    let way = drift(&mut arm, &mut rig, 2_000);
+    assert!(way < 0.005, "{way} rad");
+    assert_eq!(rig.controller.config().payload, nowhere, "it is taken");
+}

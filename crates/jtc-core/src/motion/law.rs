@@ -40,6 +40,9 @@ impl ControlMode {
     }
 }
 
+/// Longest time that the integral takes to give back what it had found for a payload that is given, ms.
+const UNWINDS_MS: u16 = 3_000;
+
 /// What a tick of the control law is given.
 pub(crate) struct LawInputs<'a> {
     pub mode: ControlMode,
@@ -68,14 +71,17 @@ pub(crate) struct ControlLaw {
     transfer: Transfer,
     /// The arm gives way: the control law adds only so much to the torque of the model (J-66).
     pub(super) yielding: bool,
+    /// Time left in which what is missing is what the controller had found for a payload that is now given, ms (J-60).
+    pub(super) unwinds_ms: u16,
 }
 
-remembered!(ControlLaw { pid, torque, payload, transfer, yielding });
+remembered!(ControlLaw { pid, torque, payload, transfer, yielding, unwinds_ms });
 
 impl ControlLaw {
     /// No torque is remembered.
     pub fn release(&mut self) {
-        let Self { pid, torque, payload, transfer, yielding } = self;
+        let Self { pid, torque, payload, transfer, yielding, unwinds_ms } = self;
+        *unwinds_ms = 0;
         *pid = Default::default();
         *torque = Default::default();
         *payload = Payload::default();
@@ -90,6 +96,8 @@ impl ControlLaw {
 
     /// The model changes under the holding arm: bumpless transfer without any step.
     pub fn change_model(&mut self) {
+        // What was missing was missing in the last one.
+        self.payload.forget();
         self.transfer.change_model();
     }
 
@@ -130,7 +138,16 @@ impl ControlLaw {
     /// against it is more likely a contact than a mass.
     pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.stand_firm();
+        if self.unwinds_ms > 0 {
+            self.payload.forget();
+        }
         self.payload.fit(dynamics, nodes.positions(), config);
+    }
+
+    /// The payload of the arm comes into the model under the holding arm: what is missing says nothing until the integral has given
+    /// back what it had found for it (J-60).
+    pub fn payload_comes(&mut self) {
+        self.unwinds_ms = UNWINDS_MS;
     }
 
     /// The payload of the arm was given in Teaching, and comes into the model in so many more ticks (J-60).
@@ -160,6 +177,7 @@ impl ControlLaw {
         saturated: &[bool; JOINTS],
     ) -> [u16; JOINTS] {
         let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
+        self.unwinds_ms = self.unwinds_ms.saturating_sub(1);
         let before = self.transfer.begin(&self.torque);
         let q = nodes.positions();
         let v = nodes.velocities();

@@ -146,7 +146,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     where
         M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
     {
-        self.writer.powered |= controller.state.has_torque();
+        let torque = controller.state.has_torque();
+        if torque && !self.writer.powered {
+            // An error before there was torque does not stop the log.
+            self.stops_in = None;
+        }
+        self.writer.powered |= torque;
         if self.held > 0 {
             // An error is not to be missed.
             self.held = if new_error { 0 } else { self.held - 1 };

@@ -374,3 +374,54 @@ fn j56_a_payload_on_its_way_is_replayed() {
     assert_eq!(same as u64, rig.controller.telemetry().tick - first);
     assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }
+
+/// An emergency stop at power-up that is cleared at once does not stop the log in which the arm then gets its torque.
+#[test]
+fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
+    let mut rig = Rig::new(Config::avena());
+    rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 63]], false));
+    rig.defaults();
+    rig.until(2_000, |rig| rig.state() == ControllerState::Init && rig.controller.telemetry().tick > 50);
+    rig.press_stop(5);
+    rig.clear(true, 0x7F);
+    let ticks = rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
+    assert!(ticks < AFTER_ERROR_MS.into(), "torque comes before the log would stop: {ticks} ms");
+    rig.run(1_000);
+    assert_eq!(recorder(&rig).state(), LogState::Recording);
+    rig.press_stop(1);
+    let error = rig.controller.telemetry().tick;
+    rig.run(400);
+    assert_eq!(recorder(&rig).state(), LogState::Error);
+    assert!(replayed(&rig).contains(&error));
+}
+
+/// Requests that read, beside others in a tick, take the turns that they took: a controller of its own, without a recorder, does the same.
+#[test]
+fn j56_requests_beside_others_are_replayed_in_their_turns() {
+    let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
+    let pairs: [[(FrameType, &[u8]); 2]; 4] = [
+        [(FrameType::GetLog, &get_log), (FrameType::GetLog, &get_log)],
+        [(FrameType::GetLog, &get_log), (FrameType::GetInfo, &[])],
+        [(FrameType::GetInfo, &[]), (FrameType::GetInfo, &[])],
+        [(FrameType::GetPoints, &[0, 0]), (FrameType::GetArm, &[0, 0])],
+    ];
+    for pair in pairs {
+        let mut rig = holding();
+        for k in 0..12 {
+            for (frame_type, body) in pair {
+                rig.send_on(1, frame_type, body);
+            }
+            let jog: Vec<u8> = [0.1f32; 6].iter().flat_map(|velocity| velocity.to_be_bytes()).collect();
+            rig.send(FrameType::Jog, &jog);
+            rig.status_free = k % 3 != 1;
+            rig.run(37);
+        }
+        let blocks = blocks(&rig);
+        let mut other = Rig::new(Config::avena());
+        other.defaults();
+        other.run(700);
+        let steps: Vec<_> = Replay::new(Log::new(&blocks), other.controller, None).collect();
+        let differs = steps.iter().filter(|step| step.outcome == Outcome::Differs).count();
+        assert!(steps.len() > 400 && differs == 0, "{pair:?}: {differs} of {} ticks differ", steps.len());
+    }
+}

@@ -203,7 +203,7 @@ impl Rig {
         // The longest takes a third of a millisecond: a model with all that follows from it.
         for _ in 0..80 {
             let flight = self.read_flight()?;
-            if flight.phase != Flight::PHASE_INPUTS && !self.in_tick() {
+            if flight.phase != Flight::PHASE_INPUTS && (self.may_hang || !self.in_tick()) {
                 return Some(flight);
             }
             let next = self.board.machine.now() + 5 * MICROSECOND;

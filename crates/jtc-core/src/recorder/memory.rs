@@ -10,7 +10,7 @@ use jtc_wire::LogState;
 use super::{BLOCK_WORDS, Block};
 use crate::remembered::BitSink;
 
-/// "JTCF" and the version of the layout.
+/// "JTCF" and the version of the layout, to be raised with each change of what is written, a list of `remembered!` among it.
 const MAGIC: u32 = 0x4A46_0001;
 /// Words in front of the bits.
 const HEAD: usize = 5;

@@ -156,6 +156,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
             controller.hash_arm();
         }
         let arm = controller.extensions.hash;
+        // It takes the requests that a device with a recorder has taken.
+        controller.extensions.log = LogState::Recording;
         let outcome = Outcome::Unsure(Unsure::NoSnapshot);
         Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
     }
@@ -237,6 +239,18 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
             status_free: recorded.status_free,
         };
         let outputs = self.controller.tick(&inputs);
+        if let Some(super::LogRequest::Page { line, .. }) = self.controller.extensions.log_request.take() {
+            let page = jtc_wire::LogPage {
+                state: LogState::Recording,
+                block: 0,
+                offset: 0,
+                end: 0,
+                points: 0,
+                points_hash: 0,
+                bytes: &[],
+            };
+            self.controller.extensions.answers.put(line, &jtc_wire::Answer::Log(page));
+        }
         self.chain = chain(self.chain, &self.controller, &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == u32::from(recorded_check);

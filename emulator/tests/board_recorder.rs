@@ -3,8 +3,8 @@ mod rig;
 
 use jtc_core::recorder::{BLOCK_BYTES, Block, Log, Outcome, Replay};
 use jtc_core::{ControllerState, Telemetry};
-use jtc_sim::{FaultKind, SimConfig, host as frames};
-use jtc_wire::{ExecCommand, LogState, fixed};
+use jtc_sim::{FaultKind, SimConfig};
+use jtc_wire::{LogState, fixed};
 use openjtc_emulator::observe::ResetCause;
 use openjtc_emulator::{BoardConfig, Port};
 use rig::{BOARDS, Rig};
@@ -17,14 +17,7 @@ fn moving() -> Rig {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
     rig.bring_up(HOST);
     rig.run(100);
-    let here = rig.telemetry().joints.map(|j| j.set_position);
-    let there = [0.4, 0.2, -0.2, 0.5, 0.3, 0.2];
-    for segment in frames::trajectory(&frames::there_and_back(&here, &there, 2.0, 1, 10), 10, 113) {
-        rig.ask(HOST, &segment);
-    }
-    rig.ask(HOST, &frames::exec(ExecCommand::Execute));
-    rig.run(2_200);
-    assert_eq!(rig.state(), ControllerState::Operate);
+    rig.set_off(HOST, 2.0, 2_200);
     rig
 }
 

@@ -4,7 +4,6 @@ mod rig;
 use jtc_bus::Request;
 use jtc_core::{ControllerState, TrajectoryState, error};
 use jtc_sim::{SimConfig, host as frames};
-use jtc_wire::ExecCommand;
 use openjtc_emulator::clock::{MICROSECOND, Time, to_us};
 use openjtc_emulator::fdcan::Outcome;
 use openjtc_emulator::observe::ResetCause;
@@ -26,14 +25,7 @@ fn holding() -> Rig {
 /// The same, on its way along a trajectory.
 fn moving() -> Rig {
     let mut rig = holding();
-    let here = rig.telemetry().joints.map(|j| j.set_position);
-    let there = [0.4, 0.2, -0.2, 0.5, 0.3, 0.2];
-    for segment in frames::trajectory(&frames::there_and_back(&here, &there, 1.0, 1, 10), 10, 113) {
-        rig.ask(HOST, &segment);
-    }
-    rig.ask(HOST, &frames::exec(ExecCommand::Execute));
-    rig.run(500);
-    assert_eq!(rig.state(), ControllerState::Operate);
+    rig.set_off(HOST, 1.0, 500);
     rig
 }
 

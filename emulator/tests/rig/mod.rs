@@ -17,7 +17,7 @@ use openjtc_emulator::{Board, BoardConfig, FIRST_LINE, Port};
 use jtc_core::{ControllerState, Telemetry};
 use jtc_sim::invariants::{Invariants, Moment};
 use jtc_sim::{FaultKind, host as frames};
-use jtc_wire::{DataStatus, FrameStatus, Response, Status, StoreState};
+use jtc_wire::{DataStatus, ExecCommand, FrameStatus, Response, Status, StoreState};
 
 #[allow(unused_imports, reason = "each test uses its part")]
 pub use elf::{BOARDS, Version, elf, fast_elf, version};
@@ -293,6 +293,19 @@ impl Rig {
         self.wait("the board is up", 50, |rig| rig.ticks > 0);
         self.write(port, &frames::use_defaults());
         self.wait_for_hold(12_000);
+    }
+
+    /// Sends the arm from where it is along a trajectory, out and back in so many seconds each, and lets `ms` of it pass.
+    #[track_caller]
+    pub fn set_off(&mut self, port: Port, seconds: f64, ms: u64) {
+        let here = self.telemetry().joints.map(|j| j.set_position);
+        let there = [0.4, 0.2, -0.2, 0.5, 0.3, 0.2];
+        for segment in frames::trajectory(&frames::there_and_back(&here, &there, seconds, 1, 10), 10, 113) {
+            self.ask(port, &segment);
+        }
+        self.ask(port, &frames::exec(ExecCommand::Execute));
+        self.run(ms);
+        assert_eq!(self.state(), ControllerState::Operate);
     }
 
     /// Every joint enabled and held.

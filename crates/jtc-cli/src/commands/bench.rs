@@ -34,7 +34,7 @@ fn set(absent: &[Option<f64>; JOINTS], link: &LinkArgs, out: &Output) -> Result<
     let mut session = link.session()?;
     session.set_absent(absent).map_err(refused)?;
     out.result(&as_json(absent), || {
-        format!("{}\nnext: jtc recover; `jtc doctor` names what is wrong", as_text(absent)).replace('`', "")
+        format!("{}\nnext: jtc recover; jtc doctor names what is wrong", as_text(absent))
     });
     Ok(())
 }

@@ -90,7 +90,13 @@ impl<P: Port> Session<P> {
         };
         log.blocks = blocks_of(&bytes);
         log.device = match self.info()? {
-            Some(info) => format!("{}, firmware {} ({})", info.board, info.firmware(), info.revision()),
+            Some(info) => {
+                let revision = match info.revision() {
+                    "" => String::new(),
+                    revision => format!(" ({revision})"),
+                };
+                format!("{}, firmware {}{revision}", info.board, info.firmware())
+            }
             None => String::new(),
         };
         log.arm = self.arm_image()?;

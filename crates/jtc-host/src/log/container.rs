@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_core::recorder::Block;
 use jtc_wire::{LogState, POINT_LEN, RawPoint};
 
 use super::{FlightLog, blocks_of};
@@ -94,7 +93,7 @@ impl FlightLog {
             let number = || data.first_chunk().map(|bytes| u32::from_be_bytes(*bytes));
             match kind {
                 part::STATE => log.state = LogState::from_byte(*data.first()?)?,
-                part::BLOCKS => log.blocks = blocks(data),
+                part::BLOCKS => log.blocks = blocks_of(data),
                 part::ARM => log.arm = data.to_vec(),
                 part::FIRST_POINT => log.first_point = number()? as usize,
                 part::POINTS => {
@@ -107,8 +106,4 @@ impl FlightLog {
         }
         rest.is_empty().then_some(log)
     }
-}
-
-fn blocks(data: &[u8]) -> Vec<Block> {
-    blocks_of(data)
 }

@@ -23,14 +23,14 @@ fn moving() -> Rig {
 
 /// The memory of the board's flight recorder.
 fn memory(rig: &Rig) -> Vec<Block> {
-    let piece = |name: &str| {
+    let piece = |(name, blocks): (&str, usize)| {
         let at = rig.board.machine.elf().symbol(name).expect("its memory");
-        let bytes =
-            rig.board.machine.memory(at.address, jtc_sim::RECORDER_BLOCKS * BLOCK_BYTES).expect("memory");
+        let bytes = rig.board.machine.memory(at.address, blocks * BLOCK_BYTES).expect("memory");
         let words: Vec<u32> = bytes.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
         words.as_chunks::<{ BLOCK_BYTES / 4 }>().0.to_vec()
     };
-    [piece("RECORDER_SRAM1"), piece("RECORDER_SRAM4")].concat()
+    let names = ["RECORDER_SRAM1", "RECORDER_SRAM3", "RECORDER_SRAM4"];
+    names.into_iter().zip(jtc_sim::RECORDER_BLOCKS).flat_map(piece).collect()
 }
 
 /// Runs the log of the controller beside the board again: the telemetry of each tick, none of which differs.

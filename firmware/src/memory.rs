@@ -53,19 +53,23 @@ impl<T> Place<T> {
     }
 }
 
-/// Blocks in each of the two pieces of the flight recorder's memory.
-const RECORDER_BLOCKS: usize = 63;
+/// Blocks in the pieces of the flight recorder's memory.
+const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
-/// Memory of the flight recorder (J-56): what DMA leaves of SRAM1, and SRAM4. Neither is cached: what is written is there at the next
+/// Memory of the flight recorder (J-56): what DMA leaves of SRAM1, SRAM3, and SRAM4. None is cached: what is written is there at the next
 /// instruction, whatever resets the processor. Their names keep the compiler from knowing what they hold.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".sram1")]
 #[used]
-static RECORDER_SRAM1: Place<[Block; RECORDER_BLOCKS]> = Place::new();
+static RECORDER_SRAM1: Place<[Block; RECORDER_BLOCKS[0]]> = Place::new();
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".sram3")]
+#[used]
+static RECORDER_SRAM3: Place<[Block; RECORDER_BLOCKS[1]]> = Place::new();
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".sram4")]
 #[used]
-static RECORDER_SRAM4: Place<[Block; RECORDER_BLOCKS]> = Place::new();
+static RECORDER_SRAM4: Place<[Block; RECORDER_BLOCKS[2]]> = Place::new();
 
 /// The trajectory.
 #[unsafe(link_section = ".axisram")]
@@ -101,7 +105,7 @@ pub struct Memory {
     /// For the stored arm and for one that is to be stored.
     pub arms: [&'static mut arm_store::Buffer; 2],
     /// For the flight recorder; it holds what the last program recorded.
-    pub recorder: [&'static mut [Block]; 2],
+    pub recorder: [&'static mut [Block]; 3],
 }
 
 /// Hands out the buffers, zeroed; but for the flight recorder's, unless the device has `lost_power`. Once; after [`init`].
@@ -110,8 +114,10 @@ pub fn take(lost_power: bool) -> Memory {
     // integers, too.
     let (points, rings, statuses, receive, batch, arms) =
         unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
-    // SAFETY: as above; both stand in sections that nobody loads or clears, and integers may be any bytes.
-    let recorder = unsafe { [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM4.keep(lost_power)] };
+    // SAFETY: as above; all stand in sections that nobody loads or clears, and integers may be any bytes.
+    let recorder: [&mut [Block]; 3] = unsafe {
+        [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM3.keep(lost_power), RECORDER_SRAM4.keep(lost_power)]
+    };
     Memory {
         points,
         rings: rings.each_mut(),
@@ -119,12 +125,12 @@ pub fn take(lost_power: bool) -> Memory {
         receive: receive.each_mut(),
         batch,
         arms: arms.each_mut(),
-        recorder: recorder.map(|blocks| &mut blocks[..]),
+        recorder,
     }
 }
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
-const REGIONS: [(u32, u32, u32); 6] = [
+const REGIONS: [(u32, u32, u32); 7] = [
     // External memory that is not there: without this the core may read it speculatively and hang. The lowest three
     // eighths and the highest of the 4 GB are left out.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
@@ -135,6 +141,7 @@ const REGIONS: [(u32, u32, u32); 6] = [
     // What DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     // What the flight recorder writes.
+    (0x3004_0000, 15, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     (0x3800_0000, 16, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     // The second bank of the flash halts whoever reads it while it is busy: opened by [`bank2`] only.
     (BANK2, 20, NO_ACCESS),
@@ -142,7 +149,7 @@ const REGIONS: [(u32, u32, u32); 6] = [
 /// Flash bank 2.
 pub const BANK2: u32 = 0x0810_0000;
 /// Number of its region.
-const BANK2_REGION: u32 = 5;
+const BANK2_REGION: u32 = 6;
 const NO_ACCESS: u32 = NO_EXECUTE;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const NO_EXECUTE: u32 = 1 << 28;
@@ -155,6 +162,7 @@ pub fn init() {
     pac::RCC.ahb2enr().modify(|w| {
         w.set_sram1en(true);
         w.set_sram2en(true);
+        w.set_sram3en(true);
     });
     // Reading back makes sure that the clock runs.
     pac::RCC.ahb2enr().read();

@@ -31,7 +31,7 @@ use crate::uart::{self, Lookahead, Transmitter};
 type Jtc = Controller<&'static mut [RawPoint]>;
 
 /// The flight recorder, with its memory elsewhere.
-pub type FlightRecorder = Recorder<&'static mut [Block], 2>;
+pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
 /// Bytes of a line that a tick looks through at most: more than two ticks bring at 15 MBd.
 const LOOK_MAX: usize = 4096;

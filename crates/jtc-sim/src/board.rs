@@ -97,13 +97,13 @@ pub struct Board {
 }
 
 /// The flight recorder with as much memory as the board gives it.
-pub type SimRecorder = Recorder<Vec<Block>, 2>;
+pub type SimRecorder = Recorder<Vec<Block>, 3>;
 
-/// Blocks in each of the two pieces of the flight recorder's memory: 126 KiB together.
-pub const RECORDER_BLOCKS: usize = 63;
+/// Blocks in the pieces of the flight recorder's memory: 157 KiB together.
+pub const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
-fn recorder_memory() -> [Vec<Block>; 2] {
-    [(); 2].map(|()| vec![[0; BLOCK_WORDS]; RECORDER_BLOCKS])
+fn recorder_memory() -> [Vec<Block>; 3] {
+    RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }
 
 impl Board {
@@ -153,7 +153,8 @@ impl Board {
         let resets = self.watchdog_resets;
         // What was being written is lost; the arm before it is still there.
         let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
-        let recorder = core::mem::replace(&mut self.recorder, Recorder::new([Vec::new(), Vec::new()], false));
+        let recorder =
+            core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
         // Its memory keeps what is in it; a reset by the watchdog is a failure.

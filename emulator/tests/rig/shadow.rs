@@ -11,18 +11,18 @@ use super::host::Host;
 /// Causes of a start after which the controller reports that it failed (J-12): watchdog, hard fault, panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
-/// Memory of the flight recorder, in the two pieces that the board has it in.
-pub type LogMemory = [Vec<Block>; 2];
+/// Memory of the flight recorder, in the pieces that the board has it in.
+pub type LogMemory = [Vec<Block>; 3];
 
 /// As it is after a loss of power.
 pub fn no_log() -> LogMemory {
-    [(); 2].map(|()| vec![[0; BLOCK_WORDS]; RECORDER_BLOCKS])
+    RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }
 
 /// The controller beside the board.
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
-    recorder: Recorder<Vec<Block>, 2>,
+    recorder: Recorder<Vec<Block>, 3>,
     /// What the last tick executed.
     pub worked: Vec<Worked>,
 }
@@ -75,7 +75,7 @@ impl Shadow {
     }
 
     /// The flight recorder.
-    pub fn recorder(&self) -> &Recorder<Vec<Block>, 2> {
+    pub fn recorder(&self) -> &Recorder<Vec<Block>, 3> {
         &self.recorder
     }
 

@@ -99,6 +99,23 @@ impl Frame {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
+    /// The payload as little-endian words, zeros behind its end.
+    #[inline]
+    pub fn words(&self) -> [u32; MAX_LEN / 4] {
+        let mut words = [0; MAX_LEN / 4];
+        for (word, bytes) in words.iter_mut().zip(self.data.as_chunks().0) {
+            *word = u32::from_le_bytes(*bytes);
+        }
+        words
+    }
+
+    /// Bytes of the payload.
+    #[inline]
+    #[allow(clippy::len_without_is_empty, reason = "a frame is no collection")]
+    pub fn len(&self) -> u8 {
+        self.len
+    }
+
     /// The length code of the frame, 0..12.
     pub fn dlc(&self) -> u8 {
         dlc_of(usize::from(self.len)).unwrap_or(0)

@@ -1,6 +1,6 @@
 //! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that outlasts a reset.
 //!
-//! What is recorded is what went *into* each tick, as few bits as that takes, every [`SNAPSHOT_MS`] a *snapshot* of what the controller
+//! What is recorded is what went *into* each tick, as a rule in eight words, every [`SNAPSHOT_MS`] a *snapshot* of what the controller
 //! remembers, and for each tick a check of what came *out*. A [`Replay`] of the log through the controller gives everything that it
 //! computed: commanded and measured motion, torques in their parts, states, errors. The arm and the points of the trajectory are named by
 //! hash.
@@ -14,6 +14,8 @@ mod reader;
 mod recorded;
 mod replay;
 mod snapshot;
+#[cfg(test)]
+mod tests;
 
 use jtc_wire::{Answer, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, RawPoint};
 
@@ -127,13 +129,14 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
     {
         controller.hash_arm();
-        let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
+        let errors = controller.errors.word();
+        let (in_error, torque) = (errors != 0, controller.state.has_torque());
         let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
         if self.writer.state != LogState::Recording && torque && !self.writer.powered {
             self.clear();
         }
         if self.writer.state == LogState::Recording {
-            self.take(controller, inputs, outputs, new_error);
+            self.take(controller, errors, inputs, outputs, new_error);
         }
         if let Some(request) = controller.extensions.log_request.take() {
             self.serve(controller, request);
@@ -142,16 +145,22 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     }
 
     /// One tick of a log that goes on.
-    fn take<M>(&mut self, controller: &Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs, new_error: bool)
-    where
+    fn take<M>(
+        &mut self,
+        controller: &Controller<M>,
+        errors: u16,
+        inputs: &Inputs<'_>,
+        outputs: &Outputs,
+        new_error: bool,
+    ) where
         M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
     {
         let torque = controller.state.has_torque();
         if torque && !self.writer.powered {
             // An error before there was torque does not stop the log.
             self.stops_in = None;
+            self.writer.set_powered();
         }
-        self.writer.powered |= torque;
         if self.held > 0 {
             // An error is not to be missed.
             self.held = if new_error { 0 } else { self.held - 1 };
@@ -168,7 +177,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.begin();
             self.snapshot(controller);
         } else {
-            self.tick(controller, inputs, outputs);
+            self.tick(controller, errors, inputs, outputs);
         }
         self.writer.commit();
         if new_error && self.stops_in.is_none() {
@@ -182,14 +191,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         }
     }
 
-    fn tick<M>(&mut self, controller: &Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
+    fn tick<M>(&mut self, controller: &Controller<M>, errors: u16, inputs: &Inputs<'_>, outputs: &Outputs)
     where
         M: AsRef<[RawPoint]> + AsMut<[RawPoint]>,
     {
-        self.writer.put(0, 1);
-        self.uncertain |= !self.reference.write(inputs, outputs.host_done, &mut self.writer);
-        self.chain = chain(self.chain, controller, outputs);
-        self.writer.put(check(self.chain), 8);
+        self.chain = chain(self.chain, controller, errors, outputs);
+        let check = check(self.chain);
+        self.uncertain |= !self.reference.write(inputs, outputs.host_done, check, &mut self.writer);
         self.since_snapshot += 1;
         let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
         // While the arm changes its hash is not known; that is over soon, unless a host sends parameters without end.
@@ -208,6 +216,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.writer.put(1, 1);
         controller.origin().write(&mut self.writer);
         controller.write_state(&mut self.writer);
+        self.writer.align();
         (self.reference, self.chain) = (Reference::default(), 0);
         (self.since_snapshot, self.uncertain) = (0, false);
     }
@@ -251,9 +260,9 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
 }
 
 /// Mixes what came out of a tick into the check of the ticks before it.
-fn chain<M>(chain: u32, controller: &Controller<M>, outputs: &Outputs) -> u32 {
+fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outputs) -> u32 {
     let mix = |hash: u32, word: u32| (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
-    let states = u32::from(controller.errors.word()) << 16
+    let states = u32::from(errors) << 16
         | (controller.state as u32) << 8
         | (controller.trajectory as u32) << 4
         | u32::from(outputs.safety_output);
@@ -270,6 +279,6 @@ fn chain<M>(chain: u32, controller: &Controller<M>, outputs: &Outputs) -> u32 {
 }
 
 /// The part of it that is recorded: enough, because each check contains all ticks before it.
-fn check(chain: u32) -> u32 {
-    chain >> 24
+fn check(chain: u32) -> u16 {
+    (chain >> 16) as u16
 }

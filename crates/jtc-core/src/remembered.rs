@@ -11,10 +11,13 @@ pub(crate) trait BitSink {
     /// Appends the lowest `bits` (0 to 32) of `value`, which has none above them.
     fn put(&mut self, value: u32, bits: u32);
 
-    /// Appends two whole words.
-    fn put_pair(&mut self, first: u32, second: u32) {
-        self.put(first, 32);
-        self.put(second, 32);
+    /// Appends 64 bits, in one where all are zero: numbers of joints at rest.
+    fn put_double(&mut self, value: u64) {
+        self.put((value != 0).into(), 1);
+        if value != 0 {
+            self.put(value as u32, 32);
+            self.put((value >> 32) as u32, 32);
+        }
     }
 }
 
@@ -82,11 +85,7 @@ whole! { u8, 8; u16, 16; u32, 32; }
 
 impl Remembered for u64 {
     fn write<S: BitSink>(&self, to: &mut S) {
-        // Many are zero: numbers of joints at rest.
-        to.put((*self != 0).into(), 1);
-        if *self != 0 {
-            to.put_pair(*self as u32, (*self >> 32) as u32);
-        }
+        to.put_double(*self);
     }
 
     fn read<S: BitSource>(from: &mut S) -> Self {

@@ -11,7 +11,7 @@ use jtc_core::{Config, ControllerState, Payload, settings};
 use jtc_wire::{Answer, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState};
 use rig::Rig;
 
-const BLOCKS: usize = 32;
+const BLOCKS: usize = 96;
 
 fn memory() -> [Vec<Block>; 2] {
     // Not of one size, and not clean: memory after power-up holds anything.
@@ -332,9 +332,10 @@ fn j56_j50_a_device_without_a_recorder_refuses_what_is_asked_of_one() {
 }
 
 #[test]
-fn j56_snapshots_come_in_time_whatever_hosts_send() {
+fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     let mut rig = holding();
-    rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 63]], false));
+    // As many as on the boards.
+    rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     let begin = rig.controller.telemetry().tick;
     for n in 0..3_000u32 {
         match n % 3 {
@@ -348,6 +349,8 @@ fn j56_snapshots_come_in_time_whatever_hosts_send() {
     let (_, snapshots) = contents(&blocks);
     let since: Vec<_> = snapshots.iter().copied().filter(|tick| *tick > begin).collect();
     assert!(since.len() >= 3, "{snapshots:?}");
+    let kept = rig.controller.telemetry().tick - since[0];
+    assert!(kept > 2_000, "{kept} ms");
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
 }
 
@@ -379,7 +382,8 @@ fn j56_a_payload_on_its_way_is_replayed() {
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
-    rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 63]], false));
+    // As many as on the boards.
+    rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::Init && rig.controller.telemetry().tick > 50);
     rig.press_stop(5);

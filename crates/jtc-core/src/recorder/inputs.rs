@@ -1,12 +1,15 @@
-//! The inputs of a tick, as few bits as they take: what the nodes answer against what they answered before, what is as ever in one bit.
+//! The inputs of a tick against those before: whole words for what is new in each tick, which take little time to write, and bits for
+//! the rest, in front of which a bit of the first word says whether there is any.
 //!
 //! Writer and reader keep the same [`Reference`]; a snapshot begins it anew on both sides.
-use jtc_bus::{Frame, id};
+use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, UrgentCommand, UrgentCommands};
 
+use super::Block;
+use super::memory::Writer;
 use crate::io::{HostEvent, Inputs};
-use crate::nodes::{FRAMES_MAX, GRIPPER};
-use crate::remembered::{BitSink, BitSource};
+use crate::nodes::FRAMES_MAX;
+use crate::remembered::BitSink;
 use crate::{JOINTS, NODES};
 
 /// Longest frame of a host that is recorded with its bytes.
@@ -16,144 +19,79 @@ const ALLOWANCE: (u16, u16) = (2, 500);
 /// What an event takes beside its bytes.
 const EVENT_BYTES: u16 = 2;
 
-/// How a number is written, by its size: not at all when 0, else in so many bits.
-struct Code(u32, u32, u32);
-
-const VELOCITY: Code = Code(6, 11, 17);
-const TORQUE: Code = Code(5, 10, 17);
-/// Bits of a change of position that is no whole number of encoder steps.
-const FINE: u32 = 22;
-
-fn zigzag(value: i32) -> u32 {
-    ((value << 1) ^ (value >> 31)) as u32
-}
-
-fn straight(code: u32) -> i32 {
-    (code >> 1) as i32 ^ -((code & 1) as i32)
-}
-
-impl Code {
-    fn write<S: BitSink>(&self, value: i32, to: &mut S) {
-        let code = zigzag(value);
-        if code == 0 {
-            to.put(0, 1);
-        } else if code >> self.0 == 0 {
-            to.put(0b01 | code << 2, 2 + self.0);
-        } else if code >> self.1 == 0 {
-            to.put(0b011 | code << 3, 3 + self.1);
-        } else {
-            to.put(0b111 | code << 3, 3 + self.2);
-        }
-    }
-
-    fn read<S: BitSource>(&self, from: &mut S) -> i32 {
-        straight(match prefix(from) {
-            0 => 0,
-            1 => from.take(self.0),
-            2 => from.take(self.1),
-            _ => from.take(self.2),
-        })
-    }
-}
-
-/// How many ones there are in front of a zero, at most 3.
-fn prefix<S: BitSource>(from: &mut S) -> u32 {
-    (0..3).find(|_| from.take(1) == 0).unwrap_or(3)
-}
-
 /// What the next inputs are written against.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
-    /// The last answer to a Move of each node: bytes, and big-endian words.
+    /// The last answers to a Move: lengths, and words by [`words`]; velocity and torque as they were when something else had changed.
     pub(super) len: [u8; NODES],
-    pub(super) words: [[u32; 4]; NODES],
-    pub(super) tails: [[u32; 2]; NODES],
+    pub(super) words: [Words; NODES],
     /// How many nodes answer.
     pub(super) expected: u8,
     /// Bytes of frames of hosts that may still be recorded.
     allowance: u16,
 }
 
+/// Words of a payload.
+pub(super) type Words = [u32; MAX_LEN / 4];
+
+/// The words of an answer as they are in memory, but for the position, which is a number.
+#[inline]
+fn words(frame: &Frame) -> Words {
+    let mut words = frame.words();
+    words[POSITION] = words[POSITION].swap_bytes();
+    words
+}
+
 impl Default for Reference {
     fn default() -> Self {
         Self {
             len: [16; NODES],
-            words: [[0; 4]; NODES],
-            tails: [[0; 2]; NODES],
+            words: [[0; MAX_LEN / 4]; NODES],
             expected: NODES as u8,
             allowance: ALLOWANCE.1,
         }
     }
 }
 
-/// The first 16 bytes of a payload: position, velocity and torque as numbers, the rest as it is in memory.
-#[inline]
-fn words(bytes: &[u8; 16]) -> [u32; 4] {
-    let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *bytes;
-    [
-        u32::from_be_bytes([a, b, c, d]),
-        u32::from_be_bytes([e, f, g, h]),
-        u32::from_le_bytes([i, j, k, l]),
-        u32::from_le_bytes([m, n, o, p]),
-    ]
+/// Word of an answer that holds the position, and the one with velocity and torque.
+pub(super) const POSITION: usize = 0;
+pub(super) const RATES: usize = 1;
+/// Bits of a joint's way in a tick, in steps of a 16-bit encoder, where all joints have moved so little.
+const WAY_BITS: u32 = 5;
+/// The same as a mask, and half of it.
+const WAY: u32 = (1 << WAY_BITS) - 1;
+const WAY_HALF: u32 = 1 << (WAY_BITS - 1);
+
+/// Where a joint is that was at `before`, by the ways of all of them.
+pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
+    let way = (ways >> (WAY_BITS * n as u32) & WAY).wrapping_sub(WAY_HALF);
+    before.wrapping_add(way << 16)
 }
 
-/// What is behind the first 16 bytes of a payload, and zeros.
-#[inline]
-fn tail(bytes: &[u8]) -> [u32; 2] {
-    let word = |at: usize| {
-        bytes.get(at..).and_then(|bytes| bytes.first_chunk()).copied().map_or(0, u32::from_le_bytes)
-    };
-    [word(0), word(4)]
+/// The first word of a tick. Bit 0 is a 1 in front of a snapshot.
+pub(super) mod head {
+    pub const STATUS_FREE: u32 = 1 << 1;
+    /// Nothing came but answers.
+    pub const QUIET: u32 = 1 << 2;
+    /// Each node that is expected has answered, in order: words with what the joints have moved follow.
+    pub const ORDERED: u32 = 1 << 3;
+    /// The way of a joint is no small number of steps: the words hold all positions.
+    pub const FAR: u32 = 1 << 4;
+    /// More than the motion has changed.
+    pub const CHANGED: u32 = 1 << 5;
+    /// Where the check of what came out begins.
+    pub const CHECK: u32 = 16;
 }
 
-/// Bits of changes that are as small as those of most ticks: of the position in steps of a 16-bit encoder, of velocity and torque.
-const STEP_BITS: u32 = 5;
-const SPEED_BITS: u32 = 8;
-const TORQUE_BITS: u32 = 9;
-const SMALL_BITS: u32 = STEP_BITS + SPEED_BITS + TORQUE_BITS;
-
-/// Bits of the last word of six of them.
-const PACKED_REST: u32 = SMALL_BITS * JOINTS as u32 - 4 * 32;
-
-/// The changes of a joint in one number, and 0 where each is small.
-#[inline]
-fn small(position: i32, velocity: i32, torque: i32) -> (u32, u32) {
-    let a = ((position >> 16) + (1 << (STEP_BITS - 1))) as u32;
-    let b = (velocity + (1 << (SPEED_BITS - 1))) as u32;
-    let c = (torque + (1 << (TORQUE_BITS - 1))) as u32;
-    let beyond = (a >> STEP_BITS) | (b >> SPEED_BITS) | (c >> TORQUE_BITS) | (position as u32) << 16;
-    (a | b << STEP_BITS | c << (STEP_BITS + SPEED_BITS), beyond)
-}
-
-/// The same back.
-fn small_parts(all: u32) -> (i32, i32, i32) {
-    let part = |from: u32, bits: u32| ((all >> from) & ((1 << bits) - 1)) as i32 - (1 << (bits - 1));
-    (part(0, STEP_BITS) << 16, part(STEP_BITS, SPEED_BITS), part(STEP_BITS + SPEED_BITS, TORQUE_BITS))
-}
-
-/// Changes of a joint of which one is large.
-#[inline(never)]
-fn write_large<S: BitSink>(position: i32, velocity: i32, torque: i32, to: &mut S) {
-    let code = zigzag(position);
-    if code >> FINE == 0 {
-        to.put(code << 1, 1 + FINE);
-    } else {
-        to.put(1, 1);
-        to.put(position as u32, 32);
-    }
-    VELOCITY.write(velocity, to);
-    TORQUE.write(torque, to);
-}
-
-/// Changes of a joint as they were written.
-pub(super) fn read_changes<S: BitSource>(is_small: bool, from: &mut S) -> (i32, i32, i32) {
-    if is_small {
-        return small_parts(from.take(SMALL_BITS));
-    }
-    let position = if from.take(1) == 0 { straight(from.take(FINE)) } else { from.take(32) as i32 };
-    let velocity = VELOCITY.read(from);
-    (position, velocity, TORQUE.read(from))
+/// What the joints have moved, of answers that came in order.
+struct Answers {
+    positions: [u32; JOINTS],
+    rates: [u32; JOINTS],
+    /// What the joints have moved, and bits that are set where one has moved far.
+    ways: u32,
+    far: u32,
+    /// Bits of other words that have.
+    changed: u32,
 }
 
 /// Words that have changed.
@@ -172,94 +110,120 @@ fn is_move_answer(frame: &Frame) -> bool {
 }
 
 impl Reference {
-    /// Writes the inputs; returns whether all of them are there (a replay of this tick gives the same).
-    pub fn write<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
-        to.put(inputs.status_free.into(), 1);
+    /// Writes a tick: what came in, and a check of what came out. Returns whether all of it is there (a replay of this tick gives the
+    /// same).
+    ///
+    /// Drives send other positions in each tick, and the rest of their answers changes seldom: as a rule a tick is eight words.
+    pub fn write<P, const N: usize>(
+        &mut self,
+        inputs: &Inputs<'_>,
+        done: usize,
+        check: u16,
+        to: &mut Writer<P, N>,
+    ) -> bool
+    where
+        P: AsRef<[Block]> + AsMut<[Block]>,
+    {
         let quiet = inputs.safety_input
             && inputs.bus_state == Inputs::QUIET.bus_state
             && inputs.missed_ticks == 0
             && inputs.host.is_empty()
             && inputs.urgent.iter().all(UrgentCommands::is_empty);
-        to.put(quiet.into(), 1);
         self.allowance = (self.allowance + ALLOWANCE.0).min(ALLOWANCE.1);
-        let whole = quiet || self.write_rest(inputs, done, to);
-        self.write_bus(inputs.bus, to);
-        whole
+        let mut head = u32::from(check) << head::CHECK;
+        head |= if inputs.status_free { head::STATUS_FREE } else { 0 };
+        head |= if quiet { head::QUIET } else { 0 };
+        let bus = inputs.bus.get(..FRAMES_MAX).unwrap_or(inputs.bus);
+        let Some(answers) = self.ordered(bus) else {
+            to.append([head]);
+            return self.write_slowly(inputs, done, quiet, to);
+        };
+        let changed = answers.changed != 0;
+        head |= head::ORDERED | if changed { head::CHANGED } else { 0 };
+        let ([p, q, r, s, t, u], [a, b, c, d, e, f]) = (answers.positions, answers.rates);
+        if answers.far == 0 {
+            to.append([head, a, b, c, d, e, f, answers.ways]);
+        } else {
+            to.append([head | head::FAR, a, b, c, d, e, f, p, q, r, s, t, u]);
+        }
+        for (before, position) in self.words.iter_mut().zip(answers.positions) {
+            before[POSITION] = position;
+        }
+        (quiet && !changed) || self.write_more(inputs, done, (quiet, changed), to)
     }
 
-    fn write_bus<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
-        let bus = bus.get(..FRAMES_MAX).unwrap_or(bus);
-        let in_place = |(n, (frame, len)): (usize, (&Frame, &u8))| {
-            frame.id == id::MOVE_ANSWER + n as u16 && frame.data().len() == usize::from(*len)
-        };
-        let ordered =
-            bus.len() == usize::from(self.expected) && bus.iter().zip(&self.len).enumerate().all(in_place);
-        to.put(ordered.into(), 1);
-        if !ordered {
-            return self.write_frames(bus, to);
+    /// The motion, if each node that is expected has answered, in order.
+    #[inline]
+    fn ordered(&self, bus: &[Frame]) -> Option<Answers> {
+        if bus.len() != usize::from(self.expected) {
+            return None;
         }
-        // As a rule each joint has moved a little, and nothing else has changed.
-        let packed = self.packed(bus);
-        to.put(packed.is_some().into(), 1);
-        match packed {
-            Some(words) => {
-                to.put_pair(words[0], words[1]);
-                to.put_pair(words[2], words[3]);
-                to.put(words[4], PACKED_REST);
-            }
-            None => {
-                for (n, frame) in bus.iter().enumerate() {
-                    self.write_answer(n, frame, to);
+        let mut answers = Answers { positions: [0; JOINTS], rates: [0; JOINTS], ways: 0, far: 0, changed: 0 };
+        let mut misplaced = 0;
+        // Without a jump for each: what differs is collected.
+        let nodes = bus.iter().zip(self.len.iter().zip(&self.words)).zip(id::MOVE_ANSWER..);
+        for (n, ((frame, (len, before)), id)) in nodes.enumerate() {
+            let now = words(frame);
+            misplaced |= (frame.id ^ id) | u16::from(frame.len() ^ len);
+            answers.changed |=
+                (now[2] ^ before[2]) | (now[3] ^ before[3]) | (now[4] ^ before[4]) | (now[5] ^ before[5]);
+            match answers.positions.get_mut(n).zip(answers.rates.get_mut(n)) {
+                Some((position, rates)) => {
+                    let way = now[POSITION].wrapping_sub(before[POSITION]);
+                    let steps = ((way as i32 >> 16) as u32).wrapping_add(WAY_HALF);
+                    answers.far |= steps & !WAY | way << 16;
+                    answers.ways |= steps << (WAY_BITS * n as u32);
+                    (*position, *rates) = (now[POSITION], now[RATES]);
+                }
+                None => {
+                    answers.changed |= (now[POSITION] ^ before[POSITION]) | (now[RATES] ^ before[RATES]);
                 }
             }
         }
+        (misplaced == 0).then_some(answers)
     }
 
-    /// What the joints have moved, in one number of 132 bits, where all moved little and nothing else has changed. Keeps the answers as
-    /// those that the next are written against, but only then.
-    #[inline]
-    fn packed(&mut self, bus: &[Frame]) -> Option<[u32; 5]> {
-        let mut moved = [0u32; JOINTS];
-        let mut now = [[0u32; 2]; JOINTS];
-        let mut changes = 0;
-        let joints = bus.iter().zip(self.words.iter().zip(&self.tails));
-        for ((frame, (before, tail_before)), (moved, now)) in joints.zip(moved.iter_mut().zip(&mut now)) {
-            let (head, rest) = frame.data().split_first_chunk()?;
-            let words = words(head);
-            let tail = if rest.is_empty() { [0; 2] } else { tail(rest) };
-            changes |= (words[2] ^ before[2])
-                | (words[3] ^ before[3])
-                | (tail[0] ^ tail_before[0])
-                | (tail[1] ^ tail_before[1]);
-            let half = |word: u32| (i32::from((word >> 16) as i16), i32::from(word as i16));
-            let ((velocity, torque), last) = (half(words[1]), half(before[1]));
-            let change = words[0].wrapping_sub(before[0]) as i32;
-            let (all, beyond) = small(change, velocity - last.0, torque - last.1);
-            changes |= beyond;
-            *moved = all;
-            *now = [words[0], words[1]];
+    /// What a tick has beside motion.
+    #[inline(never)]
+    fn write_more<P, const N: usize>(
+        &mut self,
+        inputs: &Inputs<'_>,
+        done: usize,
+        (quiet, changed): (bool, bool),
+        to: &mut Writer<P, N>,
+    ) -> bool
+    where
+        P: AsRef<[Block]> + AsMut<[Block]>,
+    {
+        let whole = quiet || self.write_rest(inputs, done, to);
+        if changed {
+            for (n, frame) in inputs.bus.iter().enumerate() {
+                if let Some(before) = self.words.get_mut(n).filter(|_| n < JOINTS) {
+                    before[RATES] = words(frame)[RATES];
+                }
+                self.write_answer(n, frame, to);
+            }
         }
-        if let (Some(frame), Some(before), Some(tail_before)) =
-            (bus.get(GRIPPER), self.words.get(GRIPPER), self.tails.get(GRIPPER))
-        {
-            let (head, rest) = frame.data().split_first_chunk()?;
-            let (now, tail) = (words(head), tail(rest));
-            // Not compared as arrays: that would be a call.
-            changes |= (now[0] ^ before[0])
-                | (now[1] ^ before[1])
-                | (now[2] ^ before[2])
-                | (now[3] ^ before[3])
-                | (tail[0] ^ tail_before[0])
-                | (tail[1] ^ tail_before[1]);
-        }
-        if changes != 0 {
-            return None;
-        }
-        for (before, now) in self.words.iter_mut().zip(now) {
-            [before[0], before[1]] = now;
-        }
-        let [a, b, c, d, e, f] = moved;
-        Some([a | b << 22, b >> 10 | c << 12, c >> 20 | d << 2 | e << 24, e >> 8 | f << 14, f >> 18])
+        to.align();
+        whole
+    }
+
+    /// A tick in which not every node has answered, or something else came.
+    #[inline(never)]
+    fn write_slowly<P, const N: usize>(
+        &mut self,
+        inputs: &Inputs<'_>,
+        done: usize,
+        quiet: bool,
+        to: &mut Writer<P, N>,
+    ) -> bool
+    where
+        P: AsRef<[Block]> + AsMut<[Block]>,
+    {
+        let whole = quiet || self.write_rest(inputs, done, to);
+        self.write_frames(inputs.bus.get(..FRAMES_MAX).unwrap_or(inputs.bus), to);
+        to.align();
+        whole
     }
 
     /// Frames in any order.
@@ -298,41 +262,13 @@ impl Reference {
     }
 
     /// An answer of node `n` to a Move, of the length that is known.
-    #[inline]
     fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
-        let Some((before, tail_before)) = self.words.get_mut(n).zip(self.tails.get_mut(n)) else { return };
-        let Some((head, rest)) = frame.data().split_first_chunk() else { return };
-        let now = words(head);
-        let tail = if rest.is_empty() { [0; 2] } else { tail(rest) };
-        let mut changes = (now[2] ^ before[2])
-            | (now[3] ^ before[3])
-            | (tail[0] ^ tail_before[0])
-            | (tail[1] ^ tail_before[1]);
-        if n < JOINTS {
-            let change = now[0].wrapping_sub(before[0]) as i32;
-            let half = |word: u32| (i32::from((word >> 16) as i16), i32::from(word as i16));
-            let ((velocity, torque), last) = (half(now[1]), half(before[1]));
-            let other = u32::from(changes != 0) << 1;
-            let (velocity, torque) = (velocity - last.0, torque - last.1);
-            match small(change, velocity, torque) {
-                (all, 0) => to.put(1 | other | all << 2, 2 + SMALL_BITS),
-                _ => {
-                    to.put(other, 2);
-                    write_large(change, velocity, torque, to);
-                }
-            }
-        } else {
-            changes |= (now[0] ^ before[0]) | (now[1] ^ before[1]);
-            to.put((changes != 0).into(), 1);
-            if changes != 0 {
-                write_words(&now[..2], &before[..2], to);
-            }
-        }
-        [before[0], before[1]] = [now[0], now[1]];
-        if changes != 0 {
-            write_words(&now[2..], &before[2..], to);
-            write_words(tail.get(..rest.len() / 4).unwrap_or(&[]), tail_before, to);
-            (*before, *tail_before) = (now, tail);
+        let Some(before) = self.words.get_mut(n) else { return };
+        let now = words(frame);
+        to.put((now != *before).into(), 1);
+        if now != *before {
+            write_words(&now, before, to);
+            *before = now;
         }
     }
 

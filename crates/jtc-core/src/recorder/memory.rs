@@ -11,7 +11,7 @@ use super::{BLOCK_WORDS, Block};
 use crate::remembered::BitSink;
 
 /// "JTCF" and the version of the layout, to be raised with each change of what is written, a list of `remembered!` among it.
-const MAGIC: u32 = 0x4A46_0001;
+const MAGIC: u32 = 0x4A46_0002;
 /// Words in front of the bits.
 const HEAD: usize = 5;
 /// Bits of a block.
@@ -35,6 +35,8 @@ const NONE: u16 = 0xFFFF;
 
 /// The controller has had torque since the log was begun.
 const POWERED: u16 = 0x100;
+/// The next block goes on where this one ends.
+const CLOSED: u16 = 0x200;
 
 /// A number with its complement above it.
 const fn doubled(value: u16) -> u32 {
@@ -63,6 +65,8 @@ pub(super) struct Whole<'a> {
     pub sequence: u32,
     /// Bits that are committed.
     pub bits: u32,
+    /// The next block goes on behind them.
+    pub closed: bool,
     /// Where the first snapshot begins.
     pub snapshot: Option<u32>,
     pub state: LogState,
@@ -88,8 +92,8 @@ impl<'a> Whole<'a> {
             return None;
         }
         let snapshot = (snapshot != NONE && u32::from(snapshot) < bits).then_some(snapshot.into());
-        let (sequence, powered) = (head[head::SEQUENCE], flags & POWERED != 0);
-        Some(Self { sequence, bits, snapshot, state, powered, words })
+        let (sequence, closed, powered) = (head[head::SEQUENCE], flags & CLOSED != 0, flags & POWERED != 0);
+        Some(Self { sequence, bits, closed, snapshot, state, powered, words })
     }
 }
 
@@ -106,7 +110,7 @@ pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
     block[head::SEQUENCE] = sequence;
     block[head::COMMIT] = commit(hash, 0, 32 * count as u32);
     block[head::SNAPSHOT] = doubled(snapshot);
-    block[head::FLAGS] = flags(LogState::Error, true);
+    block[head::FLAGS] = doubled(flags(LogState::Error, true) | CLOSED);
     block
 }
 
@@ -203,7 +207,8 @@ pub(super) struct Writer<P, const N: usize> {
     rest: u32,
     fill: u32,
     hash: u32,
-    snapshot: u16,
+    /// A snapshot begins in the open block.
+    marked: bool,
     pub state: LogState,
     pub powered: bool,
 }
@@ -226,7 +231,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
             rest: 0,
             fill: 0,
             hash: 0,
-            snapshot: NONE,
+            marked: false,
             state,
             powered,
         };
@@ -263,11 +268,31 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open_block();
     }
 
-    /// A snapshot begins here.
+    /// A snapshot begins here. Until it is committed it lies behind the bits, where there is none.
     pub fn mark_snapshot(&mut self) {
-        if self.snapshot == NONE {
-            self.snapshot = (((self.word - HEAD) * 32) as u32 + self.fill) as u16;
+        if !self.marked {
+            self.marked = true;
+            let at = self.bits() as u16;
+            self.set_head(head::SNAPSHOT, doubled(at));
         }
+    }
+
+    /// The controller has torque.
+    pub fn set_powered(&mut self) {
+        self.powered = true;
+        self.set_head(head::FLAGS, doubled(flags(self.state, true)));
+    }
+
+    fn set_head(&mut self, at: usize, word: u32) {
+        let open = self.open.is_some();
+        if let Some(block) = self.ring.at_mut(self.place).filter(|_| open) {
+            block[at] = word;
+        }
+    }
+
+    /// Bits of the open block.
+    fn bits(&self) -> u32 {
+        ((self.word - HEAD) * 32) as u32 + self.fill
     }
 
     fn open_block(&mut self) {
@@ -275,27 +300,30 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.next = sequence.wrapping_add(1);
         self.open = Some(sequence);
         self.place = self.ring.place(sequence);
+        let flags = flags(self.state, self.powered);
         if let Some(block) = self.ring.at_mut(self.place) {
             block[head::MAGIC] = 0;
+            compiler_fence(Ordering::SeqCst);
+            block[head::SEQUENCE] = sequence;
+            block[head::SNAPSHOT] = doubled(NONE);
+            block[head::FLAGS] = doubled(flags);
         }
-        (self.begun, self.word, self.rest, self.fill, self.snapshot) = (false, HEAD, 0, 0, NONE);
+        (self.begun, self.word, self.rest, self.fill, self.marked) = (false, HEAD, 0, 0, false);
         self.hash = mix(MAGIC, sequence);
     }
 
     /// Everything that was put counts from now on.
+    #[inline]
     pub fn commit(&mut self) {
-        let Self { rest, fill, hash, word, snapshot, state, powered, begun, open, place, .. } = *self;
-        let Some(block) = self.ring.at_mut(place).filter(|_| open.is_some()) else { return };
+        let (rest, bits, hash, word) = (self.rest, self.bits(), self.hash, self.word);
+        let (open, begun) = (self.open.is_some(), self.begun);
+        let Some(block) = self.ring.at_mut(self.place).filter(|_| open) else { return };
         if let Some(place) = block.get_mut(word) {
             *place = rest;
         }
-        let bits = ((word - HEAD) * 32) as u32 + fill;
-        block[head::SNAPSHOT] = doubled(snapshot);
-        block[head::FLAGS] = flags(state, powered);
         compiler_fence(Ordering::SeqCst);
         block[head::COMMIT] = commit(hash, rest, bits);
         if !begun {
-            block[head::SEQUENCE] = open.unwrap_or(0);
             compiler_fence(Ordering::SeqCst);
             block[head::MAGIC] = MAGIC;
             self.begun = true;
@@ -305,11 +333,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     /// The log ends here, for this reason.
     pub fn freeze(&mut self, state: LogState) {
         self.state = state;
-        let flags = flags(state, self.powered);
-        let open = self.open.is_some();
-        if let Some(block) = self.ring.at_mut(self.place).filter(|_| open) {
-            block[head::FLAGS] = flags;
-        }
+        self.set_head(head::FLAGS, doubled(flags(state, self.powered)));
     }
 
     /// Numbers of the oldest block and of the one behind the newest.
@@ -340,6 +364,33 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         read
     }
 
+    /// What follows begins at a whole word.
+    pub fn align(&mut self) {
+        if self.fill != 0 {
+            let word = core::mem::take(&mut self.rest);
+            self.fill = 0;
+            self.full(word);
+        }
+    }
+
+    /// Appends whole words behind whole words, in one block.
+    #[inline]
+    pub fn append<const K: usize>(&mut self, words: [u32; K]) {
+        if self.word + K > BLOCK_WORDS {
+            self.next_block();
+        }
+        let Some(place) = self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..)) else {
+            return;
+        };
+        let Some(place) = place.first_chunk_mut() else { return };
+        *place = words;
+        self.hash = words.iter().fold(self.hash, |hash, word| mix(hash, *word));
+        self.word += K;
+        if self.word == BLOCK_WORDS {
+            self.next_block();
+        }
+    }
+
     /// A word is full; what `rest` and `fill` hold follows it.
     #[inline]
     fn full(&mut self, word: u32) {
@@ -359,14 +410,15 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     #[cold]
     #[inline(never)]
     fn next_block(&mut self) {
-        // What is full counts as it is: its end may be in the middle of a tick, whose rest follows.
+        // What is there counts as it is: its end may be in the middle of a tick, whose rest follows.
         self.commit();
+        self.set_head(head::FLAGS, doubled(flags(self.state, self.powered) | CLOSED));
         self.open_block();
     }
 }
 
-fn flags(state: LogState, powered: bool) -> u32 {
-    doubled(state as u16 | if powered { POWERED } else { 0 })
+fn flags(state: LogState, powered: bool) -> u16 {
+    state as u16 | if powered { POWERED } else { 0 }
 }
 
 /// The block has this number; what is in it is not looked at.
@@ -390,12 +442,33 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         self.full(word);
     }
 
-    #[inline]
-    fn put_pair(&mut self, first: u32, second: u32) {
-        let (rest, fill) = (self.rest, self.fill);
-        let over = |value: u32| value.checked_shr(32 - fill).unwrap_or(0);
-        self.rest = over(second);
-        self.full(rest | first << fill);
-        self.full(over(first) | second << fill);
+    #[inline(never)]
+    fn put_double(&mut self, value: u64) {
+        let fill = self.fill;
+        if value != 0 {
+            let (low, high) = (value as u32, (value >> 32) as u32);
+            // Behind a bit that is set: 65 bits.
+            let (a, b, c) = (low << 1 | 1, low >> 31 | high << 1, high >> 31);
+            let over = |word: u32| (word >> 1) >> (31 - fill);
+            let words = [self.rest | a << fill, over(a) | b << fill];
+            self.rest = over(b) | c << fill;
+            // Two at once where neither is the last of the block.
+            let place =
+                self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..BLOCK_WORDS - 1));
+            match place.and_then(|place| place.first_chunk_mut()) {
+                Some(place) => {
+                    *place = words;
+                    self.hash = mix(mix(self.hash, words[0]), words[1]);
+                    self.word += 2;
+                }
+                None => words.into_iter().for_each(|word| self.full(word)),
+            }
+        }
+        self.fill = fill + 1;
+        if self.fill == 32 {
+            let word = core::mem::take(&mut self.rest);
+            self.fill = 0;
+            self.full(word);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The bits of blocks that follow each other, read back.
 use super::Block;
-use super::memory::{BITS, Whole};
+use super::memory::Whole;
 use crate::remembered::BitSource;
 
 /// Reads the bits of blocks that follow each other.
@@ -21,6 +21,16 @@ impl<'a> Reader<'a> {
         Self { blocks, block: 0, bit, current, damaged: false }
     }
 
+    /// To the next whole word.
+    pub fn align(&mut self) {
+        self.bit = self.bit.next_multiple_of(32);
+    }
+
+    /// The next bit, which is read once more.
+    pub fn peek(&self) -> bool {
+        self.clone().take(1) != 0
+    }
+
     /// Block in the list that is read.
     pub fn block(&self) -> usize {
         self.block
@@ -35,7 +45,7 @@ impl<'a> Reader<'a> {
     /// To the next block where this one is used up and another follows.
     fn advance(&mut self) {
         let Some(whole) = self.current else { return };
-        if self.bit < whole.bits || whole.bits < BITS {
+        if self.bit < whole.bits || !whole.closed {
             return;
         }
         let next = self.blocks.get(self.block + 1).and_then(Whole::parse);

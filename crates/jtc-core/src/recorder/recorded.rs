@@ -4,7 +4,8 @@ use jtc_wire::{
     EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
 };
 
-use super::inputs::{HOST_BYTES, Reference, read_changes};
+use super::inputs::{HOST_BYTES, POSITION, RATES, Reference, Words, head, moved};
+use super::reader::Reader;
 use crate::JOINTS;
 use crate::io::{BusState, HostEvent, Inputs};
 use crate::nodes::FRAMES_MAX;
@@ -125,24 +126,34 @@ impl RecordedInputs {
         !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
     }
 
-    pub(super) fn read<S: BitSource>(reference: &mut Reference, from: &mut S) -> Self {
-        let status_free = from.take(1) != 0;
+    /// A tick, and the check of what came out of it.
+    pub(super) fn read(reference: &mut Reference, from: &mut Reader<'_>) -> (Self, u16) {
+        let head = from.take(32);
         let mut inputs = Self {
             bus_state: Inputs::QUIET.bus_state,
             safety_input: true,
             missed_ticks: 0,
             urgent: [UrgentCommands::NONE; HOST_LINES],
-            status_free,
+            status_free: head & head::STATUS_FREE != 0,
             bus: [None; FRAMES_MAX],
             host: [RecordedEvent::NONE; EVENTS_MAX],
             host_len: 0,
             left_out: false,
         };
-        if from.take(1) == 0 {
+        let ordered = head & head::ORDERED != 0;
+        let motion = ordered.then(|| Motion::read(head & head::FAR != 0, from));
+        if head & head::QUIET == 0 {
             inputs.read_rest(from);
         }
-        reference.read_bus(&mut inputs.bus, from);
-        inputs
+        match motion {
+            Some(motion) => {
+                let changed = head & head::CHANGED != 0;
+                reference.read_ordered(&motion, changed, &mut inputs.bus, from);
+            }
+            None => reference.read_frames(&mut inputs.bus, from),
+        }
+        from.align();
+        (inputs, (head >> head::CHECK) as u16)
     }
 
     fn read_rest<S: BitSource>(&mut self, from: &mut S) {
@@ -166,26 +177,69 @@ impl RecordedInputs {
     }
 }
 
-impl Reference {
-    fn read_bus<S: BitSource>(&mut self, bus: &mut [Option<Frame>; FRAMES_MAX], from: &mut S) {
-        if from.take(1) != 0 {
-            let packed = from.take(1) != 0;
-            for (n, slot) in bus.iter_mut().enumerate().take(self.expected.into()) {
-                *slot = if packed { self.read_packed(n, from) } else { self.read_answer(n, from) };
-            }
-            return;
+/// How positions were written.
+enum Way {
+    /// What all joints have moved.
+    Moved(u32),
+    /// Where each is.
+    Far([u32; JOINTS]),
+}
+
+/// What the joints have moved.
+struct Motion {
+    rates: [u32; JOINTS],
+    way: Way,
+}
+
+impl Motion {
+    fn read<S: BitSource>(far: bool, from: &mut S) -> Self {
+        let rates = [(); JOINTS].map(|()| from.take(32));
+        let way =
+            if far { Way::Far([(); JOINTS].map(|()| from.take(32))) } else { Way::Moved(from.take(32)) };
+        Self { rates, way }
+    }
+
+    /// Position of joint `n`, which was at `before`.
+    fn position(&self, n: usize, before: u32) -> u32 {
+        match &self.way {
+            Way::Moved(ways) => moved(n, before, *ways),
+            Way::Far(positions) => positions.get(n).copied().unwrap_or(before),
         }
+    }
+}
+
+impl Reference {
+    fn read_ordered<S: BitSource>(
+        &mut self,
+        motion: &Motion,
+        changed: bool,
+        bus: &mut [Option<Frame>; FRAMES_MAX],
+        from: &mut S,
+    ) {
+        for (n, slot) in bus.iter_mut().enumerate().take(self.expected.into()) {
+            let Some((len, before)) = self.len.get(n).zip(self.words.get_mut(n)) else { return };
+            let rates = motion.rates.get(n);
+            if rates.is_some() {
+                before[POSITION] = motion.position(n, before[POSITION]);
+            }
+            if changed {
+                before[RATES] = rates.copied().unwrap_or(before[RATES]);
+                read_words(before, from);
+            }
+            let mut now = *before;
+            now[RATES] = rates.copied().unwrap_or(now[RATES]);
+            *slot = answer(n, *len, &now);
+        }
+    }
+
+    fn read_frames<S: BitSource>(&mut self, bus: &mut [Option<Frame>; FRAMES_MAX], from: &mut S) {
         let count = from.take(6) as usize;
         let mut answers = 0;
         for slot in bus.iter_mut().take(count) {
             *slot = if from.take(1) != 0 {
                 let n = from.take(3) as usize;
                 answers |= 1u32 << n;
-                let len = 4 * (from.take(2) as u8 + 4);
-                if let Some(place) = self.len.get_mut(n) {
-                    *place = len;
-                }
-                self.read_answer(n, from)
+                self.read_answer(n, 4 * (from.take(2) as u8 + 4), from)
             } else {
                 let (id, len) = (from.take(11) as u16, from.take(5) as usize);
                 let mut data = [0; MAX_LEN];
@@ -202,56 +256,30 @@ impl Reference {
         self.expect(answers);
     }
 
-    /// An answer of which nothing but the motion has changed, and that little.
-    fn read_packed<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
-        if n < JOINTS {
-            let words = self.words.get_mut(n)?;
-            (words[0], words[1]) = moved(words[0], words[1], read_changes(true, from));
-        }
-        self.answer(n)
-    }
-
-    fn read_answer<S: BitSource>(&mut self, n: usize, from: &mut S) -> Option<Frame> {
-        let (head, tail) = (self.words.get_mut(n)?, self.tails.get_mut(n)?);
-        let len = usize::from(*self.len.get(n)?);
-        let mut now = [head[0], head[1], head[2], head[3], tail[0], tail[1]];
-        let changed = if n < JOINTS {
-            let (is_small, changed) = (from.take(1) != 0, from.take(1) != 0);
-            (now[0], now[1]) = moved(now[0], now[1], read_changes(is_small, from));
-            changed
-        } else {
-            from.take(1) != 0
-        };
-        let first = if n < JOINTS { 2 } else { 0 };
-        if changed {
-            for word in now.iter_mut().take(len / 4).skip(first) {
-                if from.take(1) != 0 {
-                    *word = from.take(32);
-                }
-            }
-        }
-        // What is behind a payload that has become shorter is zero on the other side.
-        now.iter_mut().skip(len / 4).for_each(|word| *word = 0);
-        let [a, b, c, d, e, f] = now;
-        (*head, *tail) = ([a, b, c, d], [e, f]);
-        self.answer(n)
-    }
-
-    /// The last answer of node `n` as a frame.
-    fn answer(&self, n: usize) -> Option<Frame> {
-        let ([a, b, c, d], [e, f]) = (*self.words.get(n)?, *self.tails.get(n)?);
-        let len = usize::from(*self.len.get(n)?);
-        let mut bytes = [0; MAX_LEN];
-        for (n, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip([a, b, c, d, e, f]).enumerate() {
-            *to = if n < 2 { word.to_be_bytes() } else { word.to_le_bytes() };
-        }
-        Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..len)?)
+    fn read_answer<S: BitSource>(&mut self, n: usize, len: u8, from: &mut S) -> Option<Frame> {
+        let (place, before) = self.len.get_mut(n).zip(self.words.get_mut(n))?;
+        *place = len;
+        read_words(before, from);
+        answer(n, len, before)
     }
 }
 
-/// Position, velocity and torque after these changes.
-fn moved(position: u32, other: u32, changes: (i32, i32, i32)) -> (u32, u32) {
-    let velocity = i32::from((other >> 16) as i16).wrapping_add(changes.1) as u16;
-    let torque = i32::from(other as i16).wrapping_add(changes.2) as u16;
-    (position.wrapping_add(changes.0 as u32), u32::from(velocity) << 16 | u32::from(torque))
+/// An answer that has changed, and is as it was before where it has not.
+fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
+    if from.take(1) != 0 {
+        for word in words {
+            if from.take(1) != 0 {
+                *word = from.take(32);
+            }
+        }
+    }
+}
+
+/// An answer of node `n` to a Move.
+fn answer(n: usize, len: u8, words: &Words) -> Option<Frame> {
+    let mut bytes = [0; MAX_LEN];
+    for (at, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).enumerate() {
+        *to = if at == POSITION { word.to_be_bytes() } else { word.to_le_bytes() };
+    }
+    Frame::new(id::MOVE_ANSWER + n as u16, bytes.get(..usize::from(len))?)
 }

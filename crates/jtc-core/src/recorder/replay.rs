@@ -26,7 +26,7 @@ pub enum Record {
         /// What went in.
         inputs: RecordedInputs,
         /// Check of what came out of all ticks since the last snapshot.
-        check: u8,
+        check: u16,
     },
 }
 
@@ -78,12 +78,15 @@ impl Iterator for Log<'_> {
                 // Blocks may be missing here, or recording has rested: it goes on with a snapshot.
                 continue;
             }
-            let record = if reader.take(1) != 0 {
+            let record = if reader.peek() {
+                reader.take(1);
                 self.reference = Reference::default();
-                Record::Snapshot(Snapshot::read(&mut reader))
+                let snapshot = Snapshot::read(&mut reader);
+                reader.align();
+                Record::Snapshot(snapshot)
             } else {
-                let inputs = RecordedInputs::read(&mut self.reference, &mut reader);
-                Record::Tick { inputs, check: reader.take(8) as u8 }
+                let (inputs, check) = RecordedInputs::read(&mut self.reference, &mut reader);
+                Record::Tick { inputs, check }
             };
             self.next += reader.block() - before;
             if reader.is_damaged() {
@@ -218,7 +221,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         Step { telemetry, boots, inputs, outputs, outcome }
     }
 
-    fn tick(&mut self, recorded: &RecordedInputs, recorded_check: u8) -> Step {
+    fn tick(&mut self, recorded: &RecordedInputs, recorded_check: u16) -> Step {
         let mut bus = [NO_FRAME; FRAMES_MAX];
         let mut frames = 0;
         for (slot, frame) in bus.iter_mut().zip(recorded.bus()) {
@@ -251,9 +254,9 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
             };
             self.controller.extensions.answers.put(line, &jtc_wire::Answer::Log(page));
         }
-        self.chain = chain(self.chain, &self.controller, &outputs);
+        self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
-        let same = check(self.chain) == u32::from(recorded_check);
+        let same = check(self.chain) == recorded_check;
         if !recorded.is_whole() && self.outcome == Outcome::Same {
             self.outcome = Outcome::Unsure(Unsure::Input);
             self.follows = true;

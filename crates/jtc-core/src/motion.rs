@@ -16,6 +16,7 @@ use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
 use crate::remembered::remembered;
+pub(crate) use commanded::Commanded;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
 use limiter::Limiter;

@@ -51,9 +51,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The answers of the nodes, and whether this tick comes in time.
     fn take_answers(&mut self, inputs: &Inputs<'_>) {
         let found_moving = self.motion.set.next_tick();
-        let commanded = self.motion.set.due_velocity(&self.config);
+        let commanded = &self.motion.set.commanded;
         if found_moving != [false; JOINTS] {
-            self.nodes.go_on_moving(&found_moving, commanded);
+            self.nodes.go_on_moving(&found_moving, commanded.due_velocity(&self.config));
         }
         self.nodes.take(inputs, &self.config, self.goal(), commanded);
         self.pump &= !self.nodes.gripper_lost();

@@ -4,6 +4,7 @@
 //! commands in answer to that acts later still. By this *delay* ([`Config::delay_ticks`](crate::Config)) the position that was
 //! commanded is looked up that a joint which follows exactly would measure now: the *due* one. What is left between the two is an
 //! error of the joint, and not the way that it has gone since.
+use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
@@ -25,6 +26,9 @@ pub(crate) struct Commanded {
 remembered!(Commanded { position, velocity, now });
 
 impl Commanded {
+    /// The oldest set values that are kept, ticks ago.
+    pub const OLDEST: u8 = SLOTS as u8 - 1;
+
     /// The next tick begins.
     pub fn next_tick(&mut self) {
         self.now = self.now.wrapping_add(1);
@@ -44,6 +48,12 @@ impl Commanded {
     /// Velocities (rad/s) alike.
     pub fn velocity(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.velocity[self.slot(ticks)]
+    }
+
+    /// Velocities (rad/s) that are due in the measurement of this tick, before its set values are known: those of the last one at the
+    /// latest.
+    pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
+        self.velocity(config.delay_ticks.max(1))
     }
 
     /// A joint begins anew: as if it had been commanded to move at `velocity` (rad/s) for ever, so as to be at `position` (rad) so

@@ -17,7 +17,7 @@ pub(crate) struct SetValues {
     /// The set values of this tick.
     pub point: SetPoint,
     /// Those of the last ticks (J-62).
-    pub(super) commanded: Commanded,
+    pub commanded: Commanded,
     /// The joint is enabled and its set position latched.
     pub(super) holding: [bool; JOINTS],
     /// The joint is set absent (J-53): there is nothing to hold.
@@ -70,11 +70,6 @@ impl SetValues {
     /// Positions (rad) that are due in the measurement of this tick (J-62).
     pub fn due(&self, config: &Config) -> &[f64; JOINTS] {
         self.commanded.position(config.delay_ticks)
-    }
-
-    /// Velocities (rad/s) that are due in it, before the set values of this tick are known: those of the last one at the latest.
-    pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
-        self.commanded.velocity(config.delay_ticks.max(1))
     }
 
     /// Joint velocities to move at from now on, rad/s.

@@ -4,22 +4,28 @@
 //! without a usable answer takes the *prediction*: the last one, carried on at the rate at which the joint moved, and the
 //! change of the commanded velocity since. The first usable answer after missing ones differs from the prediction by an
 //! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
-//! The same holds when answers that had been late are overtaken by one in time: what came with the first is taken back by the last,
-//! and the offsets of many do not add up.
+//! A *late* answer ([`Lateness`]) is one of the time at which it was due: it is compared with what was predicted for then, and the
+//! prediction goes on from it. Where it is about where it was predicted it is used as it is, like one in time: offsets that fade
+//! in each tick would be a filter in the position loop, which makes it swing.
 //! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
 //! stays closed however often answers are lost.
 mod history;
+mod lateness;
 
-use crate::DT;
 use crate::config::Config;
+use crate::motion::Commanded;
 use crate::remembered::remembered;
+use crate::{DT, JOINTS};
 use history::{Answered, History};
+use lateness::Lateness;
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
 /// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
 /// the joint of an encoder that jumps has not moved.
 const UNEXPECTED: f64 = 0.1;
+/// Steps of the encoder that a late answer may be from where it was predicted: positions and the rate carried on are as coarse as that.
+const IN_ITS_PLACE: f64 = 2.0;
 /// Most that the rate carried on differs from the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
 /// Most that is carried on, in velocity limits.
@@ -45,14 +51,27 @@ pub(crate) struct Tick {
     pub answer: Option<Reading>,
     /// A Move asked for an answer.
     pub expected: bool,
-    /// It is not the only answer of this tick: those before it were late.
-    pub again: bool,
+    /// That Move was acknowledged.
+    pub asked: bool,
+    /// Answers of this tick: those before the last were late.
+    pub answers: u8,
     /// Commanded velocity, rad/s.
     pub commanded: f64,
     /// Milliseconds since the last tick.
     pub elapsed_ms: u32,
     /// Velocity limit of the joint, rad/s.
     pub velocity_max: f64,
+}
+
+/// An answer that is late, and what was commanded since it was due.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Late {
+    /// ms.
+    pub ms: u32,
+    /// Velocity that was commanded when it was due, rad/s.
+    pub commanded: f64,
+    /// Way that was commanded since, rad.
+    pub commanded_way: f64,
 }
 
 /// What is known of a joint's motion.
@@ -76,6 +95,8 @@ pub(crate) struct Measurement {
     carried: f64,
     /// The last usable answers.
     history: History,
+    /// How late the answers are.
+    lateness: Lateness,
     /// An answer has been missing since the last usable one.
     missing: bool,
     /// Prediction less answer, as much as has not faded.
@@ -107,6 +128,7 @@ remembered!(Measurement {
     rate,
     carried,
     history,
+    lateness,
     missing,
     position_offset,
     velocity_offset,
@@ -126,6 +148,32 @@ impl Fading {
         if self.left.abs() < FADED && self.slope.abs() < FADED {
             *self = Self::default();
         }
+    }
+
+    /// As much of it goes as is opposite to `by`.
+    fn take_back(&mut self, by: f64) {
+        let left = self.left + by;
+        self.left = if self.left > 0.0 { left.max(0.0).min(self.left) } else { left.min(0.0).max(self.left) };
+    }
+}
+
+impl Late {
+    /// An answer of this joint that is so many ticks late, as far as what was commanded is known.
+    #[cold]
+    pub fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
+        let now = config.delay_ticks.max(1);
+        let then = (now + ticks).min(Commanded::OLDEST);
+        let of = |values: &[f64; JOINTS]| values.get(joint).copied().unwrap_or_default();
+        Self {
+            ms: (then - now).into(),
+            commanded: of(commanded.velocity(then)),
+            commanded_way: of(commanded.position(now)) - of(commanded.position(then)),
+        }
+    }
+
+    /// Way of a joint since, whose rate then was `carried` (rad/s), rad.
+    fn way(&self, carried: f64) -> f64 {
+        self.commanded_way + (carried - self.commanded) * (f64::from(self.ms) * DT)
     }
 }
 
@@ -151,8 +199,8 @@ impl Measurement {
         self.commanded = commanded;
     }
 
-    /// One tick; false when the answer is not usable, or there is none.
-    pub fn step(&mut self, tick: &Tick, config: &Config) -> bool {
+    /// One tick; false when the answer is not usable, or there is none. `past`: what was commanded since so many ticks ago.
+    pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> bool {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
         self.answer.position += (self.carried + change) * (f64::from(tick.elapsed_ms) * DT);
@@ -161,24 +209,51 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
+        // Nearly always every answer is in time. What that needs is compiled on its own.
+        if self.lateness.stands(tick.answers) {
+            self.take(tick, None, config)
+        } else {
+            self.take_late(*tick, past, config)
+        }
+    }
 
-        let age_ms = self.clock_ms.wrapping_sub(self.answered_ms);
+    /// The rest of a tick whose answer may be late. `tick` is a copy: where it is in memory, every tick is slower.
+    #[cold]
+    #[inline(never)]
+    fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> bool {
+        let ticks = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
+        let late = self.late(ticks, &tick, past, config);
+        self.take(&tick, late, config)
+    }
+
+    /// The answer of a tick, if it has one that is usable. Inlined: without a late answer half of it falls away.
+    #[inline(always)]
+    fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> bool {
+        let change = tick.commanded - self.commanded;
+        let predicted = Reading { velocity: self.answer.velocity + change, ..self.answer };
+        let at_ms = self.clock_ms.wrapping_sub(late.map_or(0, |late| late.ms));
+        let age_ms = at_ms.wrapping_sub(self.answered_ms);
         let reach = (IMPLAUSIBLE * DT) * tick.velocity_max * f64::from(age_ms);
-        let usable = tick
-            .answer
-            .filter(|answer| !self.known || (answer.position - self.answer.position).abs() <= reach);
+        // Where a late answer has led meanwhile.
+        let since = |carried: f64| late.map_or(0.0, |late| late.way(carried));
+        let off = |answer: &Reading| predicted.position - (answer.position + since(self.carried));
+        let usable = tick.answer.filter(|answer| !self.known || off(answer).abs() <= reach);
         if let Some(answer) = usable {
-            let off = self.answer.position - answer.position;
-            if !self.known {
-                *self = Self { known: true, ..Self::default() };
-            } else if self.missing | tick.again {
-                self.position_offset.left += off;
-                self.velocity_offset.left += self.answer.velocity + change - answer.velocity;
-                self.fading = true;
+            let (off, known) = (off(&answer).abs(), self.known);
+            if !known {
+                *self =
+                    Self { known: true, clock_ms: self.clock_ms, lateness: self.lateness, ..Self::default() };
             }
-            self.answer = answer;
-            (self.answered_ms, self.commanded, self.missing) = (self.clock_ms, tick.commanded, false);
-            self.take_rate(off.abs() <= UNEXPECTED * reach, tick.velocity_max);
+            self.take_rate(&answer, at_ms, off <= UNEXPECTED * reach, tick.velocity_max);
+            self.answer = Reading { position: answer.position + since(self.carried), ..answer };
+            self.answered_ms = at_ms;
+            self.commanded = late.map_or(tick.commanded, |late| late.commanded);
+            let again = late.is_some() && tick.answers > 1;
+            if known && (self.missing || again) {
+                let in_its_place = late.is_some() && off <= config.encoder_step * IN_ITS_PLACE;
+                self.bridge(&predicted, tick.commanded, in_its_place);
+            }
+            self.missing = false;
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
         }
@@ -191,12 +266,48 @@ impl Measurement {
         usable.is_some()
     }
 
+    /// What the answer of this tick differs by from what was `predicted` is not to be a step. One that is in its place makes none;
+    /// it takes back what is left of others, where it can, or else they would add up.
+    #[inline(always)]
+    fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
+        let position = predicted.position - self.answer.position;
+        let velocity = predicted.velocity - (self.answer.velocity + (commanded - self.commanded));
+        if in_its_place {
+            self.position_offset.take_back(position);
+            self.velocity_offset.take_back(velocity);
+        } else {
+            self.position_offset.left += position;
+            self.velocity_offset.left += velocity;
+            self.fading = true;
+        }
+    }
+
+    /// What was commanded since the answer of this tick was due: so many ticks ago as it is counted.
+    fn late(&mut self, ticks: u8, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Option<Late> {
+        let answer = tick.answer?;
+        let counted = past(ticks);
+        let in_its_place = |late: &Late| {
+            let off = self.answer.position - (answer.position + late.way(self.carried));
+            off.abs() <= config.encoder_step * IN_ITS_PLACE
+        };
+        if !self.known || in_its_place(&counted) {
+            return Some(counted);
+        }
+        // Fast joints show at once that an answer was lost: those behind it are where later ones are due.
+        let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
+            return Some(counted);
+        };
+        self.lateness.lost(later);
+        Some(past(later))
+    }
+
     /// The rate at an answer, since the youngest one that is old enough. It is of answers alone: a rate that came from
     /// predictions would carry itself on, whatever the joint does, while every other answer is lost. `as_predicted`: the answer
-    /// was about where the motion so far had led.
-    fn take_rate(&mut self, as_predicted: bool, velocity_max: f64) {
-        let Reading { position, velocity } = self.answer;
-        let answered = Answered { position, at_ms: self.clock_ms };
+    /// was about where the motion so far had led. Inlined for the sake of the ticks without a late answer.
+    #[inline(always)]
+    fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
+        let Reading { position, velocity } = *answer;
+        let answered = Answered { position, at_ms };
         let rate = self.history.rate_to(&answered);
         self.history.push(answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);

@@ -5,6 +5,7 @@ use jtc_wire::can_flag;
 
 use crate::config::Config;
 use crate::io::Inputs;
+use crate::motion::Commanded;
 use crate::{JOINTS, NODES};
 
 mod bring_up;
@@ -14,7 +15,7 @@ mod node;
 mod tests;
 
 use crate::remembered::remembered;
-use measure::{Reading, Tick};
+use measure::{Late, Reading, Tick};
 pub(crate) use node::{Goal, Node};
 
 /// Node number of the gripper.
@@ -181,8 +182,8 @@ impl Nodes {
         &self.velocity
     }
 
-    /// Takes in what came over the bus since the last tick. `commanded`: velocities, rad/s.
-    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &[f64; JOINTS]) {
+    /// Takes in what came over the bus since the last tick. `commanded`: the set values of the ticks so far.
+    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
@@ -191,7 +192,7 @@ impl Nodes {
         let gripper = &self.nodes[GRIPPER];
         let (gripper_state, gripper_configured) = (gripper.report.state, gripper.configured);
         for (n, node) in self.nodes.iter_mut().enumerate() {
-            (node.misbehaved, node.again) = (false, false);
+            (node.misbehaved, node.answers) = (false, 0);
             node.deaf_left = node.deaf_left.saturating_sub(1);
             configured_before |= u8::from(node.configured) << n;
         }
@@ -226,7 +227,7 @@ impl Nodes {
         }
         let torque_taken = core::mem::replace(&mut self.powered, goal == Goal::Enabled) && !self.powered;
         self.rest_ms = if torque_taken { config.enable_rest_ms } else { self.rest_ms.saturating_sub(1) };
-        let usable = self.measure(answered, commanded, 1 + u32::from(inputs.missed_ticks), config);
+        let usable = self.measure(inputs, answered, commanded, config);
         self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
         self.gripper_lost = (gripper_state == NodeState::ENABLED
@@ -255,7 +256,7 @@ impl Nodes {
             node.unasked = Some(report.state);
             return;
         }
-        node.again |= *answered & (1 << n) != 0;
+        node.answers = node.answers.wrapping_add(1);
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
@@ -287,20 +288,25 @@ impl Nodes {
         }
     }
 
-    /// Positions and velocities from the nodes that `answered`, so long after the last tick; returns those whose answers are usable.
-    fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], elapsed_ms: u32, config: &Config) -> u8 {
+    /// Positions and velocities from the nodes that `answered`; returns those whose answers are usable.
+    fn measure(&mut self, inputs: &Inputs<'_>, answered: u8, commanded: &Commanded, config: &Config) -> u8 {
+        let elapsed_ms = 1 + u32::from(inputs.missed_ticks);
+        let asked = self.sent_move && inputs.bus_state.acknowledged;
+        let velocity = commanded.due_velocity(config);
         let (mut usable, mut still) = (answered, true);
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
             let reading = Reading { position: node.report.position, velocity: node.report.velocity };
             let tick = Tick {
                 answer: (answered & (1 << j) != 0).then_some(reading),
                 expected: self.sent_move,
-                again: node.again,
-                commanded: commanded[j],
+                answers: node.answers,
+                asked,
+                commanded: velocity[j],
                 elapsed_ms,
                 velocity_max: config.joints[j].velocity_max,
             };
-            if node.valid && !node.measured.step(&tick, config) {
+            let past = |ticks| Late::new(ticks, j, commanded, config);
+            if node.valid && !node.measured.step(&tick, past, config) {
                 usable &= !(1 << j);
             }
             node.fresh = usable & (1 << j) != 0;

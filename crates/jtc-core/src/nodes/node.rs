@@ -53,8 +53,8 @@ pub(crate) struct Node {
     pub(super) absent: bool,
     /// State that it reported while it was not listened to.
     pub(super) unasked: Option<NodeState>,
-    /// More than one answer came in since the last tick: all but the last were late.
-    pub(super) again: bool,
+    /// Answers that came in since the last tick: all but the last were late.
+    pub(super) answers: u8,
     /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
@@ -77,7 +77,7 @@ remembered!(Node {
     fresh,
     absent,
     unasked,
-    again,
+    answers,
     misbehaved,
 });
 

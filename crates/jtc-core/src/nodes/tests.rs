@@ -17,7 +17,7 @@ fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
 }
 
 fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
-    nodes.take(&inputs(bus, bus_state), &Config::avena(), Goal::Ready, &[0.0; JOINTS]);
+    nodes.take(&inputs(bus, bus_state), &Config::avena(), Goal::Ready, &Commanded::default());
 }
 
 /// Every node configured and ready, and a Move just sent.
@@ -281,7 +281,7 @@ fn j16_a_joint_at_the_speed_limit_of_enabling_is_not_slow() {
     for (enable_speed_max, slow) in [(speed, false), (0.999 * speed, false), (1.001 * speed, true)] {
         let (config, mut nodes) = (Config { enable_speed_max, ..Config::avena() }, nodes.clone());
         let before = nodes.still_ms;
-        nodes.take(&inputs(&bus, GOOD), &config, Goal::Ready, &[0.0; JOINTS]);
+        nodes.take(&inputs(&bus, GOOD), &config, Goal::Ready, &Commanded::default());
         assert_eq!(nodes.still_ms, if slow { before + 1 } else { 0 }, "{enable_speed_max}");
     }
 }

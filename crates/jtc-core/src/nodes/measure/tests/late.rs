@@ -1,0 +1,234 @@
+//! Answers that come late, and some that are lost among them (J-63).
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// A step of the encoders.
+const ENCODER: f64 = 96e-6;
+
+/// A joint that goes to and fro.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    /// rad.
+    amplitude: f64,
+    /// 1/s.
+    rate: f64,
+    /// Share of it that is commanded: the rest is what the joint does of itself.
+    commanded: f64,
+}
+
+/// What is used in a millisecond, less where the joint is and how fast.
+#[derive(Clone, Copy, Debug)]
+struct Off {
+    /// rad.
+    position: f64,
+    /// rad/s.
+    velocity: f64,
+}
+
+impl Motion {
+    fn position(&self, ms: f64) -> f64 {
+        self.amplitude * (self.rate * ms * DT).sin()
+    }
+
+    fn velocity(&self, ms: f64) -> f64 {
+        self.amplitude * self.rate * (self.rate * ms * DT).cos()
+    }
+
+    /// Most of it, rad/s.
+    fn speed(&self) -> f64 {
+        self.amplitude * self.rate
+    }
+
+    fn past(&self, ms: f64, ticks: u8) -> Late {
+        let then = ms - f64::from(ticks);
+        Late {
+            ms: ticks.into(),
+            commanded: self.commanded * self.velocity(then),
+            commanded_way: self.commanded * (self.position(ms) - self.position(then)),
+        }
+    }
+
+    /// Each millisecond; `came`: its answers.
+    fn off(&self, came: &[Vec<u32>]) -> Vec<Off> {
+        let mut joint = Measurement::default();
+        let mut off = Vec::new();
+        for (now, came) in (0u32..).zip(came) {
+            let ms = f64::from(now);
+            let answer = came.last().map(|&n| Reading {
+                position: ENCODER * (self.position(n.into()) / ENCODER).round(),
+                velocity: self.velocity(n.into()),
+            });
+            let tick = Tick {
+                answer,
+                expected: true,
+                asked: true,
+                answers: came.len() as u8,
+                commanded: self.commanded * self.velocity(ms),
+                elapsed_ms: 1,
+                velocity_max: VELOCITY_MAX,
+            };
+            let usable = joint.step(&tick, |ticks| self.past(ms, ticks), &Config::avena());
+            assert_eq!(usable, answer.is_some(), "{now} ms");
+            let Reading { position, velocity } = joint.used();
+            off.push(Off { position: position - self.position(ms), velocity: velocity - self.velocity(ms) });
+        }
+        off
+    }
+}
+
+/// The numbers of the answers that come in each millisecond: each so late, in order; `lost` ones never.
+fn arrivals(late: &[u32], lost: &[u32]) -> Vec<Vec<u32>> {
+    let mut came = std::vec![Vec::new(); late.len()];
+    let mut last = 0;
+    for (n, late) in (0u32..).zip(late).filter(|(n, _)| !lost.contains(n)) {
+        last = last.max(n + late);
+        if let Some(came) = came.get_mut(last as usize) {
+            came.push(n);
+        }
+    }
+    came
+}
+
+/// rad.
+fn most(off: &[Off]) -> f64 {
+    off.iter().fold(0.0, |most, off| most.max(off.position.abs()))
+}
+
+/// Lateness of each answer: twenty in time, then a burst that shows how late they may be, then any, and all in time in every 24th tick.
+fn lateness(most: u32) -> impl Strategy<Value = Vec<u32>> {
+    let burst = (0..=20).map(|_| 0).chain((0..=most).rev());
+    let burst: Vec<u32> = burst.collect();
+    prop::collection::vec(0..=most, 600).prop_map(move |late| {
+        let late = (0..).zip(late).map(|(n, late)| late.min(23 - n % 24));
+        burst.iter().copied().chain(late).collect()
+    })
+}
+
+fn motion() -> impl Strategy<Value = Motion> {
+    (0.05..0.5f64, 0.5..2.0f64, 0.5..1.0f64).prop_map(|(amplitude, rate, commanded)| Motion {
+        amplitude,
+        rate,
+        commanded,
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
+    /// A late answer, once it is known that there are some, is worth one in time but for what the joint has done since: steps of the
+    /// encoder, and what the rate carried on is off by. Taken for one in time, it would be off by its lateness times the speed, 3 mrad.
+    #[test]
+    fn j63_late_answers_are_used_as_of_the_time_at_which_they_were_due(
+        motion in motion(),
+        late in (1u32..=5).prop_flat_map(lateness),
+    ) {
+        let off = motion.off(&arrivals(&late, &[]));
+        // Those of the burst itself have been bridged, which fades.
+        prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
+    }
+
+    /// Their velocities alike: where the joint does what is commanded, it has the velocity that was reported, and what was commanded since.
+    #[test]
+    fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
+        let motion = Motion { commanded: 1.0, ..motion };
+        for off in &motion.off(&arrivals(&late, &[]))[500..] {
+            prop_assert!(off.velocity.abs() < 1e-4, "{off:?}");
+        }
+    }
+
+    /// However many are lost among them: what is used is off by the way of the most that answers are late, and by what is bridged
+    /// when that is seen, which is as much; and nothing of it stays.
+    #[test]
+    fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
+        motion in motion(),
+        late in lateness(3),
+        lost in prop::collection::vec(30u32..300, 0..20),
+    ) {
+        // None is late in the end, but what was lost shows there all the same.
+        let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
+        let off = motion.off(&arrivals(&late, &lost));
+        let way = 4.0 * motion.speed() * DT;
+        prop_assert!(most(&off) <= 2.0 * way + 8.0 * ENCODER, "{} rad, way {way}", most(&off));
+        prop_assert!(most(&off[550..]) <= 4.0 * ENCODER, "{} rad", most(&off[550..]));
+    }
+}
+
+/// Where a joint is fast, the answer behind a lost one is where the prediction has it, and not a millisecond's way behind: it does not take
+/// the rest of the window to be seen.
+#[test]
+fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
+    let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
+    let late: Vec<u32> = (0..400).map(|n| if n < 200 { [0, 1, 0, 2, 0, 0][n % 6] } else { 0 }).collect();
+    let lost = [210, 213, 217, 240];
+    let off = motion.off(&arrivals(&late, &lost));
+    assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
+}
+
+/// What was late before it was known makes no step: it is bridged, and fades.
+#[test]
+fn j63_the_first_late_answers_make_no_step() {
+    let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
+    for late in 1..=4 {
+        let late: Vec<u32> = (0..400).map(|n| if (100..200).contains(&n) { late } else { 0 }).collect();
+        let off = motion.off(&arrivals(&late, &[]));
+        let step =
+            off.windows(2).fold(0.0, |most: f64, off| most.max((off[1].position - off[0].position).abs()));
+        assert!(step <= 3.0 * ENCODER, "{step} rad");
+    }
+}
+
+/// A constant delay is not seen by this (it is what `delay_ticks` is for), and answers that are all late by the same are followed
+/// without an offset that stays.
+#[test]
+fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
+    let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
+    let late: Vec<u32> = (0..3_000).map(|n| if n < 100 { 0 } else { 2 }).collect();
+    let came = arrivals(&late, &[]);
+    let off = motion.off(&came);
+    for (ms, off) in (0..3_000).zip(&off).skip(1_000) {
+        let ms = f64::from(ms);
+        let behind = motion.position(ms - 2.0) - motion.position(ms);
+        assert!((off.position - behind).abs() <= ENCODER, "{ms} ms: {off:?}, {behind} rad behind");
+    }
+}
+
+/// What is bridged because an answer was beside the prediction, and is in its place again in small steps, does not add up with them.
+#[test]
+fn j63_what_was_bridged_is_taken_back() {
+    let mut joint = moving(0.0);
+    let mut answers = |off: f64, answers: u8| {
+        step(&mut joint, &Tick { answers, ..tick(Some(off), 0.0) });
+        let used = joint.used().position;
+        step(&mut joint, &tick(None, 0.0));
+        used
+    };
+    answers(0.0, 2);
+    for k in 1..=20 {
+        for off in [0.0, 3.1 * ENCODER, 1.6 * ENCODER] {
+            let used = answers(off, 1);
+            assert!((-ENCODER..=4.0 * ENCODER).contains(&used), "{k}: {used} rad at an answer of {off} rad");
+        }
+    }
+}
+
+/// Toward nothing, and not beyond it.
+#[test]
+fn j63_only_what_is_left_is_taken_back() {
+    for (left, by, remains) in [
+        (2.0, -0.5, 1.5),
+        (2.0, -3.0, 0.0),
+        (2.0, 0.5, 2.0),
+        (-2.0, 0.5, -1.5),
+        (-2.0, 3.0, 0.0),
+        (-2.0, -0.5, -2.0),
+        (0.0, 1.0, 0.0),
+        (0.0, -1.0, 0.0),
+    ] {
+        let mut fading = Fading { left, slope: 0.0 };
+        fading.take_back(by);
+        assert_eq!(fading.left, remains, "{left} {by}");
+    }
+}

@@ -151,6 +151,30 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
     }
 }
 
+/// A joint that is stuck had not followed what was commanded: where the arm loses its torque because of it, and the next answers are
+/// missing, it is not predicted to move back.
+#[test]
+fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
+    for velocity in [0.25, -0.25] {
+        let mut rig = Rig::holding();
+        let path: Vec<_> = pieces(JOINT, &[(5.0 * velocity, 20), (0.0, 200), (-5.0 * velocity, 20)]);
+        rig.move_along(&path, 600);
+        rig.apart[JOINT] = true;
+        rig.nodes[JOINT].report.velocity = 0.0;
+        rig.until(1_500, |rig| rig.trajectory() != TrajectoryState::Execute);
+        assert_eq!(rig.state(), ControllerState::Error);
+        let stuck = rig.nodes[JOINT].report.position;
+        for k in 1..=4 {
+            // The answer to the Move of that tick was lost, too.
+            rig.drop_answers(JOINT);
+            rig.tick();
+            let t = rig.controller.telemetry().joints[JOINT];
+            assert!((t.position - stuck).abs() < 1e-4, "{velocity}, {k}: {} rad", t.position - stuck);
+            assert!(t.velocity.abs() < 0.02, "{velocity}, {k}: {} rad/s", t.velocity);
+        }
+    }
+}
+
 /// Acknowledges missing in four of five ticks are no transmit timeout. A joint that is dead meanwhile is not predicted for
 /// longer than otherwise.
 #[test]

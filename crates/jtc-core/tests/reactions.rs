@@ -134,6 +134,29 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_gives_way_while_it_still_
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
 
+/// A joint that is stuck had not followed what was commanded: where the arm is held because of it, and the next answers are missing, it
+/// is not predicted to move back.
+#[test]
+fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
+    let mut config = Config::avena();
+    config.joints[4].torque_max = 2_000.0;
+    let mut rig = Rig::holding_with(config);
+    rig.run(1_000);
+    rig.move_along(&path(), 100);
+    rig.apart[4] = true;
+    rig.until(1_500, |rig| rig.trajectory() != TrajectoryState::Execute);
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Pause, 0));
+    let stuck = rig.nodes[4].report.position;
+    for k in 1..=4 {
+        // The answer to the Move of that tick was lost, too.
+        rig.drop_answers(4);
+        rig.tick();
+        let t = rig.controller.telemetry().joints[4];
+        assert!((t.position - stuck).abs() < 1e-5, "{k}: {} rad", t.position - stuck);
+        assert!(t.velocity.abs() < 1e-3, "{k}: {} rad/s", t.velocity);
+    }
+}
+
 struct Row {
     error: &'static str,
     cause: fn(&mut Rig),

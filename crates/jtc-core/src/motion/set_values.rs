@@ -22,7 +22,7 @@ pub(crate) struct SetValues {
     pub(super) holding: [bool; JOINTS],
     /// The joint is set absent (J-53): there is nothing to hold.
     absent: [bool; JOINTS],
-    /// Joints whose set values began to move because they were found in motion, since the last tick.
+    /// Joints whose set values began anew from where they were found since the last tick, in motion or at rest.
     found_moving: [bool; JOINTS],
     /// Joints whose load is being caught.
     pub(super) catch: [Catch; JOINTS],
@@ -40,7 +40,7 @@ impl SetValues {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         commanded.rest(nodes.positions());
-        (*holding, *absent, *found_moving) = ([false; JOINTS], [false; JOINTS], [false; JOINTS]);
+        (*holding, *absent, *found_moving) = ([false; JOINTS], [false; JOINTS], [true; JOINTS]);
         *catch = [Catch::default(); JOINTS];
         *deceleration = [None; JOINTS];
         *jog = None;
@@ -50,6 +50,8 @@ impl SetValues {
     pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.commanded.rest(position);
+        // J-63: joints do not stop because the set values begin anew, least of all one that had not followed them.
+        self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.jog = None;
     }
@@ -60,8 +62,8 @@ impl SetValues {
         self.commanded.rest(nodes.positions());
     }
 
-    /// The next tick begins. Returns joints whose set values began to move in the last one, without a change of their motion: they
-    /// were found in it.
+    /// The next tick begins. Returns joints whose set values began anew in the last one, without a change of their motion: they were
+    /// found in it.
     pub fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)

@@ -279,7 +279,7 @@ impl Nodes {
         }
     }
 
-    /// Joints were found in motion, and what is commanded began with it (rad/s): that is no change of their motion (J-63).
+    /// Joints were found in motion or at rest, and what is commanded began with it (rad/s): that is no change of their motion (J-63).
     pub fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {

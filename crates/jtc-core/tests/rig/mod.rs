@@ -273,6 +273,11 @@ impl Rig {
         panic!("not within {ticks} ticks: {:?}", self.controller.telemetry());
     }
 
+    /// What a node has answered and the controller has not seen yet is lost.
+    pub fn drop_answers(&mut self, node: usize) {
+        self.answers.retain(|frame| usize::from(frame.id & 0x0F) != node);
+    }
+
     pub fn tick(&mut self) {
         let bus = if self.inject.is_empty() {
             core::mem::take(&mut self.answers)

@@ -364,7 +364,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if reloaded {
                 // Nothing at another place, or in place of nothing, is no payload that comes or goes.
                 if config.payload.is_there() || self.config.payload.is_there() {
-                    self.parameters.change_payload(&config);
+                    let heavier = config.payload.mass - self.config.payload.mass;
+                    self.parameters.change_payload(&config, heavier);
                 }
                 self.config.payload = config.payload;
             }

@@ -13,6 +13,8 @@ pub(crate) const BLEND_MS: u16 = 500;
 pub(crate) struct PayloadBlend {
     from: LinkInertias,
     to: LinkInertias,
+    /// Mass that has not come yet, kg; negative where it goes.
+    mass: f64,
     left_ms: u16,
 }
 
@@ -20,23 +22,28 @@ pub(crate) struct PayloadBlend {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,
+    mass: f64,
     /// Numbers of the arm that the way began with, unless it has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
-remembered!(BlendState { left_ms, from });
+remembered!(BlendState { left_ms, mass, from });
 
 impl PayloadBlend {
     /// What is remembered of it.
     pub fn state(&self) -> BlendState {
-        BlendState { left_ms: self.left_ms, from: (self.left_ms > 0).then(|| self.from.numbers()) }
+        BlendState {
+            left_ms: self.left_ms,
+            mass: self.mass,
+            from: (self.left_ms > 0).then(|| self.from.numbers()),
+        }
     }
 
     /// Goes on from there, with the dynamics of the arm and all of its payload.
     pub fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
-            self.left_ms = state.left_ms.min(BLEND_MS);
+            (self.left_ms, self.mass) = (state.left_ms.min(BLEND_MS), state.mass);
             self.from = LinkInertias::from_numbers(from);
             dynamics.set_inertias(&self.between());
         }
@@ -50,17 +57,24 @@ impl PayloadBlend {
     /// Nothing is on its way.
     pub fn none(dynamics: &Dynamics) -> Self {
         let now = dynamics.inertias();
-        Self { from: now, to: now, left_ms: 0 }
+        Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// From the arm `now`, which may be on its way itself, to the one with the `next` payload.
-    pub fn begin(&mut self, now: &Dynamics, next: &Dynamics) {
-        *self = Self { from: now.inertias(), to: next.inertias(), left_ms: BLEND_MS };
+    /// From the arm `now`, which may be on its way itself, to the one with the `next` payload, which is by so much heavier than the last
+    /// (kg).
+    pub fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
+        let mass = self.mass + heavier;
+        *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
     }
 
     /// The model was made anew, with the whole payload in it.
     pub fn forget(&mut self) {
-        self.left_ms = 0;
+        (self.left_ms, self.mass) = (0, 0.0);
+    }
+
+    /// Mass that comes with the next tick of the way, kg.
+    pub fn next_mass(&self) -> f64 {
+        self.mass / f64::from(self.left_ms.max(1))
     }
 
     /// Time left, ms.
@@ -74,6 +88,7 @@ impl PayloadBlend {
             0 => {}
             1 => self.end(dynamics),
             _ => {
+                self.mass -= self.next_mass();
                 self.left_ms -= 1;
                 dynamics.set_inertias(&self.between());
             }
@@ -82,8 +97,33 @@ impl PayloadBlend {
 
     /// The rest of the way at once: nobody is held by it.
     pub fn end(&mut self, dynamics: &mut Dynamics) {
+        self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
             dynamics.set_inertias(&self.to);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Config, Parameters};
+
+    /// Also where one payload follows another on its way.
+    #[test]
+    fn j60_as_much_mass_comes_as_is_given() {
+        let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);
+        let mut blend = PayloadBlend::none(&dynamics);
+        let mut come = 0.0;
+        for (heavier, ticks) in [(1.5, 200), (-0.5, 499), (0.25, 1_000)] {
+            let now = dynamics.clone();
+            blend.begin(&now, &now, heavier);
+            for _ in 0..ticks {
+                come += blend.next_mass();
+                blend.step(&mut dynamics);
+            }
+        }
+        assert!((come - 1.25).abs() < 1e-12, "{come}");
+        assert_eq!((blend.left_ms(), blend.next_mass()), (0, 0.0));
     }
 }

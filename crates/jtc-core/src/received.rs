@@ -178,9 +178,9 @@ impl ReceivedParameters {
         (0..JOINTS).all(held)
     }
 
-    /// The payload of these settings comes into the model, over half a second (J-60).
-    pub fn change_payload(&mut self, config: &Config) {
-        self.payload.begin(&self.dynamics, &dynamics(&self.model, config));
+    /// The payload of these settings comes into the model, over half a second (J-60); it is by so much heavier than the last (kg).
+    pub fn change_payload(&mut self, config: &Config, heavier: f64) {
+        self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
     /// A tick in which the arm is held or taught: the payload comes on.
@@ -191,6 +191,11 @@ impl ReceivedParameters {
     /// A tick without torque: the payload is there.
     pub fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
+    }
+
+    /// Mass that comes with the next [`blend_payload`](Self::blend_payload), kg.
+    pub fn next_mass(&self) -> f64 {
+        self.payload.next_mass()
     }
 
     /// Milliseconds until the payload is in the model; 0: it is.

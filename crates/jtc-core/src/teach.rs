@@ -79,13 +79,11 @@ impl Payload {
         self.elapsed_ms = 0;
     }
 
-    /// The payload of the arm was given, and comes into the model in so many more ticks (J-60): what had been fitted goes as it
-    /// comes.
-    pub fn give_way(&mut self, left_ms: u16) {
-        let left = f64::from(left_ms.max(1));
-        let kept = (left - 1.0) / left;
-        self.mass *= kept;
-        self.rest = self.rest.map(|rest| rest * kept);
+    /// So much mass (kg) at the flange comes into the model with this tick (J-60): as much goes of the fitted one. What is given beyond
+    /// that is a load that was not there when the mass was fitted.
+    pub fn give_way(&mut self, mass: f64) {
+        let left = self.mass - mass;
+        self.mass = if self.mass > 0.0 { left.max(0.0).min(self.mass) } else { left.min(0.0).max(self.mass) };
     }
 
     /// A tick of Teaching at `q` (rad) and `v` (rad/s): the torque that carries the mass, and what is left of the rest, N·m.
@@ -212,6 +210,25 @@ mod tests {
         (0..100).for_each(|_| payload.observe(&[3.0; JOINTS]));
         // A time constant of 100 ms: 1 − 1/e of the step.
         assert!((payload.missing[3] - 2.632).abs() < 0.005, "{}", payload.missing[3]);
+    }
+
+    /// Toward nothing, and not beyond it.
+    #[test]
+    fn j60_a_mass_that_is_given_goes_from_the_fitted_one() {
+        for (fitted, given, left) in [
+            (2.0, 0.1, 1.9),
+            (2.0, 2.5, 0.0),
+            (2.0, -0.5, 2.0),
+            (-1.0, -0.25, -0.75),
+            (-1.0, -3.0, 0.0),
+            (-1.0, 2.0, -1.0),
+            (0.0, 1.0, 0.0),
+            (0.0, -1.0, 0.0),
+        ] {
+            let mut payload = Payload { mass: fitted, ..Payload::default() };
+            payload.give_way(given);
+            assert_eq!(payload.mass, left, "{fitted} kg, given {given} kg");
+        }
     }
 
     /// What was found before the arm moved does not hold where it is now.

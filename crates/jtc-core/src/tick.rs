@@ -111,10 +111,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.set.follow_measured(&self.nodes);
-        let left_ms = self.parameters.blend_left_ms();
-        if left_ms > 0 {
-            // What Teaching had found missing is now given.
-            self.motion.law.give_way_to_payload(left_ms);
+        if self.parameters.blend_left_ms() > 0 {
+            // As much of what Teaching had found missing is now given.
+            self.motion.law.give_way_to_payload(self.parameters.next_mass());
             self.parameters.blend_payload();
         }
         self.control(ControlMode::Teach)

@@ -135,16 +135,36 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         arm.run(&mut rig, 700);
         assert_eq!(rig.state(), ControllerState::Teaching);
         let carried = torques(&rig);
+        let was_found = rig.controller.telemetry().joints.map(|joint| joint.torque_other);
         assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
+        // What it had found is right to within the friction.
+        let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
             assert!((arm.q[j] - from[j]).abs() < 0.005, "joint {}: {} rad", j + 1, arm.q[j] - from[j]);
             assert!((torques(&rig)[j] - carried[j]).abs() < 4.0, "joint {}", j + 1);
             let found = telemetry.joints[j].torque_other;
-            assert!(found.abs() < 1e-9, "joint {}: {found} N·m are carried twice", j + 1);
+            assert!(found.abs() < 0.2 * most, "joint {}: {found} of {most} N·m are carried twice", j + 1);
+        }
+    }
+}
+
+/// A small correction is no reason to let go of the rest: half of what was found, and one after another.
+#[test]
+fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
+    for pose in [POSES[0], POSES[2]] {
+        let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), pose);
+        let mut rig = arm.holding(Config::avena());
+        arm.run(&mut rig, 4_000);
+        taught(&mut arm, &mut rig);
+        arm.run(&mut rig, 1_000);
+        // The second comes while the first is on its way.
+        for (mass, wait) in [(0.1, 1_000), (0.5, 200), (1.0, 3_000), (0.8, 3_000)] {
+            let way = set_and_wait(&mut arm, &mut rig, &point_mass(mass), wait);
+            assert!(way < 0.005 && rig.state() == ControllerState::Teaching, "{mass} kg: {way} rad");
         }
     }
 }
@@ -301,6 +321,13 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
         farthest = arm.q.iter().zip(from).map(|(q, from)| (q - from).abs()).fold(farthest, f64::max);
     }
     farthest
+}
+
+/// The same, behind a payload that is given.
+fn set_and_wait(arm: &mut Plant, rig: &mut Rig, payload: &Payload, ms: usize) -> f64 {
+    let body: Vec<u8> = settings::payload_values(payload).flat_map(|value| value.emit()).collect();
+    rig.send(FrameType::SetSettings, &body);
+    drift(arm, rig, ms)
 }
 
 fn taught(arm: &mut Plant, rig: &mut Rig) {

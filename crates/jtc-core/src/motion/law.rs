@@ -150,9 +150,9 @@ impl ControlLaw {
         self.unwinds_ms = UNWINDS_MS;
     }
 
-    /// The payload of the arm was given in Teaching, and comes into the model in so many more ticks (J-60).
-    pub fn give_way_to_payload(&mut self, left_ms: u16) {
-        self.payload.give_way(left_ms);
+    /// The payload of the arm was given in Teaching, and so much more of it (kg) comes into the model with this tick (J-60).
+    pub fn give_way_to_payload(&mut self, mass: f64) {
+        self.payload.give_way(mass);
     }
 
     /// Teaching ends: the integral takes over what teaching carried.

@@ -8,7 +8,9 @@ use jtc_core::recorder::{
     AFTER_ERROR_MS, BLOCK_WORDS, Block, Log, Outcome, Record, Recorder, Replay, SNAPSHOT_MS,
 };
 use jtc_core::{Config, ControllerState, Payload, settings};
-use jtc_wire::{Answer, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState};
+use jtc_wire::{
+    Answer, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, LogPage, LogState, StoreState,
+};
 use rig::Rig;
 
 const BLOCKS: usize = 96;
@@ -427,5 +429,49 @@ fn j56_requests_beside_others_are_replayed_in_their_turns() {
         let steps: Vec<_> = Replay::new(Log::new(&blocks), other.controller, None).collect();
         let differs = steps.iter().filter(|step| step.outcome == Outcome::Differs).count();
         assert!(steps.len() > 400 && differs == 0, "{pair:?}: {differs} of {} ticks differ", steps.len());
+    }
+}
+
+/// Disabled or held; a StoreArm after so many ticks, and half a second and more.
+fn storing(state: ControllerState, wait: usize) -> Rig {
+    let mut rig = recorded();
+    rig.controller.set_store_state(StoreState::Empty, 0);
+    rig.defaults();
+    rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
+    // What was before the torque is not kept.
+    rig.run(600);
+    let stored = state == ControllerState::Init;
+    if stored {
+        assert_eq!(rig.ask(FrameType::Disable, &[]), DataStatus::NoError);
+        rig.until(500, |rig| rig.state() == state);
+    }
+    rig.run(wait);
+    let expected = if stored { DataStatus::NoError } else { DataStatus::NotAllowed };
+    assert_eq!(rig.ask(FrameType::StoreArm, &[]), expected);
+    rig.run(700);
+    rig
+}
+
+/// A replay has no memory to store an arm in and refuses it at once, which is no difference of the controller's, also where there is a
+/// snapshot meanwhile. Behind the next one all is as it was.
+#[test]
+fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
+    for state in [ControllerState::Init, ControllerState::HoldPos] {
+        let rig = storing(state, 0);
+        let sent = rig.controller.telemetry().tick - 700;
+        let snapshot = contents(&blocks(&rig)).1.into_iter().find(|tick| *tick > sent).expect("a snapshot");
+        for before in 0..8 {
+            let rig = storing(state, (snapshot - sent + before) as usize);
+            let blocks = blocks(&rig);
+            let mut other = Rig::new(Config::avena());
+            other.defaults();
+            other.run(700);
+            let steps: Vec<_> = Replay::new(Log::new(&blocks), other.controller, None).collect();
+            let differs = steps.iter().filter(|step| step.outcome == Outcome::Differs).count();
+            assert_eq!(differs, 0, "{state:?}, {before}: {differs} of {} ticks differ", steps.len());
+            let last = steps.last().map(|step| (step.telemetry.tick, step.outcome));
+            let now = rig.controller.telemetry().tick;
+            assert_eq!(last, Some((now, Outcome::Same)), "{state:?}, {before}");
+        }
     }
 }

@@ -112,7 +112,8 @@ pub enum Outcome {
 /// Why a replay may differ from what was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsure {
-    /// Something that went in is not in the log: a long frame, parameters, or more frames than it has room for.
+    /// Something that went in is not in the log: a long frame, parameters, more frames than it has room for, or the memory that a
+    /// StoreArm is for.
     Input,
     /// The arm is not the one of that time.
     Arm,
@@ -257,7 +258,10 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == recorded_check;
-        if !recorded.is_whole() && self.outcome == Outcome::Same {
+        // Here is no memory that lasts: a device that has one takes some ticks for a StoreArm which is refused here at once.
+        let stores = |event: &RecordedEvent| event.frame_type == FrameType::StoreArm as u8;
+        let repeatable = recorded.is_whole() && !recorded.host().iter().any(stores);
+        if !repeatable && self.outcome == Outcome::Same {
             self.outcome = Outcome::Unsure(Unsure::Input);
             self.follows = true;
         } else if self.outcome == Outcome::Same

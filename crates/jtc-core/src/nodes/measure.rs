@@ -26,6 +26,8 @@ const IMPLAUSIBLE: f64 = 3.0;
 const UNEXPECTED: f64 = 0.1;
 /// Steps of the encoder that a late answer may be from where it was predicted: positions and the rate carried on are as coarse as that.
 const IN_ITS_PLACE: f64 = 2.0;
+/// The coarsest encoder for which that counts, rad: what is used as it is may be a step of so much.
+const COARSEST: f64 = 1e-4;
 /// Most that the rate carried on differs from the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
 /// Most that is carried on, in velocity limits.
@@ -157,6 +159,11 @@ impl Fading {
     }
 }
 
+/// How far from where it was predicted a late answer is in its place, rad.
+fn place(config: &Config) -> f64 {
+    config.encoder_step.min(COARSEST) * IN_ITS_PLACE
+}
+
 impl Late {
     /// An answer of this joint that is so many ticks late, as far as what was commanded is known.
     #[cold]
@@ -221,7 +228,10 @@ impl Measurement {
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> bool {
-        let ticks = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
+        let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
+        // Younger than the last one: a frame that comes twice counts as evidence, too, and may have been counted wrongly.
+        let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
+        let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
         self.take(&tick, late, config)
     }
@@ -248,9 +258,9 @@ impl Measurement {
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
             self.answered_ms = at_ms;
             self.commanded = late.map_or(tick.commanded, |late| late.commanded);
-            let again = late.is_some() && tick.answers > 1;
-            if known && (self.missing || again) {
-                let in_its_place = late.is_some() && off <= config.encoder_step * IN_ITS_PLACE;
+            // While answers may be late, each may also be the first that is counted otherwise than those before.
+            if known && (self.missing || late.is_some()) {
+                let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
             self.missing = false;
@@ -288,7 +298,7 @@ impl Measurement {
         let counted = past(ticks);
         let in_its_place = |late: &Late| {
             let off = self.answer.position - (answer.position + late.way(self.carried));
-            off.abs() <= config.encoder_step * IN_ITS_PLACE
+            off.abs() <= place(config)
         };
         if !self.known || in_its_place(&counted) {
             return Some(counted);

@@ -3,7 +3,8 @@
 //! An answer does not name the Move that it answers, but those of a node keep their order. So the newest answer is as late as there
 //! are Moves behind the one that it answers: those that are *outstanding*. A missing answer may be late or lost, and nothing in what
 //! has come distinguishes the two, until two answers come in one tick: the first of them was late. For a second after such
-//! *evidence* unanswered Moves count as outstanding, never more of them than have come in together; without it, as lost.
+//! *evidence* unanswered Moves count as outstanding, never more of them than have come in together; without it, as lost. Evidence may be
+//! wrong: a frame that the bus repeats comes twice.
 //! An answer that was lost all the same shows in the long run, because the count does not come back to zero: what it does not fall
 //! below is taken off.
 use crate::remembered::remembered;
@@ -50,7 +51,9 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        self.moves = self.moves.checked_shl(elapsed_ms).unwrap_or(0) | u8::from(asked);
+        // The Move was sent in the tick before, however long ago that is.
+        let moves = self.moves << 1 | u8::from(asked);
+        self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
         // Where there are more answers than Moves, some had been taken for lost.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
@@ -169,6 +172,9 @@ mod tests {
             assert_eq!(lateness.count(true, 1, 1), 0);
             lateness.count(true, 0, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8);
+            // And the answer to the Move of the tick before.
+            lateness.count(true, 2, 1);
+            assert_eq!(lateness.count(true, 1, long), long as u8 - 1);
         }
     }
 

@@ -53,6 +53,10 @@ impl Motion {
 
     /// Each millisecond; `came`: its answers.
     fn off(&self, came: &[Vec<u32>]) -> Vec<Off> {
+        self.off_with(came, &Config::avena())
+    }
+
+    fn off_with(&self, came: &[Vec<u32>], config: &Config) -> Vec<Off> {
         let mut joint = Measurement::default();
         let mut off = Vec::new();
         for (now, came) in (0u32..).zip(came) {
@@ -70,7 +74,7 @@ impl Motion {
                 elapsed_ms: 1,
                 velocity_max: VELOCITY_MAX,
             };
-            let usable = joint.step(&tick, |ticks| self.past(ms, ticks), &Config::avena());
+            let usable = joint.step(&tick, |ticks| self.past(ms, ticks), config);
             assert_eq!(usable, answer.is_some(), "{now} ms");
             let Reading { position, velocity } = joint.used();
             off.push(Off { position: position - self.position(ms), velocity: velocity - self.velocity(ms) });
@@ -177,6 +181,23 @@ fn j63_the_first_late_answers_make_no_step() {
         let step =
             off.windows(2).fold(0.0, |most: f64, off| most.max((off[1].position - off[0].position).abs()));
         assert!(step <= 3.0 * ENCODER, "{step} rad");
+    }
+}
+
+/// Nor does a lateness that shifts once it is known that there is some, also where the encoder is said to be coarse.
+#[test]
+fn j63_a_lateness_that_shifts_makes_no_step() {
+    let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
+    for most in 1..=4u32 {
+        for encoder_step in [0.0, ENCODER, 0.01] {
+            let shifts = (0..1_500).map(|n| if n / 150 % 2 == 1 || n == 60 { most } else { 0 });
+            let late: Vec<u32> = shifts.collect();
+            let config = Config { encoder_step, ..Config::avena() };
+            let off = motion.off_with(&arrivals(&late, &[]), &config);
+            let steps = off.windows(2).map(|off| (off[1].position - off[0].position).abs());
+            let step = steps.fold(0.0, f64::max);
+            assert!(step <= 4.0 * ENCODER, "{most} ms, {encoder_step} rad: a step of {step} rad");
+        }
     }
 }
 

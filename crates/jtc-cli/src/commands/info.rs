@@ -64,10 +64,6 @@ fn as_json(info: &Info) -> Value {
 fn as_text(info: &Info) -> String {
     let list = |names: Vec<String>| if names.is_empty() { "nothing".into() } else { names.join(", ") };
     let missing = words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect();
-    let revision = match info.revision() {
-        "" => String::new(),
-        revision => format!(" ({revision})"),
-    };
     let memory = match info.store {
         StoreState::Stored => format!("{}, number {}", info.store, info.sequence),
         state => state.to_string(),
@@ -77,7 +73,7 @@ fn as_text(info: &Info) -> String {
         "arm:       {}, hash {}\n\
          missing:   {}; nodes: {}\n\
          defaults:  {defaults}; memory: {memory}\n\
-         firmware:  {}{revision} on {}, extensions {}\n\
+         firmware:  {} on {}, extensions {}\n\
          started:   {}, the last by {}, {} ago\n\
          records:   {} lost\n\
          recorder:  {}",
@@ -85,7 +81,7 @@ fn as_text(info: &Info) -> String {
         hash(info.hash),
         list(missing),
         list(words::node_names(info.nodes_missing)),
-        info.firmware(),
+        info.firmware_and_revision(),
         info.board,
         info.version,
         if info.boots == 1 { "once".into() } else { format!("{} times", info.boots) },

@@ -90,13 +90,7 @@ impl<P: Port> Session<P> {
         };
         log.blocks = blocks_of(&bytes);
         log.device = match self.info()? {
-            Some(info) => {
-                let revision = match info.revision() {
-                    "" => String::new(),
-                    revision => format!(" ({revision})"),
-                };
-                format!("{}, firmware {}{revision}", info.board, info.firmware())
-            }
+            Some(info) => format!("{}, firmware {}", info.board, info.firmware_and_revision()),
             None => String::new(),
         };
         log.arm = self.arm_image()?;

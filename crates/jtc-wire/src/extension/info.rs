@@ -176,6 +176,11 @@ impl Info {
         text(&self.revision)
     }
 
+    /// Version of the firmware and, where it has one, its Git revision in brackets: as every program shows it.
+    pub fn firmware_and_revision(&self) -> impl fmt::Display + '_ {
+        FirmwareAndRevision(self)
+    }
+
     /// The body of its frame.
     pub fn emit(&self) -> [u8; INFO_LEN] {
         use field::*;
@@ -234,10 +239,22 @@ impl Info {
     }
 }
 
+struct FirmwareAndRevision<'a>(&'a Info);
+
+impl fmt::Display for FirmwareAndRevision<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.firmware())?;
+        match self.0.revision() {
+            "" => Ok(()),
+            revision => write!(f, " ({revision})"),
+        }
+    }
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Info: extension {}, arm \"{}\", hash {:016x}", self.version, self.arm, self.hash)?;
-        write!(f, ", firmware {} ({}) on {}", self.firmware(), self.revision(), self.board)?;
+        write!(f, ", firmware {} on {}", self.firmware_and_revision(), self.board)?;
         let missing =
             self.missing & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL);
         if missing != 0 {

@@ -39,6 +39,15 @@ fn j52_an_info_comes_back_as_it_was_sent() {
 }
 
 #[test]
+fn j52_a_firmware_without_a_revision_is_shown_without_brackets() {
+    for (revision, shown) in [("4334c10", "0.1.0 (4334c10)"), ("", "0.1.0")] {
+        let info = info().with_firmware("0.1.0", revision);
+        assert_eq!(std::format!("{}", info.firmware_and_revision()), shown);
+        assert!(std::format!("{info}").contains(&std::format!("firmware {shown} on ")), "{info}");
+    }
+}
+
+#[test]
 fn j54_names_are_text_that_fits() {
     assert_eq!(Name::new("Arm 7, Ünit").unwrap().as_str(), "Arm 7, Ünit");
     assert_eq!(Name::new("a\nb"), None);

@@ -239,6 +239,25 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
+/// Ctrl-C while a jog waits for the drives: nothing was jogged, which is not the same as a jog by nothing.
+#[test]
+fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
+    let sim = Sim::start(&[]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    // The drives are enabled one after another, which takes seconds.
+    loop {
+        let status = sim.json(&["status"], 0);
+        if status["state"] == "HoldPos" {
+            break;
+        }
+        assert_ne!(status["state"], "Error", "{status}");
+    }
+    let (code, value) = interrupted(&sim, &["jog", "1", "0.1"], "waiting until");
+    assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{value}");
+    let message = value["error"]["message"].as_str().unwrap_or_default();
+    assert!(message.contains("during the wait for the drives"), "{value}");
+}
+
 /// Ctrl-C on the way to the first point stops there, and the motion is not begun.
 #[test]
 fn j33_an_interrupt_on_the_approach_stops_on_it() {

@@ -34,7 +34,15 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let mut begin = session.fresh_status()?;
     if begin.state == ControllerState::HoldPos && !words::is_held(&begin) {
         out.note("waiting until all drives are enabled");
-        begin = session.wait_ready(BRING_UP)?;
+        let held = |s: &Status| s.state == ControllerState::Error || words::is_held(s) || stop.asked();
+        session.wait_for("HoldPos with all drives enabled", BRING_UP, held)?;
+        if !stop.asked() {
+            begin = session.wait_ready(BRING_UP)?;
+        }
+    }
+    if stop.asked() {
+        let message = "cancelled during the wait for the drives; no joint was jogged".into();
+        return Err(Failure { message, ..Failure::of(&Error::Cancelled) });
     }
     settled(&mut session)?;
     if let Some(joint) = args.joint.and_then(|joint| Joint::from_number(joint.into()))

@@ -12,12 +12,12 @@ use jtc_wire::Joint;
 use serde::Serialize;
 
 use super::source::JOINT_KEYS;
-use super::{Arm, Source};
+use super::{Arm, PoseError, Source};
 
 /// One thing that was found out about an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
-    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `unit` or `proposed`.
+    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `unit`, `pose` or `proposed`.
     pub code: &'static str,
     /// How bad it is (a problem: the controller refuses it), what it is, its cause and what to do.
     #[serde(flatten)]
@@ -110,6 +110,7 @@ impl Arm {
         if sound && self.rotors_given == [true; JOINTS] {
             self.find_gains(&mut findings);
         }
+        self.find_poses(&mut findings);
         self.find_proposed(&mut findings);
         findings.sort_by_key(|f| f.finding.severity);
         Checked { findings, holding }
@@ -324,6 +325,21 @@ impl Arm {
             if !joints.is_empty() {
                 findings.push(ArmFinding { name: Some(name), ..found(name, numbers(&joints)) });
             }
+        }
+    }
+
+    /// Poses in which the limits do not let the arm be.
+    fn find_poses(&self, findings: &mut Vec<ArmFinding>) {
+        for name in self.poses.keys() {
+            let Err(PoseError::Outside { joint, value, min, max, .. }) = self.pose(name) else { continue };
+            let what =
+                format!("pose {name}, {}: {value} rad is outside {min}..{max} rad", self.titled(joint));
+            let mut found = ArmFinding::new(Severity::Warning, "pose", what)
+                .because("no motion leads there")
+                .measured(value, if value < min { min } else { max }, "rad")
+                .next("jtc pose save saves it again where the arm is, jtc pose remove takes it out");
+            found.joint = Some(joint);
+            findings.push(found);
         }
     }
 

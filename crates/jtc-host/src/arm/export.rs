@@ -107,6 +107,12 @@ impl Arm {
                 _ => writeln!(out, "{} = {:?}", row.name, value.value),
             };
         }
+        if !self.poses.is_empty() {
+            out += "\n[poses] # rad, base to wrist\n";
+        }
+        for (name, position) in &self.poses {
+            let _ = writeln!(out, "{} = {}", super::poses::key(name), list(position));
+        }
         let Some(tables) = &self.table else { return out };
         let one = tables.iter().all(|t| *t == tables[0]);
         for t in tables.iter().take(if one { 1 } else { JOINTS }) {

@@ -7,6 +7,7 @@ mod device;
 mod export;
 mod image;
 mod parameters;
+mod poses;
 mod propose;
 mod source;
 mod statics;
@@ -30,6 +31,8 @@ pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
+pub(crate) use poses::is_name;
+pub use poses::{PoseError, Poses, remove_pose, save_pose};
 pub use propose::{RULES, Rule};
 pub use source::{Key, Source, Sources};
 pub use values::ArmValue;
@@ -94,6 +97,8 @@ pub struct Arm {
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
     /// Friction tables.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
+    /// Named joint positions, rad. No controller has them, and no hash counts them.
+    pub poses: Poses,
     /// What was not carried over or filled in.
     pub warnings: Vec<Warning>,
     /// Where the numbers come from.
@@ -260,6 +265,7 @@ impl Arm {
             pid: None,
             polynomial: None,
             table: None,
+            poses: Poses::new(),
             warnings: Vec::new(),
             sources: Sources::default(),
         }

@@ -43,6 +43,8 @@ struct ArmForm {
     friction_table: Vec<TableForm>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     settings: BTreeMap<String, toml::Value>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    poses: BTreeMap<String, Vec<f64>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -191,6 +193,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         pid: all_or_none(joints, "pid", |j| Ok(j.pid.map(PidForm::gains)))?,
         polynomial: all_or_none(joints, "friction_polynomial", JointForm::polynomial)?,
         table: tables(&form.friction_table)?,
+        poses: super::poses::read(&form.poses)?,
         link_names: std::array::from_fn(|i| {
             Some(&form.link[i].name).filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("link_{i}"))
         }),

@@ -16,7 +16,7 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
     }
     let value = json!({
         "file": name, "arm": arm.name, "joints": arm.joint_names, "links": arm.link_names,
-        "flange": arm.flange_name, "friction_table": arm.table.is_some(), "warnings": arm.warnings, "values": values,
+        "flange": arm.flange_name, "poses_rad": arm.poses, "friction_table": arm.table.is_some(), "warnings": arm.warnings, "values": values,
     });
     out.result(&value, || {
         let numbered = Joint::ALL.iter().zip(&arm.joint_names).map(|(j, name)| format!("{} {name}", j.number()));
@@ -36,6 +36,9 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
         let unit = |name: &str| values.iter().find(|v| v.name == name).map_or("", |v| v.unit);
         text += &format!("\n{}", frames(&values, arm, unit("origin_rpy_rad.roll")));
         text += &format!("\n{}", links(&values, arm, unit("com_rpy_rad.roll")));
+        if !arm.poses.is_empty() {
+            text += &format!("\n{}", poses(arm, deg));
+        }
         text + &format!("\nsettings of the controller; an arm file may give them in [settings]\n{}", of_controller(&values))
     });
     Ok(())
@@ -142,6 +145,16 @@ fn of_controller(values: &[ArmValue]) -> String {
     };
     let rows: Vec<Vec<String>> = values.iter().filter(own).map(row).collect();
     table(&["", ">value", "unit", "range", ">default", "from"], &rows)
+}
+
+/// A row for each pose.
+pub(in crate::commands) fn poses(arm: &Arm, deg: bool) -> String {
+    let row = |(name, position): (&String, &[f64; 6])| {
+        let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));
+        std::iter::once(name.clone()).chain(cells).collect()
+    };
+    let rows: Vec<Vec<String>> = arm.poses.iter().map(row).collect();
+    table(&[if deg { "pose, °" } else { "pose, rad" }, ">1", ">2", ">3", ">4", ">5", ">6"], &rows)
 }
 
 fn frames(values: &[ArmValue], arm: &Arm, angle: &str) -> String {

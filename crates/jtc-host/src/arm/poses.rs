@@ -1,0 +1,375 @@
+//! Named joint positions of an arm, in the `[poses]` table of its file.
+//!
+//! A pose is a name and six positions (rad, base to wrist). Poses are no part of what a controller is given, nor of the arm's hash.
+//! [`save_pose`] and [`remove_pose`] change that table alone: the rest of the file stays as it is, comments included.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
+use jtc_core::JOINTS;
+use jtc_wire::Joint;
+use toml_edit::{Array, DocumentMut, Item, Table, Value};
+
+use super::{Arm, is_xml, toml_form};
+use crate::file::{FileError, Place, read_text, short};
+
+/// Named joint positions, rad.
+pub type Poses = BTreeMap<String, [f64; JOINTS]>;
+
+/// Longest name of a pose, characters.
+const NAME_MAX: usize = 64;
+/// Names this alike are taken for a slip of the hand.
+const ALIKE: f64 = 0.7;
+/// Positions are saved to a micrometre at the end of an arm of one metre: encoders measure no finer.
+const DECIMALS: f64 = 1e6;
+
+/// Why a pose cannot be used or saved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// A name that no waypoint file or option could hold.
+    #[error(
+        "\"{name}\" is no name of a pose: it begins with a letter and has letters, digits, _, - and . only, {NAME_MAX} at most"
+    )]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// No pose of this name.
+    #[error("the arm {arm} has no pose \"{name}\"{}", known_words(known))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Name of the arm.
+        arm: String,
+        /// The poses that it has.
+        known: Vec<String>,
+        /// That one of them which looks most like it.
+        like: Option<String>,
+    },
+    /// The arm cannot be there.
+    #[error("pose \"{name}\", {joint}: {value} rad is outside {min}..{max} rad")]
+    Outside {
+        /// Name of the pose.
+        name: String,
+        /// Of this joint.
+        joint: Joint,
+        /// rad.
+        value: f64,
+        /// rad.
+        min: f64,
+        /// rad.
+        max: f64,
+    },
+    /// A pose of this name is there already.
+    #[error("{}: pose \"{name}\" is there already", path.display())]
+    Exists {
+        /// The arm file.
+        path: PathBuf,
+        /// Name of the pose.
+        name: String,
+    },
+    /// A robot description, which has no place for poses.
+    #[error("{} is a robot description, which has no place for poses", path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The arm file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+fn known_words(known: &[String]) -> String {
+    if known.is_empty() { "; it has none".into() } else { format!("; it has {}", known.join(", ")) }
+}
+
+impl Diagnose for PoseError {
+    fn diagnosis(&self) -> Diagnosis {
+        let (kind, code, next) = match self {
+            Self::Name { .. } => (ErrorKind::Usage, "pose-name", "give it another name, as above-table".into()),
+            Self::Unknown { like: Some(like), .. } => {
+                (ErrorKind::Usage, "unknown-pose", format!("is \"{like}\" meant? `jtc pose list` shows all poses of an arm file"))
+            }
+            Self::Unknown { .. } => (
+                ErrorKind::Usage,
+                "unknown-pose",
+                "`jtc pose save NAME --arm FILE` saves where the arm is, --arm FILE names the file with the pose".into(),
+            ),
+            Self::Outside { .. } => (
+                ErrorKind::Refused,
+                "outside-limits",
+                "a pose from another arm, or limits that were changed since: save it again, or correct it in the file".into(),
+            ),
+            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --force writes over it".into()),
+            Self::Description { .. } => {
+                (ErrorKind::Usage, "no-arm-file", "`jtc arm import URDF -o arm.toml` makes an arm file of it".into())
+            }
+            Self::File(e) => return e.diagnosis(),
+        };
+        Diagnosis::new(kind, code, next)
+    }
+}
+
+impl Arm {
+    /// The positions of a named pose, rad.
+    ///
+    /// # Errors
+    ///
+    /// [`PoseError::Unknown`], with the name that looks most like it; [`PoseError::Outside`] where the arm's limits do not let it be there.
+    pub fn pose(&self, name: &str) -> Result<[f64; JOINTS], PoseError> {
+        let Some(position) = self.poses.get(name) else {
+            let known: Vec<String> = self.poses.keys().cloned().collect();
+            return Err(PoseError::Unknown {
+                name: short(name),
+                arm: self.name.clone(),
+                like: alike(name, &known),
+                known,
+            });
+        };
+        match self.outside(position) {
+            None => Ok(*position),
+            Some((joint, min, max)) => {
+                Err(PoseError::Outside { name: name.into(), joint, value: position[joint.index()], min, max })
+            }
+        }
+    }
+
+    /// The first joint that is outside its range there, and that range, rad.
+    pub(crate) fn outside(&self, position: &[f64; JOINTS]) -> Option<(Joint, f64, f64)> {
+        let config = self.config();
+        Joint::ALL.into_iter().find_map(|joint| {
+            let (min, max) = config.position_range(joint.index());
+            (!(min..=max).contains(&position[joint.index()])).then_some((joint, min, max))
+        })
+    }
+}
+
+/// The name that looks most like `name`, where one does.
+fn alike(name: &str, known: &[String]) -> Option<String> {
+    let name = name.to_lowercase();
+    let likeness = known.iter().map(|known| (strsim::jaro_winkler(&known.to_lowercase(), &name), known));
+    let most = likeness.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (most.0 >= ALIKE).then(|| most.1.clone())
+}
+
+/// Whether a pose may have this name: it fits into an option beside lists of numbers, and into a cell of a waypoint file.
+pub(crate) fn is_name(name: &str) -> bool {
+    name.chars().count() <= NAME_MAX
+        && name.starts_with(char::is_alphabetic)
+        && name.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c))
+}
+
+/// The poses of a file's table.
+pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileError> {
+    let pose = |(name, values): (&String, &Vec<f64>)| {
+        let wrong = |problem: String| FileError::at(Place::name(format!("poses, {}", short(name))), problem);
+        if !is_name(name) {
+            return Err(wrong(PoseError::Name { name: short(name) }.to_string()));
+        }
+        let count = values.len();
+        let position = <[f64; JOINTS]>::try_from(&values[..])
+            .map_err(|_| wrong(format!("{count} numbers, not 6 (rad, base to wrist)")))?;
+        match position.iter().find(|v| !v.is_finite()) {
+            Some(v) => Err(wrong(format!("{v} is not a finite number"))),
+            None => Ok((name.clone(), position)),
+        }
+    };
+    given.iter().map(pose).collect()
+}
+
+/// A key of a table as it stands in a file.
+pub(super) fn key(name: &str) -> String {
+    toml_edit::Key::new(name).display_repr().into_owned()
+}
+
+/// Saves a pose (rad) into an arm file, to a millionth of a radian.
+///
+/// # Errors
+///
+/// A name that is none, one that is there already unless `force` is set, a robot description, a file that is no arm file or cannot be
+/// written. The file is as it was then.
+pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool) -> Result<(), PoseError> {
+    if !is_name(name) {
+        return Err(PoseError::Name { name: short(name) });
+    }
+    let rounded = position.map(|v| (v * DECIMALS).round() / DECIMALS + 0.0);
+    edit(path, |table, arm| {
+        if arm.poses.contains_key(name) && !force {
+            return Err(PoseError::Exists { path: path.to_owned(), name: name.into() });
+        }
+        match table.get_mut(name).and_then(Item::as_value_mut) {
+            // What stands before and behind it stays.
+            Some(value) => {
+                let around = value.decor().clone();
+                *value = Value::Array(Array::from_iter(rounded));
+                *value.decor_mut() = around;
+            }
+            None => drop(table.insert(name, Item::Value(Value::Array(Array::from_iter(rounded))))),
+        }
+        arm.poses.insert(name.into(), rounded);
+        Ok(())
+    })
+}
+
+/// Takes a pose out of an arm file.
+///
+/// # Errors
+///
+/// A pose that is not there, a robot description, a file that is no arm file or cannot be written. The file is as it was then.
+pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
+    edit(path, |table, arm| {
+        if arm.poses.remove(name).is_none() {
+            // With the names that there are.
+            return arm.pose(name).map(drop);
+        }
+        table.remove(name);
+        Ok(())
+    })
+}
+
+/// Changes the table of poses in a file, and the arm of that file alike: both must come to the same.
+fn edit(
+    path: &Path,
+    change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
+) -> Result<(), PoseError> {
+    let text = read_text(path)?;
+    if is_xml(&text) {
+        return Err(PoseError::Description { path: path.to_owned() });
+    }
+    let in_file = |e: FileError| PoseError::File(e.in_file(path));
+    let mut arm = toml_form::read(&text).map_err(in_file)?;
+    let mut document =
+        text.parse::<DocumentMut>().map_err(|e| in_file(FileError::form(e.message().to_owned())))?;
+    let poses = document.entry("poses").or_insert_with(|| Item::Table(Table::new()));
+    let table = poses.as_table_like_mut().ok_or_else(|| in_file(FileError::form("poses is no table")))?;
+    change(table, &mut arm)?;
+    let written = document.to_string();
+    if !toml_form::read(&written).is_ok_and(|read| read == arm) {
+        return Err(in_file(FileError::form(
+            "its poses cannot be changed by this program: change them by hand",
+        )));
+    }
+    write_whole(path, written.as_bytes())
+        .map_err(|source| FileError::Io { path: path.to_owned(), source })?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::arm::AVENA_TOML;
+
+    const HOME: [f64; JOINTS] = [0.0, 0.5, -1.0, 0.25, 0.0, 1.5];
+
+    fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("arm.toml");
+        std::fs::write(&path, text).unwrap();
+        (dir, path)
+    }
+
+    /// The first pose makes the table; each later change touches one line, and taking all of them out leaves the arm as it was.
+    #[test]
+    fn the_rest_of_the_file_stays_as_it_is() {
+        let (_dir, path) = file(AVENA_TOML);
+        save_pose(&path, "home", &HOME, false).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with(AVENA_TOML.trim_end()), "only the end is new");
+        let commented =
+            text.replace("[poses]\n", "[poses] # taught on Monday\n# the rest position\n") + "# the end\n";
+        std::fs::write(&path, &commented).unwrap();
+        save_pose(&path, "above-table", &[0.1; 6], false).unwrap();
+        save_pose(&path, "home", &[0.2; 6], true).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        for line in commented.lines().filter(|line| !line.starts_with("home")) {
+            assert!(text.lines().any(|l| l == line), "lost: {line}\n{text}");
+        }
+        assert_eq!(text.lines().count(), commented.lines().count() + 1);
+        let arm = Arm::load(&path).unwrap();
+        assert_eq!((arm.pose("home").unwrap(), arm.pose("above-table").unwrap()), ([0.2; 6], [0.1; 6]));
+        assert_eq!(Arm { poses: Poses::new(), ..arm }, Arm::avena());
+        for name in ["home", "above-table"] {
+            remove_pose(&path, name).unwrap();
+        }
+        assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
+    }
+
+    #[test]
+    fn poses_are_no_part_of_what_a_controller_is_given() {
+        let plain = Arm::avena();
+        let with = Arm { poses: Poses::from([("home".into(), HOME)]), ..Arm::avena() };
+        assert_eq!(with.hash().unwrap(), plain.hash().unwrap());
+        assert!(with.differences(&plain).is_empty());
+        // They go round through the file.
+        assert_eq!(Arm::parse(&with.to_toml()).unwrap().poses, with.poses);
+    }
+
+    #[test]
+    fn what_is_refused_leaves_the_file_alone() {
+        let (_dir, path) = file(AVENA_TOML);
+        save_pose(&path, "home", &HOME, false).unwrap();
+        let before = std::fs::read_to_string(&path).unwrap();
+        let message = |done: Result<(), PoseError>| {
+            let error = done.unwrap_err();
+            format!("{error} | {}", error.diagnosis().next)
+        };
+        assert!(
+            message(save_pose(&path, "home", &[0.0; 6], false))
+                .contains("\"home\" is there already | choose another")
+        );
+        for name in ["", "1", "a b", "a,b", "-x", "ä\n"] {
+            assert!(
+                message(save_pose(&path, name, &HOME, false)).contains("is no name of a pose"),
+                "{name:?}"
+            );
+        }
+        let unknown = message(remove_pose(&path, "hone"));
+        assert!(
+            unknown.contains("avena has no pose \"hone\"; it has home | is \"home\" meant?"),
+            "{unknown}"
+        );
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+        let (_dir, urdf) = file(&Arm::avena().to_urdf());
+        assert!(message(save_pose(&urdf, "home", &HOME, false)).contains("jtc arm import"));
+    }
+
+    #[test]
+    fn a_table_that_is_wrong_names_the_pose() {
+        for (line, problem) in [
+            ("home = [0, 0, 0]", "poses, home: 3 numbers, not 6"),
+            ("home = [0, 0, 0, 0, 0, nan]", "poses, home: NaN is not a finite number"),
+            ("\"a b\" = [0, 0, 0, 0, 0, 0]", "poses, a b: \"a b\" is no name"),
+            ("home = \"here\"", "line"),
+        ] {
+            let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();
+            assert!(error.contains(problem), "{line}: {error}");
+        }
+        // One that the limits do not allow is found by the check, and refused where it is used.
+        let arm = Arm::parse(&format!("{AVENA_TOML}\n[poses]\nfar = [0, 2, 0, 0, 0, 0]\n")).unwrap();
+        assert_eq!(
+            arm.pose("far").unwrap_err().to_string(),
+            "pose \"far\", joint 2: 2 rad is outside -1.57..1.57 rad"
+        );
+        assert!(
+            arm.check().findings.iter().any(|f| f.code == "pose" && f.joint.map(Joint::number) == Some(2))
+        );
+        assert!(!arm.check().is_refused());
+    }
+
+    proptest! {
+        /// Whatever the name and the numbers are, the pose that is read is the one that was saved.
+        #[test]
+        fn what_was_saved_is_read(name in "[a-zA-Zäλ][a-zA-Z0-9_.ö-]{0,20}", q in prop::array::uniform6(-3.0..3.0f64)) {
+            let (_dir, path) = file(AVENA_TOML);
+            save_pose(&path, &name, &q, false).unwrap();
+            let read = Arm::load(&path).unwrap().poses[&name];
+            for j in 0..JOINTS {
+                prop_assert!((read[j] - q[j]).abs() <= 0.5e-6 + 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,27 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod along;
+mod binding;
+mod blend;
+mod error;
+mod limits;
+mod motion;
+mod p2p;
+mod path;
+mod through;
+mod torque;
+mod trapezoid;
+mod verify;
+
+pub use along::along;
+pub use binding::{Binding, LimitKind};
+pub use blend::BlendedPath;
+pub use error::PlanError;
+pub use jtc_dynamics::{JOINTS, JointVec};
+pub use limits::{JERK_TIME, Limits};
+pub use motion::{Motion, State};
+pub use p2p::point_to_point;
+pub use path::{Path, PathPoint};
+pub use through::{Waypoint, through};
+pub use torque::{ArmDynamics, HOLD_SHARE};

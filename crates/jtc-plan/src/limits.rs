@@ -1,0 +1,102 @@
+//! What a motion has to keep to.
+use jtc_core::Config;
+use jtc_wire::Joint;
+
+use crate::{JOINTS, JointVec, LimitKind, PlanError};
+
+/// Time in which an arm's limits let a joint go from rest to its highest acceleration, s: the jerk limit of [`Limits::of`].
+pub const JERK_TIME: f64 = 0.1;
+
+/// Limits that a motion keeps, per joint, base to wrist.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Lowest and highest position, rad.
+    pub position: [(f64, f64); JOINTS],
+    /// Highest speed, rad/s.
+    pub velocity: JointVec,
+    /// Highest acceleration, rad/s².
+    pub acceleration: JointVec,
+    /// Highest jerk, rad/s³; infinite: none.
+    pub jerk: JointVec,
+    /// Highest torque, N·m; asked for only where a motion is planned with an [`crate::ArmDynamics`].
+    pub torque: JointVec,
+}
+
+impl Limits {
+    /// Those of an arm (J-43). An arm has no limit of jerk: here it is the highest acceleration within [`JERK_TIME`].
+    pub fn of(config: &Config) -> Self {
+        let of = |value: fn(&jtc_core::JointConfig) -> f64| config.joints.each_ref().map(value);
+        let acceleration = of(|j| j.acceleration_max);
+        Self {
+            position: std::array::from_fn(|j| config.position_range(j)),
+            velocity: of(|j| j.velocity_max),
+            acceleration,
+            jerk: acceleration.map(|a| a / JERK_TIME),
+            torque: of(|j| j.torque_max),
+        }
+    }
+
+    /// Those at which a motion that these bind takes 1/`share` of the time: velocity × `share`, acceleration × its square, jerk × its
+    /// cube. Positions and torques remain.
+    pub fn at_speed(&self, share: f64) -> Self {
+        Self {
+            velocity: self.velocity.map(|v| v * share),
+            acceleration: self.acceleration.map(|a| a * share * share),
+            jerk: self.jerk.map(|j| j * share * share * share),
+            ..self.clone()
+        }
+    }
+
+    /// The same without a limit of jerk.
+    pub fn without_jerk(self) -> Self {
+        Self { jerk: [f64::INFINITY; JOINTS], ..self }
+    }
+
+    /// Whether any joint's jerk is limited.
+    pub fn has_jerk(&self) -> bool {
+        self.jerk.iter().any(|j| j.is_finite())
+    }
+
+    /// Whether there can be a motion within them.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError::Limit`] for the first limit that is no positive number (only that of jerk may be infinite), or a range of
+    /// positions without any.
+    pub fn check(&self) -> Result<(), PlanError> {
+        for joint in Joint::ALL {
+            let j = joint.index();
+            let (min, max) = self.position[j];
+            if !(min.is_finite() && max.is_finite() && min < max) {
+                return Err(PlanError::Range { joint, min, max });
+            }
+            for (limit, value, finite) in [
+                (LimitKind::Velocity, self.velocity[j], true),
+                (LimitKind::Acceleration, self.acceleration[j], true),
+                (LimitKind::Jerk, self.jerk[j], false),
+                (LimitKind::Torque, self.torque[j], true),
+            ] {
+                let positive = value > 0.0 && (value.is_finite() || !finite);
+                // Squares and cubes of what is smaller are lost in rounding.
+                if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
+                    return Err(PlanError::Limit { joint, limit, value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether `position` is within the limits; `waypoint`, from 1, names it in the error.
+    pub(crate) fn holds(&self, position: &JointVec, waypoint: usize) -> Result<(), PlanError> {
+        for joint in Joint::ALL {
+            let (value, (min, max)) = (position[joint.index()], self.position[joint.index()]);
+            if !value.is_finite() {
+                return Err(PlanError::NotFinite { waypoint, joint, value });
+            }
+            if !(min..=max).contains(&value) {
+                return Err(PlanError::Position { waypoint, joint, value, min, max });
+            }
+        }
+        Ok(())
+    }
+}

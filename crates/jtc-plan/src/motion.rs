@@ -1,0 +1,161 @@
+//! Motions in time.
+use crate::binding::Binding;
+use crate::{JOINTS, JointVec};
+
+/// Position, velocity and acceleration at a moment.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct State {
+    /// rad.
+    pub position: JointVec,
+    /// rad/s.
+    pub velocity: JointVec,
+    /// rad/s².
+    pub acceleration: JointVec,
+}
+
+impl State {
+    /// At rest.
+    pub(crate) fn rest(position: JointVec) -> Self {
+        Self { position, ..Self::default() }
+    }
+}
+
+/// A part of a motion: each joint's position is a polynomial of fifth degree of the time since `start`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    /// s.
+    pub start: f64,
+    /// s, above 0.
+    pub length: f64,
+    /// Per joint, ascending.
+    pub coefficients: [[f64; 6]; JOINTS],
+}
+
+impl Piece {
+    /// The one that leads from one state to another (Hermite).
+    pub fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
+        let h = length;
+        let coefficients = std::array::from_fn(|j| {
+            let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
+            // What is missing at the end, in units of the length.
+            let dp = b.position[j] - (p + h * (v + h * c));
+            let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
+            let da = (b.acceleration[j] - 2.0 * c) * h * h;
+            let d3 = 10.0 * dp - 4.0 * dv + 0.5 * da;
+            let d4 = -15.0 * dp + 7.0 * dv - da;
+            let d5 = 6.0 * dp - 3.0 * dv + 0.5 * da;
+            let h3 = h * h * h;
+            [p, v, c, d3 / h3, d4 / (h3 * h), d5 / (h3 * h * h)]
+        });
+        Self { start, length, coefficients }
+    }
+
+    /// At `t` seconds after its start.
+    pub fn at(&self, t: f64) -> State {
+        let mut state = State::default();
+        for (j, c) in self.coefficients.iter().enumerate() {
+            let [c0, c1, c2, c3, c4, c5] = *c;
+            state.position[j] = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))));
+            state.velocity[j] = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)));
+            state.acceleration[j] = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5));
+        }
+        state
+    }
+
+    /// Third derivative at `t` seconds after its start, rad/s³.
+    pub fn jerk(&self, t: f64) -> JointVec {
+        self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
+    }
+
+    /// The same way in `factor` times the time.
+    pub fn stretched(&self, factor: f64) -> Self {
+        let mut coefficients = self.coefficients;
+        for c in &mut coefficients {
+            let mut power = 1.0;
+            for x in c {
+                *x *= power;
+                power /= factor;
+            }
+        }
+        Self { start: self.start * factor, length: self.length * factor, coefficients }
+    }
+}
+
+/// A motion in time, from rest to rest.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) end: State,
+    pub(crate) binding: Vec<Binding>,
+    pub(crate) waypoint_times: Vec<f64>,
+}
+
+impl Motion {
+    /// Of the pieces, which follow each other without a gap, and rest at `end`.
+    pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
+        Self { pieces, end: State::rest(end), binding: Vec::new(), waypoint_times }
+    }
+
+    /// Seconds from rest to rest, above 0.
+    pub fn duration(&self) -> f64 {
+        self.pieces.last().map_or(0.0, |p| p.start + p.length)
+    }
+
+    /// State at `t` seconds from the start: before it and beyond the end the arm rests where it begins and ends, exactly at the
+    /// first and the last waypoint. Without a limit of jerk the acceleration jumps, and this is the one that follows the jump.
+    pub fn at(&self, t: f64) -> State {
+        match self.piece(t) {
+            None => self.end,
+            Some(first) if t <= 0.0 => {
+                let state = first.at(0.0);
+                if t < 0.0 { State::rest(state.position) } else { state }
+            }
+            Some(piece) => piece.at(t - piece.start),
+        }
+    }
+
+    /// Jerk at `t` seconds from the start, rad/s³; 0 where the arm rests.
+    pub fn jerk_at(&self, t: f64) -> JointVec {
+        if t < 0.0 {
+            return [0.0; JOINTS];
+        }
+        self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
+    }
+
+    /// Which limit binds when, in the order of time. In between no limit is used up.
+    pub fn binding(&self) -> &[Binding] {
+        &self.binding
+    }
+
+    /// When the motion is nearest to each waypoint, s from the start.
+    pub fn waypoint_times(&self) -> &[f64] {
+        &self.waypoint_times
+    }
+
+    /// The piece that `t` is in, the first one before the start; `None` from the end on.
+    fn piece(&self, t: f64) -> Option<&Piece> {
+        if t.is_nan() || t >= self.duration() {
+            return None;
+        }
+        let after = self.pieces.partition_point(|p| p.start <= t);
+        self.pieces.get(after.saturating_sub(1))
+    }
+
+    /// The same way in `factor` times the time.
+    pub(crate) fn stretched(&self, factor: f64) -> Self {
+        Self {
+            pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
+            end: self.end,
+            binding: Vec::new(),
+            waypoint_times: self.waypoint_times.iter().map(|t| t * factor).collect(),
+        }
+    }
+
+    /// Appends another motion that begins where this one ends. The first waypoint of `next` is the last one of this.
+    pub(crate) fn append(&mut self, next: &Self) {
+        let start = self.duration();
+        self.pieces.extend(next.pieces.iter().map(|p| Piece { start: p.start + start, ..*p }));
+        self.waypoint_times.extend(next.waypoint_times.iter().skip(1).map(|t| t + start));
+        self.end = next.end;
+    }
+}

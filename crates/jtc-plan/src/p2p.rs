@@ -1,0 +1,90 @@
+//! Point to point.
+use rsruckig::prelude::{
+    DataArrayOrVec, InputParameter, Ruckig, Synchronization, ThrowErrorHandler, Trajectory,
+};
+
+use crate::motion::{Motion, Piece};
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, trapezoid, verify};
+
+/// Length of a motion that leads nowhere, s: a trajectory has two points, and so some time.
+const STANDING: f64 = 0.01;
+
+/// A motion from rest to rest as fast as velocity, acceleration and jerk allow, all joints from the first to the last moment
+/// (Ruckig: Berscheid and Kröger 2021); along a straight line of joint space where that takes no longer. With an `arm` it is slowed
+/// down until its torque suffices, and its speed is within the friction table.
+///
+/// From a place to the same place it is a rest of 10 ms.
+///
+/// # Errors
+///
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::NotFinite`] and [`PlanError::Position`]
+/// for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] where the torque does not suffice at any speed.
+pub fn point_to_point(
+    from: &JointVec,
+    to: &JointVec,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Motion, PlanError> {
+    limits.check()?;
+    limits.holds(from, 1)?;
+    limits.holds(to, 2)?;
+    let motion = fastest(from, to, &verify::with_table(limits, arm))?;
+    verify::finished(motion, limits, arm)
+}
+
+/// The same without torque.
+fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
+    if from == to {
+        return Ok(standing(from));
+    }
+    if !limits.has_jerk() {
+        return Ok(trapezoid::straight_or_joined(from, to, limits));
+    }
+    ruckig(from, to, limits)
+}
+
+/// A rest.
+pub(crate) fn standing(at: &JointVec) -> Motion {
+    let rest = State::rest(*at);
+    Motion::new(vec![Piece::between(0.0, STANDING, &rest, &rest)], *at, vec![0.0, STANDING])
+}
+
+/// By Ruckig, the joint of the longest way deciding where the others may follow it on a straight line.
+fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
+    let mut input = InputParameter::<JOINTS>::new(None);
+    input.current_position = DataArrayOrVec::Stack(*from);
+    input.target_position = DataArrayOrVec::Stack(*to);
+    input.max_velocity = DataArrayOrVec::Stack(limits.velocity);
+    input.max_acceleration = DataArrayOrVec::Stack(limits.acceleration);
+    input.max_jerk = DataArrayOrVec::Stack(limits.jerk);
+    input.synchronization = Synchronization::Phase;
+    let mut trajectory = Trajectory::new(None);
+    Ruckig::<JOINTS, ThrowErrorHandler>::new(None, 0.001)
+        .calculate(&input, &mut trajectory)
+        .map_err(|e| PlanError::NoTimeLaw { leg: 1, reason: e.to_string() })?;
+    let end = trajectory.get_duration();
+    let mut breaks: Vec<f64> = vec![0.0, end];
+    for profile in trajectory.get_profiles().iter().flat_map(|section| section.iter()) {
+        breaks.extend(profile.t_sum.iter().map(|t| t + profile.brake.duration));
+    }
+    breaks.retain(|t| (0.0..=end).contains(t));
+    breaks.sort_by(f64::total_cmp);
+    breaks.dedup_by(|b, a| *b - *a < 1e-12);
+    if let Some(last) = breaks.last_mut() {
+        *last = end;
+    }
+    let pieces = breaks.windows(2).map(|pair| constant_jerk(&trajectory, pair[0], pair[1] - pair[0]));
+    Ok(Motion::new(pieces.collect(), *to, vec![0.0, end]))
+}
+
+/// The part of a trajectory in which no joint's jerk changes.
+fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Piece {
+    let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
+    let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
+    trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
+    // Its middle decides which jerk: at the start it may still be the one before.
+    let middle = start + 0.5 * length;
+    trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);
+    let coefficients = std::array::from_fn(|j| [p[j], v[j], 0.5 * a[j], jerk[j] / 6.0, 0.0, 0.0]);
+    Piece { start, length, coefficients }
+}

@@ -1,0 +1,239 @@
+//! What a motion uses of its limits, between samples too, and slowing it down until they hold.
+use jtc_wire::Joint;
+
+use crate::binding::{Binding, LimitKind};
+use crate::motion::{Motion, Piece};
+use crate::torque::HOLD_SHARE;
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
+
+/// Of a limit that the arithmetic may exceed it by.
+const ROUNDING: f64 = 1e-9;
+/// Distance of the samples of the torque, s.
+const TORQUE_STEP: f64 = 0.005;
+/// What the torque may reach of its limit at the samples: between them it may be higher.
+const TORQUE_SHARE: f64 = 0.999;
+/// Samples of the torque at most; a longer motion has them further apart.
+const SAMPLES_MAX: f64 = 200_000.0;
+/// The slowest that a motion is made for its torque, as a factor of its time.
+const SLOWEST: f64 = 64.0;
+/// From this share of it on a limit binds.
+const BINDS: f64 = 0.985;
+
+/// The limits with the speeds that the friction table has (J-36).
+pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
+    let mut limits = limits.clone();
+    for (j, velocity) in limits.velocity.iter_mut().enumerate() {
+        // A little inside: the last row belongs to the table, what rounds beyond it does not.
+        let table = arm.map_or(f64::INFINITY, |arm| arm.velocity_max(j) * (1.0 - 1e-4));
+        *velocity = velocity.min(table);
+    }
+    limits
+}
+
+/// Slows a motion down until all limits hold, and finds what binds it.
+pub(crate) fn finished(
+    motion: Motion,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Motion, PlanError> {
+    let within = with_table(limits, arm);
+    let stretch = motion.pieces.iter().map(|p| kinematic_stretch(p, &within)).fold(1.0, f64::max);
+    if !stretch.is_finite() {
+        return Err(PlanError::NoTimeLaw { leg: 1, reason: "the motion is not finite".into() });
+    }
+    let mut motion = if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion };
+    if let Some(arm) = arm {
+        motion = within_torque(motion, &within, arm)?;
+    }
+    motion.binding = binding(&motion, &within, arm);
+    Ok(motion)
+}
+
+/// By what a piece's time has to be multiplied so that velocity, acceleration and jerk hold everywhere in it.
+pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
+    let mut most = 0.0f64;
+    for j in 0..JOINTS {
+        let h = piece.length;
+        // In units of the piece's length.
+        let [_, c1, c2, c3, c4, c5] = piece.coefficients[j];
+        let velocity = [c1, 2.0 * c2 * h, 3.0 * c3 * h * h, 4.0 * c4 * h.powi(3), 5.0 * c5 * h.powi(4)];
+        let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
+        let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
+        let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
+        most = most.max(of(&velocity, limits.velocity[j]));
+        most = most.max(of(&acceleration, limits.acceleration[j]).sqrt());
+        if limits.jerk[j].is_finite() {
+            most = most.max(of(&jerk, limits.jerk[j]).cbrt());
+        }
+        if velocity.iter().chain(&jerk).any(|c| !c.is_finite()) {
+            return f64::INFINITY;
+        }
+    }
+    most
+}
+
+/// A bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth where it is above `limit`: the magnitudes of its
+/// Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
+fn largest(polynomial: &[f64], limit: f64) -> f64 {
+    let degree = polynomial.len() - 1;
+    let mut bernstein = [0.0; 5];
+    for (i, b) in bernstein.iter_mut().enumerate().take(degree + 1) {
+        *b = (0..=i).map(|k| polynomial[k] * BINOMIAL[i][k] / BINOMIAL[degree][k]).sum();
+    }
+    hull(&bernstein[..=degree], limit, 6)
+}
+
+const BINOMIAL: [[f64; 5]; 5] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0, 0.0, 0.0],
+    [1.0, 2.0, 1.0, 0.0, 0.0],
+    [1.0, 3.0, 3.0, 1.0, 0.0],
+    [1.0, 4.0, 6.0, 4.0, 1.0],
+];
+
+fn hull(b: &[f64], limit: f64, depth: u8) -> f64 {
+    let bound = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let n = b.len() - 1;
+    let reached = b[0].abs().max(b[n].abs());
+    if depth == 0 || bound <= limit || bound <= reached * (1.0 + 1e-6) {
+        return bound;
+    }
+    // Halved (de Casteljau).
+    let (mut work, mut left, mut right) = ([0.0; 5], [0.0; 5], [0.0; 5]);
+    work[..=n].copy_from_slice(b);
+    for i in 0..=n {
+        left[i] = work[0];
+        right[n - i] = work[n - i];
+        for k in 0..n - i {
+            work[k] = 0.5 * (work[k] + work[k + 1]);
+        }
+    }
+    hull(&left[..=n], limit, depth - 1).max(hull(&right[..=n], limit, depth - 1))
+}
+
+/// The parts of the torque at a place of the motion, N·m, and where that is.
+struct Load {
+    time: f64,
+    hold: JointVec,
+    motion: JointVec,
+    velocity: JointVec,
+}
+
+/// Slows a motion down until the torque suffices.
+fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
+    holds_where_it_rests(&motion, limits, arm)?;
+    let loads = loads(&motion, arm);
+    let over = |factor: f64| {
+        loads.iter().find_map(|load| {
+            let slow = 1.0 / factor;
+            Joint::ALL.into_iter().find_map(|joint| {
+                let j = joint.index();
+                let friction = arm.friction(j, load.velocity[j] * slow);
+                let torque = load.hold[j] + load.motion[j] * slow * slow + friction;
+                let limit = limits.torque[j];
+                (torque.abs() > TORQUE_SHARE * limit || torque.is_nan())
+                    .then_some((load.time, joint, torque, limit))
+            })
+        })
+    };
+    if over(1.0).is_none() {
+        return Ok(motion);
+    }
+    let (mut fast, mut slow) = (1.0, 1.25);
+    while let Some((time, joint, torque, limit)) = over(slow) {
+        if slow > SLOWEST {
+            let waypoint = waypoint_at(&motion, time);
+            return Err(PlanError::Torque { waypoint, joint, torque: torque.abs(), limit, holding: false });
+        }
+        fast = slow;
+        slow *= 1.25;
+    }
+    for _ in 0..10 {
+        let middle = 0.5 * (fast + slow);
+        if over(middle).is_some() { fast = middle } else { slow = middle }
+    }
+    Ok(motion.stretched(slow))
+}
+
+/// Waypoint, from 1, that was passed last at `time`.
+fn waypoint_at(motion: &Motion, time: f64) -> usize {
+    motion.waypoint_times.partition_point(|t| *t <= time).max(1)
+}
+
+fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Result<(), PlanError> {
+    for (i, &time) in motion.waypoint_times.iter().enumerate() {
+        let state = motion.at(time);
+        if state.velocity.iter().any(|v| v.abs() > 1e-6) {
+            continue;
+        }
+        let torques = arm.holding(&state.position);
+        for joint in Joint::ALL {
+            let (torque, limit) = (torques[joint.index()].abs(), HOLD_SHARE * limits.torque[joint.index()]);
+            if torque > limit || torque.is_nan() {
+                return Err(PlanError::Torque { waypoint: i + 1, joint, torque, limit, holding: true });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn loads(motion: &Motion, arm: &ArmDynamics) -> Vec<Load> {
+    let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
+    let mut loads = Vec::new();
+    let mut next = 0.0;
+    for piece in &motion.pieces {
+        let end = piece.start + piece.length;
+        // Both sides of a jump, and what lies between them.
+        let inside = std::iter::successors(Some(f64::max(next, piece.start)), |t| Some(t + step));
+        let inside = inside.take_while(|t| *t < end).chain([end]);
+        for t in inside {
+            let s = piece.at(t - piece.start);
+            let hold = arm.holding(&s.position);
+            let mut whole = arm.rigid(&s.position, &s.velocity, &s.acceleration);
+            whole.iter_mut().zip(&hold).for_each(|(w, h)| *w -= h);
+            loads.push(Load { time: t, hold, motion: whole, velocity: s.velocity });
+        }
+        next = if piece.length < step { next.max(piece.start + step) } else { end };
+    }
+    loads
+}
+
+/// Which limit is closest to being exceeded, where it is close.
+fn binding(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Vec<Binding> {
+    let duration = motion.duration();
+    let step = (duration / 4000.0).max(0.002);
+    let count = (duration / step).ceil() as usize;
+    let mut found: Vec<Binding> = Vec::new();
+    let mut open = false;
+    for i in 0..count {
+        let time = (i as f64 + 0.5) * duration / count as f64;
+        let state = motion.at(time);
+        let torque = arm.map(|arm| arm.torque(&state));
+        let jerk = motion.jerk_at(time);
+        let mut most = (BINDS, None);
+        for joint in Joint::ALL {
+            let j = joint.index();
+            let mut take = |value: f64, limit: f64, kind| {
+                if value.abs() / limit > most.0 {
+                    most = (value.abs() / limit, Some((joint, kind)));
+                }
+            };
+            take(state.velocity[j], limits.velocity[j], LimitKind::Velocity);
+            take(state.acceleration[j], limits.acceleration[j], LimitKind::Acceleration);
+            take(jerk[j], limits.jerk[j], LimitKind::Jerk);
+            if let Some(torque) = torque {
+                take(torque[j], limits.torque[j], LimitKind::Torque);
+            }
+        }
+        let (from, to) = (duration * i as f64 / count as f64, duration * (i + 1) as f64 / count as f64);
+        match (most.1, found.last_mut()) {
+            (Some((joint, limit)), Some(last)) if open && last.joint == joint && last.limit == limit => {
+                last.to = to;
+            }
+            (Some((joint, limit)), _) => found.push(Binding { from, to, joint, limit }),
+            (None, _) => {}
+        }
+        open = most.1.is_some();
+    }
+    found
+}

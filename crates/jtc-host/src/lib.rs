@@ -20,6 +20,7 @@ pub mod report;
 pub mod sample;
 pub mod session;
 pub mod trajectory;
+pub mod waypoints;
 pub mod words;
 
 pub use arm::Arm;

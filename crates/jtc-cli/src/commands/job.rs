@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, exit::REFUSED};
-use jtc_core::{Config, JOINTS};
+use jtc_core::{Config, Friction, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Suspicion, Verdict};
-use jtc_host::plan;
+use jtc_host::plan::{self, Planner};
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use serde_json::json;
@@ -61,7 +61,7 @@ impl Job {
         let trajectory = if args.speed == 100.0 {
             loaded.trajectory.clone()
         } else {
-            plan::at_speed(&loaded.trajectory, args.speed).map_err(Failure::usage)?
+            plan::at_speed(&loaded.trajectory, args.speed)?
         };
         let config = arm.config();
         let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
@@ -167,6 +167,11 @@ impl Job {
         if let Some(words) = self.without() {
             out.note(format!("note: {words}"));
         }
+    }
+
+    /// Makes motions for the arm of this job, within the limits that count; `friction` is the arm's.
+    pub fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
+        Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
     /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.

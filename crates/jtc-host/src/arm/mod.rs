@@ -31,7 +31,6 @@ pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
-pub(crate) use poses::is_name;
 pub use poses::{PoseError, Poses, remove_pose, save_pose};
 pub use propose::{RULES, Rule};
 pub use source::{Key, Source, Sources};

@@ -155,7 +155,7 @@ fn alike(name: &str, known: &[String]) -> Option<String> {
 }
 
 /// Whether a pose may have this name: it fits into an option beside lists of numbers, and into a cell of a waypoint file.
-pub(crate) fn is_name(name: &str) -> bool {
+fn is_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
         && name.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c))

@@ -52,7 +52,7 @@ pub struct CheckOptions {
 /// The check compares the first point with the pose that it is given: no joint may be further from it than the start tolerance,
 /// 0.02 rad (J-34). Give it the pose that was measured just before, from the status that
 /// [`Session::wait_ready`](crate::Session::wait_ready) returns. An arm that stands elsewhere is moved to the first point by a
-/// trajectory of its own, which [`plan::approach`](crate::plan::approach) makes and which is checked in the same way; after it the
+/// trajectory of its own, which [`Planner::to`](crate::plan::Planner::to) makes and which is checked in the same way; after it the
 /// motion is checked from the pose that the approach ended in.
 ///
 /// The controller compares once more at the moment of execution. An arm that was moved after the check does not move by it:

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output};
+use jtc_host::CheckError;
 use jtc_host::check::CheckedTrajectory;
+use jtc_host::plan::Planner;
 use jtc_host::session::UploadOptions;
-use jtc_host::{CheckError, plan};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -24,8 +25,9 @@ pub fn approach(
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
     // Half of the limits: nobody has looked at this path for obstacles.
     let speed = args.check.speed.min(50.0);
-    let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed)
-        .map_err(|e| refused(&e.to_string(), &args.file))?;
+    let friction = job.arm.friction();
+    let planner = Planner { speed_pct: speed, ..job.planner(friction.as_ref()) };
+    let path = planner.to(&here, &first).map_err(|e| refused(&e.to_string(), &args.file))?.trajectory;
     let checked = job.checked(&path, status, args, UploadOptions::default()).map_err(|e| {
         let CheckError::Refused(verdict) = e else { return e.into() };
         let failure = refused(&verdict.to_string(), &args.file);

@@ -1,0 +1,56 @@
+//! Why there is no plan.
+
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use jtc_core::POINTS_MAX;
+
+use crate::check::Verdict;
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// There is no such motion; waypoint, joint, value and limit are in it.
+    #[error(transparent)]
+    Plan(#[from] jtc_plan::PlanError),
+    /// The check refuses the motion, however slow it is.
+    #[error("{0}")]
+    Refused(Box<Verdict>),
+    /// Not a share of the speed.
+    #[error("speed {percent} % is not within 1..{most} %")]
+    Speed {
+        /// As it was asked for, %.
+        percent: f64,
+        /// The most, %.
+        most: f64,
+    },
+    /// Longer than a trajectory can be.
+    #[error("the motion takes {seconds:.0} s, more than {POINTS_MAX} points can hold")]
+    TooLong {
+        /// s.
+        seconds: f64,
+    },
+}
+
+impl Diagnose for PlanError {
+    fn diagnosis(&self) -> Diagnosis {
+        use jtc_plan::PlanError as Of;
+        match self {
+            Self::Plan(
+                e @ (Of::TooFew { .. } | Of::NotFinite { .. } | Of::Blend { .. } | Of::Time { .. }),
+            ) => Diagnosis::new(ErrorKind::Usage, "waypoints", e.hint()),
+            Self::Plan(e) => Diagnosis::new(ErrorKind::Refused, "plan", e.hint()),
+            Self::Refused(verdict) => {
+                let what = "choose other waypoints or poses: less stretched out, or nearer to each other; or carry a lighter payload";
+                let slower = "give later times, or leave the times out";
+                let too_fast = verdict.slower(100.0).is_some();
+                Diagnosis::new(ErrorKind::Refused, "check", if too_fast { slower } else { what })
+            }
+            Self::Speed { .. } => {
+                Diagnosis::new(ErrorKind::Usage, "speed", "100 is as fast as the limits allow")
+            }
+            Self::TooLong { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
+            }
+        }
+    }
+}

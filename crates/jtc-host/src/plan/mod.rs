@@ -1,0 +1,253 @@
+//! Moves made here: to a place, through waypoints, and trajectories at another speed.
+//!
+//! The motions are those of `jtc-plan`, as fast as the limits of velocity, acceleration, jerk and torque allow. Here they become
+//! trajectories, points at a fixed step as the wire carries them, and each passes the same [check](crate::check) as a file before it
+//! is given to anybody: where rounding, a pause on the path (J-33) or friction ask for more, the motion is slowed down and
+//! [`Planned::notes`] reports it.
+//!
+//! ```
+//! use jtc_host::{Arm, plan::Planner};
+//!
+//! let arm = Arm::avena();
+//! let (config, friction) = (arm.config(), arm.friction());
+//! let planner = Planner { model: Some(&arm.model), friction: friction.as_ref(), ..Planner::new(&config) };
+//! let planned = planner.to(&[0.0; 6], &[0.5, 0.3, -0.4, 0.2, 0.6, -0.5])?;
+//! assert_eq!(planned.trajectory.points.last().unwrap().position[4], 0.6);
+//! # Ok::<(), jtc_host::plan::PlanError>(())
+//! ```
+
+mod error;
+mod rest_of;
+mod sampled;
+mod speed;
+#[cfg(test)]
+mod tests;
+
+use jtc_core::{Config, Friction, JOINTS};
+use jtc_dynamics::ArmModel;
+use jtc_plan::{ArmDynamics, Limits, Motion, Waypoint};
+use jtc_wire::Joint;
+use serde::Serialize;
+
+pub use error::PlanError;
+pub use rest_of::{Standstill, rest_of, where_it_stands};
+pub use speed::at_speed;
+pub(crate) use speed::set_point;
+
+use crate::check::{Checker, HOLD_SHARE, Problem, ProblemKind, Verdict};
+use crate::trajectory::{Trajectory, UploadOptions};
+use sampled::{sampled, step_ms};
+
+/// Step of planned moves, ms.
+const STEP_MS: u16 = 10;
+/// Share of the velocity and acceleration limits that a plan uses: the rest is for the rounding of the wire.
+const SHARE: f64 = 0.98;
+/// Share of the torque limit that a plan uses: the rest is for the controller's own corrections, or it would be at its limit for longer
+/// than it may (J-43).
+const TORQUE_SHARE: f64 = 0.9;
+/// A motion that is slowed down by more than this is none any more.
+const SLOWEST: f64 = 50.0;
+/// Least and most by which one step slows a motion down.
+const SLOWER: (f64, f64) = (1.01, 2.0);
+
+/// Makes motions for an arm, and checks them.
+#[derive(Clone, Debug)]
+pub struct Planner<'a> {
+    /// Limits, rotor inertia, gravity, payload.
+    pub config: &'a Config,
+    /// Model for the torques; `None`: torque is neither planned nor checked.
+    pub model: Option<&'a ArmModel>,
+    /// Friction compensation that the controller will add to it.
+    pub friction: Option<&'a Friction>,
+    /// Speed, 1 to 100 % of what the limits allow.
+    pub speed_pct: f64,
+    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each waypoint.
+    pub blend: f64,
+    /// Whether jerk is limited, too.
+    pub jerk: bool,
+    /// Segments that the trajectory will be sent in.
+    pub upload: UploadOptions,
+}
+
+/// Which limit a motion uses up, from when to when.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bound {
+    /// s from the start.
+    pub from_s: f64,
+    /// s from the start.
+    pub to_s: f64,
+    /// Which joint.
+    pub joint: Joint,
+    /// "velocity", "acceleration", "jerk", "torque", "stop" (room to stop in time), "friction" (its table) or "given time".
+    pub limit: &'static str,
+}
+
+/// A motion that passed the check.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// What is run.
+    pub trajectory: Trajectory,
+    /// What the check found: figures of each joint, warnings.
+    pub verdict: Verdict,
+    /// What binds when, in the order of time.
+    pub binding: Vec<Bound>,
+    /// When the motion is nearest to each waypoint, s.
+    pub waypoint_times: Vec<f64>,
+    /// What was changed for the check, in words.
+    pub notes: Vec<String>,
+}
+
+impl<'a> Planner<'a> {
+    /// Within the limits of `config` alone, as fast as they allow, with a stop at each waypoint.
+    pub fn new(config: &'a Config) -> Self {
+        let upload = UploadOptions::default();
+        Self { config, model: None, friction: None, speed_pct: 100.0, blend: 0.0, jerk: true, upload }
+    }
+
+    /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError::Speed`]; [`PlanError::Plan`] for a place outside the limits or that no torque holds; [`PlanError::Refused`] when the
+    /// check finds what no speed mends.
+    pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
+        let (limits, arm) = (self.limits(&[*from, *to])?, self.dynamics());
+        let motion = jtc_plan::point_to_point(from, to, &limits, arm.as_ref())?;
+        self.checked(&motion, Some(*from), false)
+    }
+
+    /// Through waypoints, from rest to rest: straight legs in joint space, with corners rounded within the blend. Times that are given
+    /// are kept.
+    ///
+    /// # Errors
+    ///
+    /// As [`Planner::to`], with the waypoint that is meant.
+    pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
+        let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
+        let (limits, arm) = (self.limits(&positions)?, self.dynamics());
+        let motion = jtc_plan::through(waypoints, self.blend, &limits, arm.as_ref())?;
+        self.checked(&motion, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
+    }
+
+    fn dynamics(&self) -> Option<ArmDynamics<'a>> {
+        self.model.map(|model| ArmDynamics::new(self.config, model, self.friction))
+    }
+
+    /// What a plan keeps to. A place that takes more than the usual share of a torque to be held, but not too much, can be left again.
+    fn limits(&self, places: &[[f64; JOINTS]]) -> Result<Limits, PlanError> {
+        if !(1.0..=100.0).contains(&self.speed_pct) {
+            return Err(PlanError::Speed { percent: self.speed_pct, most: 100.0 });
+        }
+        let mut limits = Limits::of(self.config);
+        let holding = self.dynamics().map(|arm| {
+            let finite = places.iter().filter(|q| q.iter().all(|v| v.is_finite()));
+            finite.map(|q| arm.holding(q)).collect::<Vec<_>>()
+        });
+        for j in 0..JOINTS {
+            limits.velocity[j] *= SHARE;
+            limits.acceleration[j] *= SHARE;
+            let most = holding.iter().flatten().map(|torque| torque[j].abs()).fold(0.0, f64::max);
+            let to_hold = most / (HOLD_SHARE * limits.torque[j]);
+            limits.torque[j] *= to_hold.clamp(TORQUE_SHARE, 1.0);
+        }
+        let limits = limits.at_speed(self.speed_pct / 100.0);
+        Ok(if self.jerk { limits } else { limits.without_jerk() })
+    }
+
+    /// The motion as a trajectory that passes the check, slowed down as far as it has to be; one that is `timed` is not.
+    fn checked(
+        &self,
+        motion: &Motion,
+        start: Option<[f64; JOINTS]>,
+        timed: bool,
+    ) -> Result<Planned, PlanError> {
+        let checker = Checker {
+            model: self.model,
+            friction: self.friction,
+            start,
+            upload: self.upload,
+            ..Checker::new(self.config)
+        };
+        let (mut stretch, mut slowed) = (1.0, None::<Problem>);
+        loop {
+            let step = step_ms(motion.duration() * stretch)?;
+            let sampled = sampled(motion, stretch, step, timed)?;
+            let verdict = checker.check(&sampled.trajectory);
+            let Some(worst) = verdict.refusals().next().cloned() else {
+                let scale = sampled.scale;
+                return Ok(Planned {
+                    binding: binding(motion, scale, slowed.as_ref()),
+                    waypoint_times: motion.waypoint_times().iter().map(|t| t * scale).collect(),
+                    notes: slowed.map(|p| slowed_words(&p, stretch)).into_iter().collect(),
+                    trajectory: sampled.trajectory,
+                    verdict,
+                });
+            };
+            let Some(factor) = slower(&verdict).filter(|factor| !timed && stretch * factor <= SLOWEST) else {
+                return Err(PlanError::Refused(Box::new(verdict)));
+            };
+            stretch *= factor;
+            slowed = Some(worst);
+        }
+    }
+}
+
+/// By how much a motion is slowed down for what is wrong with it; `None` where that does not mend it.
+fn slower(verdict: &Verdict) -> Option<f64> {
+    use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
+    let factors = verdict.refusals().map(|p| {
+        let over = (p.value / p.limit).abs();
+        match p.kind {
+            Velocity | PositionSpeed | FrictionVelocity => Some(over),
+            Acceleration => Some(over.sqrt()),
+            // Part of it is gravity, which no speed changes.
+            Torque | NoStop => Some(over.max(1.03)),
+            _ => None,
+        }
+    });
+    let factor = factors.collect::<Option<Vec<f64>>>()?.into_iter().fold(1.0, f64::max);
+    factor.is_finite().then_some((1.005 * factor).clamp(SLOWER.0, SLOWER.1))
+}
+
+fn limit_name(kind: ProblemKind) -> &'static str {
+    match kind {
+        ProblemKind::Velocity | ProblemKind::PositionSpeed => "velocity",
+        ProblemKind::Acceleration => "acceleration",
+        ProblemKind::NoStop => "stop",
+        ProblemKind::FrictionVelocity => "friction",
+        _ => "torque",
+    }
+}
+
+/// What binds: the limits that the motion was planned by, or else what it was slowed down for.
+fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
+    if let Some(problem) = slowed {
+        let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));
+        return vec![Bound { from_s: 0.0, to_s: motion.duration() * scale, joint, limit }];
+    }
+    let bound = |b: &jtc_plan::Binding| Bound {
+        from_s: b.from * scale,
+        to_s: b.to * scale,
+        joint: b.joint,
+        limit: b.limit.name(),
+    };
+    motion.binding().iter().map(bound).collect()
+}
+
+fn slowed_words(problem: &Problem, stretch: f64) -> String {
+    format!("slowed down to {:.0} % of the speed that was planned, for the check: {problem}", 100.0 / stretch)
+}
+
+/// A move between two places within the limits of `config` alone, at `speed_pct` of them: [`Planner::to`] without torques.
+///
+/// # Errors
+///
+/// Those of [`Planner::to`].
+pub fn joint_move(
+    from: &[f64; JOINTS],
+    to: &[f64; JOINTS],
+    config: &Config,
+    speed_pct: f64,
+) -> Result<Trajectory, PlanError> {
+    Ok(Planner { speed_pct, ..Planner::new(config) }.to(from, to)?.trajectory)
+}

@@ -1,0 +1,152 @@
+//! The rest of a trajectory that was broken off: from standstill on its path to its end, on the same path.
+
+use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
+
+use super::sampled::step_ms;
+use super::{PlanError, set_point};
+use crate::trajectory::{Point, Trajectory};
+
+/// Where an arm stands on a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standstill {
+    /// Path time, ms from the first point.
+    pub ms: u32,
+    /// How far it is from there, rad of the joint that is furthest.
+    pub away_rad: f64,
+}
+
+/// The first place between `from_ms` and `to_ms` of the path that is within `tolerance` of `position` (rad each) in all joints, and there
+/// the nearest one; `None` where the arm stands beside the path.
+pub fn where_it_stands(
+    trajectory: &Trajectory,
+    (from_ms, to_ms): (u32, u32),
+    position: &[f64; JOINTS],
+    tolerance: f64,
+) -> Option<Standstill> {
+    let end = (trajectory.duration_s() * 1e3).round() as u32;
+    let mut nearest: Option<Standstill> = None;
+    for ms in from_ms..=to_ms.min(end) {
+        let at = trajectory.at_ms(ms)?.position;
+        let away_rad = (0..JOINTS).map(|j| (at[j] - position[j]).abs()).fold(0.0, f64::max);
+        match &mut nearest {
+            Some(before) if away_rad < before.away_rad => *before = Standstill { ms, away_rad },
+            // The path has left the place again: a later passage is another one.
+            Some(_) if away_rad > tolerance => break,
+            None if away_rad <= tolerance => nearest = Some(Standstill { ms, away_rad }),
+            _ => {}
+        }
+    }
+    nearest
+}
+
+/// The path from `from_ms` on: it speeds up from standstill in `ramp_s` seconds, and then goes on at its own times. The first point is
+/// where the path is at `from_ms`, the last one that of the trajectory.
+///
+/// # Errors
+///
+/// [`PlanError::TooLong`] when it does not fit into the controller any more.
+pub fn rest_of(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Trajectory, PlanError> {
+    let from_s = f64::from(from_ms) * 1e-3;
+    let left = (trajectory.duration_s() - from_s).max(0.0);
+    // At the end of the ramp half of its time of the path has passed.
+    let ramp = ramp_s.min(2.0 * left).max(1e-3);
+    let seconds = left + 0.5 * ramp;
+    let step_ms = step_ms(seconds)?;
+    let h = f64::from(step_ms) * 1e-3;
+    let steps = ((seconds / h - 1e-6).ceil() as usize).clamp(1, POINTS_MAX - 1);
+    let mut points: Vec<Point> = (0..steps)
+        .map(|k| {
+            let t = k as f64 * h;
+            let (passed, rate, change) = ramped(t, ramp);
+            let at = place(trajectory, from_s + passed);
+            Point {
+                position: at.position,
+                velocity: at.velocity.map(|v| v * rate),
+                acceleration: std::array::from_fn(|j| {
+                    at.acceleration[j] * rate * rate + at.velocity[j] * change
+                }),
+            }
+        })
+        .collect();
+    let end = place(trajectory, trajectory.duration_s());
+    points.push(Point { position: end.position, ..Point::default() });
+    Ok(Trajectory { step_ms, points })
+}
+
+/// Path time that has passed after `t` seconds, its rate, and how that changes: from 0 to 1 within `ramp` seconds.
+fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
+    let u = t / ramp;
+    if u >= 1.0 {
+        return (t - 0.5 * ramp, 1.0, 0.0);
+    }
+    (ramp * u * u * u * (1.0 - 0.5 * u), u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) / ramp)
+}
+
+/// Set values at `t` seconds of the path, as the controller computes them between points (J-32).
+fn place(trajectory: &Trajectory, t: f64) -> SetPoint {
+    let h = f64::from(trajectory.step_ms.max(1)) * 1e-3;
+    let i = (t / h).max(0.0) as usize;
+    match (trajectory.points.get(i), trajectory.points.get(i + 1)) {
+        (Some(a), Some(b)) => {
+            interpolate(&set_point(a), &set_point(b), h, (t / h - i as f64).clamp(0.0, 1.0))
+        }
+        _ => trajectory.points.last().map(set_point).unwrap_or_default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_core::Config;
+
+    use super::*;
+    use crate::check::Checker;
+    use crate::example::demo_motion;
+    use crate::plan::joint_move;
+
+    fn near(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
+        (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
+    }
+
+    /// From any place: it stands there, stays on the path, ends where that ends, and passes the check.
+    #[test]
+    fn the_rest_begins_at_rest_and_stays_on_the_path() {
+        let (whole, config) = (demo_motion(), Config::avena());
+        for from_ms in [0, 1, 997, 2500, 5003, 9_700, 9_999] {
+            let rest = rest_of(&whole, from_ms, 0.5).unwrap();
+            let first = rest.points[0];
+            assert_eq!(first.velocity, [0.0; JOINTS]);
+            assert!(near(&first.position, &whole.at_ms(from_ms).unwrap().position) < 2e-4, "{from_ms}");
+            assert_eq!(rest.points.last().unwrap().position, whole.points.last().unwrap().position);
+            let verdict = Checker::new(&config).check(&rest);
+            assert!(verdict.is_ok(), "{from_ms}: {verdict}");
+            for ms in (0..(rest.duration_s() * 1e3) as u32).step_by(7) {
+                let at = rest.at_ms(ms).unwrap().position;
+                // Which path time it is does not matter here.
+                let aside = (from_ms.saturating_sub(5)..=10_000)
+                    .map(|k| near(&at, &whole.at_ms(k).unwrap().position));
+                let aside = aside.fold(f64::INFINITY, f64::min);
+                assert!(aside < 1.5e-3, "{from_ms}, {ms}: {aside}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_arm_is_found_where_it_stands_first() {
+        let there = joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
+        // There and back: each place is passed twice.
+        let mut both = there.clone();
+        both.points.extend(
+            there.points.iter().rev().skip(1).map(|p| Point { velocity: p.velocity.map(|v| -v), ..*p }),
+        );
+        let end = (there.duration_s() * 1e3) as u32;
+        for ms in [0, 200, 900] {
+            let at = both.at_ms(ms).unwrap().position;
+            let found = where_it_stands(&both, (0, 2 * end), &at, 0.02).unwrap();
+            assert!(found.ms.abs_diff(ms) < 30 && found.away_rad < 1e-3, "{ms}: {found:?}");
+            let back = where_it_stands(&both, (end, 2 * end), &at, 0.02).unwrap();
+            assert!(back.ms.abs_diff(2 * end - ms) < 30, "{ms}: {back:?}");
+        }
+        assert_eq!(where_it_stands(&both, (0, end), &[0.5, 0.1, 0.0, 0.0, 0.0, 0.0], 0.02), None);
+        assert_eq!(where_it_stands(&both, (0, 10), &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 0.02), None);
+    }
+}

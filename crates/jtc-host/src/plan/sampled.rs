@@ -1,0 +1,89 @@
+//! Motions as trajectories: points at a fixed step.
+
+use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
+use jtc_plan::{Motion, State};
+
+use super::{PlanError, STEP_MS};
+use crate::trajectory::{Point, Trajectory};
+
+/// Fewest steps of a motion, where its step can be short enough.
+const STEPS_MIN: f64 = 20.0;
+/// Shortest step, ms: in a shorter one the position moves less than it is rounded to.
+const STEP_MIN_MS: f64 = 2.0;
+/// Longest step that a trajectory frame carries, ms.
+const STEP_MAX_MS: f64 = 1000.0;
+/// How far a trajectory may be from the motion between its points, rad.
+const ASIDE: f64 = 1e-3;
+/// Places looked at in each interval.
+const PARTS: usize = 4;
+
+/// A motion as a trajectory.
+pub(super) struct Sampled {
+    pub trajectory: Trajectory,
+    /// Time of the trajectory for a time of the motion.
+    pub scale: f64,
+}
+
+/// The step for a motion of so many seconds, ms.
+///
+/// # Errors
+///
+/// [`PlanError::TooLong`] when it does not fit into the controller.
+pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
+    let fits = (seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil();
+    let short = (seconds * 1e3 / STEPS_MIN).floor().clamp(STEP_MIN_MS, f64::from(STEP_MS));
+    let step = fits.max(short);
+    if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
+}
+
+/// The motion in `stretch` times its time. It takes a whole number of steps: without given times it is stretched by what is missing;
+/// where they are to be `kept`, the arm rests for the rest of the last step. The last point is exactly where the motion ends.
+///
+/// # Errors
+///
+/// [`PlanError::TooLong`] where the step is too long for the motion's corners.
+pub(super) fn sampled(motion: &Motion, stretch: f64, step_ms: u16, kept: bool) -> Result<Sampled, PlanError> {
+    let h = f64::from(step_ms) * 1e-3;
+    let seconds = motion.duration() * stretch;
+    let steps = ((seconds / h - 1e-6).ceil() as usize).clamp(1, POINTS_MAX - 1);
+    let scale = if kept { stretch } else { steps as f64 * h / motion.duration() };
+    let end = motion.at(motion.duration());
+    let rest = Point { position: end.position, ..Point::default() };
+    let at = |t: f64| slowed(&motion.at(t / scale), scale);
+    let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
+    // Without a limit of jerk the acceleration jumps at the start; either side of the jump is right.
+    if let Some(first) = points.first_mut() {
+        first.velocity = [0.0; JOINTS];
+    }
+    points.push(rest);
+    let aside = aside(&points, h, at);
+    if aside > ASIDE && step_ms > STEP_MS {
+        return Err(PlanError::TooLong { seconds });
+    }
+    Ok(Sampled { trajectory: Trajectory { step_ms, points }, scale })
+}
+
+fn slowed(state: &State, scale: f64) -> Point {
+    Point {
+        position: state.position,
+        velocity: state.velocity.map(|v| v / scale),
+        acceleration: state.acceleration.map(|a| a / (scale * scale)),
+    }
+}
+
+/// How far the controller's curve between the points is from the motion, rad.
+fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
+    let mut most = 0.0f64;
+    let set =
+        |p: &Point| SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration };
+    for (i, pair) in points.windows(2).enumerate() {
+        for part in 1..PARTS {
+            let u = part as f64 / PARTS as f64;
+            let (curve, motion) = (interpolate(&set(&pair[0]), &set(&pair[1]), h, u), at((i as f64 + u) * h));
+            for j in 0..JOINTS {
+                most = most.max((curve.position[j] - motion.position[j]).abs());
+            }
+        }
+    }
+    most
+}

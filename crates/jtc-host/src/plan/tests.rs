@@ -1,0 +1,104 @@
+//! Plans: whatever is planned passes the check, and what cannot be is refused by name.
+
+use host_kit::{Diagnose, ErrorKind};
+use jtc_core::POINTS_MAX;
+use proptest::prelude::*;
+
+use super::*;
+use crate::Arm;
+
+fn pose() -> impl Strategy<Value = [f64; JOINTS]> {
+    prop::array::uniform6(-1.5..1.5f64)
+}
+
+fn waypoints(positions: &[[f64; JOINTS]]) -> Vec<Waypoint> {
+    positions.iter().map(|position| Waypoint { position: *position, time: None }).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Any planned move passes the check at any speed, and ends exactly where it should.
+    #[test]
+    fn planned_moves_pass_the_check(from in pose(), to in pose(), speed in 1.0..100.0f64) {
+        let config = Config::avena();
+        let plan = joint_move(&from, &to, &config, speed).unwrap();
+        let verdict = Checker { start: Some(from), ..Checker::new(&config) }.check(&plan);
+        prop_assert!(verdict.is_ok(), "{verdict}");
+        prop_assert_eq!(plan.points.last().unwrap().position, to);
+        prop_assert!(plan.points.len() <= POINTS_MAX);
+    }
+
+    /// With torques, friction and the way to stop; where an arm cannot be held, or not stopped at any speed, that is the reason.
+    #[test]
+    fn plans_of_an_arm_pass_its_check(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.3f64, jerk: bool) {
+        let arm = Arm::avena();
+        let (config, friction) = (arm.config(), arm.friction());
+        let model = Some(&arm.model);
+        let planner = Planner { model, friction: friction.as_ref(), blend, jerk, ..Planner::new(&config) };
+        match planner.through(&waypoints(&places)) {
+            Ok(planned) => {
+                let verdict = Checker { model, friction: friction.as_ref(), ..Checker::new(&config) }.check(&planned.trajectory);
+                prop_assert!(verdict.is_ok(), "{verdict}");
+                let first = planned.trajectory.points[0].position;
+                prop_assert!((0..JOINTS).all(|j| (first[j] - places[0][j]).abs() < 1e-9));
+                prop_assert_eq!(planned.trajectory.points.last().unwrap().position, *places.last().unwrap());
+                prop_assert_eq!(planned.waypoint_times.len(), places.len());
+                let end = planned.trajectory.duration_s() + 1e-9;
+                prop_assert!(planned.binding.iter().all(|b| b.from_s <= b.to_s && b.to_s <= end));
+            }
+            Err(PlanError::Refused(verdict)) => prop_assert!(
+                verdict.refusals().any(|p| matches!(p.kind, ProblemKind::HoldTorque | ProblemKind::Torque)),
+                "{verdict}"
+            ),
+            Err(PlanError::Plan(jtc_plan::PlanError::Torque { .. })) => {}
+            Err(other) => prop_assert!(false, "{other}"),
+        }
+    }
+}
+
+#[test]
+fn a_target_outside_the_limits_is_refused() {
+    let config = Config::avena();
+    let error = joint_move(&[0.0; 6], &[0.0, 1.6, 0.0, 0.0, 0.0, 0.0], &config, 100.0).unwrap_err();
+    assert!(error.to_string().contains("joint 2: 1.6 rad is outside -1.57..1.57 rad"), "{error}");
+    assert!(joint_move(&[f64::NAN; 6], &[0.0; 6], &config, 100.0).is_err());
+    for speed in [0.0, 0.5, 101.0, f64::NAN] {
+        let error = joint_move(&[0.0; 6], &[0.0; 6], &config, speed).unwrap_err();
+        assert_eq!(error.diagnosis().kind, ErrorKind::Usage, "{speed}: {error}");
+    }
+}
+
+/// A motion that is too fast for its torque is planned slower.
+#[test]
+fn moves_slow_down_for_torque() {
+    let arm = Arm::avena();
+    let mut config = arm.config();
+    let to = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
+    config.joints[1].torque_max = 140.0;
+    let fast = joint_move(&[0.0; 6], &to, &config, 100.0).unwrap();
+    let with =
+        |config: &Config| Planner { model: Some(&arm.model), ..Planner::new(config) }.to(&[0.0; 6], &to);
+    let planned = with(&config).unwrap();
+    assert!(planned.trajectory.duration_s() >= fast.duration_s());
+    config.joints[1].torque_max = 60.0;
+    let error = with(&config).unwrap_err();
+    assert!(error.to_string().contains("joint 2"), "{error}");
+    assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
+}
+
+/// Long and slow motions have longer steps, up to what the controller holds.
+#[test]
+fn any_length_fits_or_is_refused() {
+    let config = Config::avena();
+    let slow = joint_move(&[0.0; 6], &[2.9, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 1.0).unwrap();
+    assert!(
+        slow.points.len() <= POINTS_MAX && slow.duration_s() > 120.0 && slow.step_ms > STEP_MS,
+        "{}",
+        slow.duration_s()
+    );
+    let places: Vec<[f64; JOINTS]> =
+        (0..10_000).map(|i| [if i % 2 == 0 { 0.0 } else { 0.2 }; JOINTS]).collect();
+    let error = Planner::new(&config).through(&waypoints(&places)).unwrap_err();
+    assert!(matches!(error, PlanError::TooLong { .. }), "{error}");
+}

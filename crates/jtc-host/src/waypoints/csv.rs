@@ -1,0 +1,133 @@
+//! Waypoints as a table with a header: `t`, `pose`, `q1`..`q6` or `q1_deg`..`q6_deg`.
+
+use jtc_core::JOINTS;
+
+use super::{FileWaypoint, Target, WaypointFile};
+use crate::file::{FileError, Place, number, rows, short};
+
+/// What the columns are, in words.
+const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file)";
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Column {
+    Time,
+    Pose,
+    /// From 0.
+    Joint(usize),
+}
+
+/// Where the columns are, and the radians in a unit of each.
+#[derive(Default)]
+struct Header {
+    names: Vec<String>,
+    time: Option<usize>,
+    pose: Option<usize>,
+    joints: [Option<(usize, f64)>; JOINTS],
+}
+
+pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
+    let mut rows = rows(text);
+    let Some((line, names)) = rows.next() else {
+        return Err(FileError::form("an empty file has no waypoints"));
+    };
+    if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+        let problem =
+            format!("{} columns and no header: write q1,q2,q3,q4,q5,q6 before all other lines", names.len());
+        return Err(FileError::at(Place::line(line), problem));
+    }
+    let header = header(line, &names)?;
+    let waypoints = rows.map(|(line, cells)| header.waypoint(line, &cells)).collect::<Result<Vec<_>, _>>()?;
+    if waypoints.is_empty() {
+        return Err(FileError::at(Place::line(line), "a header and no waypoints"));
+    }
+    let units_named = names.iter().any(|name| name.contains("_deg") || name.contains("_rad"));
+    Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
+}
+
+/// What the name of a column says, and the radians in its unit.
+fn column(name: &str) -> Option<(Column, f64)> {
+    let name = name.trim_matches('"').to_ascii_lowercase();
+    match name.as_str() {
+        "t" | "t_s" | "time" | "time_s" => return Some((Column::Time, 1.0)),
+        "pose" | "name" => return Some((Column::Pose, 1.0)),
+        _ => {}
+    }
+    let (name, unit) = match (name.strip_suffix("_rad"), name.strip_suffix("_deg")) {
+        (Some(head), _) => (head, 1.0),
+        (_, Some(head)) => (head, 1f64.to_radians()),
+        _ => (name.as_str(), 1.0),
+    };
+    let joint = name.strip_prefix('q')?.parse::<usize>().ok()?;
+    (1..=JOINTS).contains(&joint).then_some((Column::Joint(joint - 1), unit))
+}
+
+fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
+    let mut header = Header { names: names.iter().map(|name| short(name)).collect(), ..Header::default() };
+    for (i, name) in names.iter().enumerate() {
+        let wrong = |problem: String| {
+            FileError::at(Place::cell(line, i + 1).named(format!("\"{}\"", short(name))), problem)
+        };
+        let Some((column, unit)) = column(name) else {
+            let lower = name.to_ascii_lowercase();
+            let is_rate = lower.starts_with("qd");
+            let problem = if is_rate {
+                "waypoints have no velocities: a file with them is a trajectory, which `jtc traj run` runs as it is".into()
+            } else {
+                format!("unknown column; {KNOWN}")
+            };
+            return Err(wrong(problem));
+        };
+        let before = match column {
+            Column::Time => header.time.replace(i).is_some(),
+            Column::Pose => header.pose.replace(i).is_some(),
+            Column::Joint(j) => header.joints[j].replace((i, unit)).is_some(),
+        };
+        if before {
+            return Err(wrong("this column is there twice".into()));
+        }
+    }
+    let missing = header.joints.iter().position(Option::is_none);
+    let any = header.joints.iter().any(Option::is_some);
+    match missing {
+        Some(j) if any || header.pose.is_none() => {
+            Err(FileError::at(Place::line(line), format!("column q{} is missing; {KNOWN}", j + 1)))
+        }
+        _ => Ok(header),
+    }
+}
+
+impl Header {
+    fn waypoint(&self, line: usize, cells: &[&str]) -> Result<FileWaypoint, FileError> {
+        if cells.len() != self.names.len() {
+            let problem = format!("{} columns, the header has {}", cells.len(), self.names.len());
+            return Err(FileError::at(Place::line(line), problem));
+        }
+        let value = |i: usize| number(cells[i], || Place::cell(line, i + 1).named(&self.names[i]));
+        let time = match self.time {
+            Some(i) if !cells[i].is_empty() => Some(value(i)?),
+            _ => None,
+        };
+        let name = self.pose.map(|i| (i, cells[i].trim_matches('"'))).filter(|(_, name)| !name.is_empty());
+        let first = self.joints.iter().flatten().map(|(i, _)| *i).find(|i| !cells[*i].is_empty());
+        let (target, place) = match (name, first) {
+            (Some((at, name)), None) => (Target::Pose(name.to_owned()), Place::cell(line, at + 1)),
+            (Some((_, name)), Some(at)) => {
+                let problem =
+                    format!("both the pose \"{}\" and positions: a waypoint is one of them", short(name));
+                return Err(FileError::at(Place::cell(line, at + 1).named(&self.names[at]), problem));
+            }
+            (None, None) if self.pose.is_some() => {
+                return Err(FileError::at(Place::line(line), "neither a pose nor positions"));
+            }
+            (None, _) => {
+                let mut position = [0.0; JOINTS];
+                for (to, (i, unit)) in position.iter_mut().zip(self.joints.iter().flatten()) {
+                    *to = unit * value(*i)?;
+                }
+                (Target::Joints(position), Place::line(line))
+            }
+        };
+        Ok(FileWaypoint { target, time, place })
+    }
+}

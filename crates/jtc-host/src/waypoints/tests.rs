@@ -1,0 +1,110 @@
+//! Waypoint files, and the errors of broken ones.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::arm::{Arm, Poses};
+
+fn arm() -> Arm {
+    let poses = [("home".to_owned(), [0.0; 6]), ("above-table".to_owned(), [0.1, 0.2, -0.3, 0.4, 0.5, 0.6])];
+    Arm { poses: Poses::from(poses), ..Arm::avena() }
+}
+
+fn read(text: &str) -> Vec<jtc_plan::Waypoint> {
+    WaypointFile::parse(text).unwrap().positions(&arm()).unwrap()
+}
+
+#[test]
+fn the_forms_say_the_same() {
+    let plain = read("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.1,0.2,-0.3,0.4,0.5,0.6\n");
+    assert_eq!(plain[1].position, [0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
+    let degrees = [0.1f64, 0.2, -0.3, 0.4, 0.5, 0.6].map(|q| q.to_degrees().to_string()).join(";");
+    for text in [
+        format!("# a comment\nq1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg\n0;0;0;0;0;0\n{degrees}\n"),
+        "pose\nhome\nabove-table\n".into(),
+        "pose,q1,q2,q3,q4,q5,q6\nhome,,,,,,\n,0.1,0.2,-0.3,0.4,0.5,0.6\n".into(),
+        r#"[{"pose": "home"}, {"q1": 0.1, "q2": 0.2, "q3": -0.3, "q4": 0.4, "q5": 0.5, "q6": 0.6}]"#.into(),
+        r#"{"waypoints": [{"q1": 0, "q2": 0, "q3": 0, "q4": 0, "q5": 0, "q6": 0}, {"pose": "above-table"}]}"#
+            .into(),
+    ] {
+        for (waypoint, same) in read(&text).iter().zip(&plain) {
+            for j in 0..6 {
+                assert!((waypoint.position[j] - same.position[j]).abs() < 1e-12, "{text}");
+            }
+            assert_eq!(waypoint.time, None);
+        }
+    }
+}
+
+/// Times count from the first waypoint, and may be left out.
+#[test]
+fn times_are_from_the_first_waypoint() {
+    let times = |text: &str| read(text).iter().map(|w| w.time).collect::<Vec<_>>();
+    assert_eq!(times("t,pose\n2,home\n,above-table\n5.5,home\n"), [Some(0.0), None, Some(3.5)]);
+    assert_eq!(
+        times(r#"[{"t": 0, "pose": "home"}, {"t": 2, "pose": "above-table"}]"#),
+        [Some(0.0), Some(2.0)]
+    );
+}
+
+#[test]
+fn degrees_are_taken_only_where_the_file_names_no_unit() {
+    let file = WaypointFile::parse("q1,q2,q3,q4,q5,q6\n90,0,0,0,0,0\n").unwrap().in_degrees().unwrap();
+    assert_eq!(file.positions(&arm()).unwrap()[0].position[0], std::f64::consts::FRAC_PI_2);
+    let named = WaypointFile::parse("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n90,0,0,0,0,0\n").unwrap();
+    assert!(named.in_degrees().unwrap_err().to_string().contains("are known"));
+}
+
+#[test]
+fn a_broken_file_is_refused_with_its_place() {
+    for (text, words) in [
+        ("", "an empty file has no waypoints"),
+        ("0,0,0,0,0,0\n1,0,0,0,0,0\n", ", line 1: 6 columns and no header: write q1,q2"),
+        ("q1,q2,q3,q4,q5,q6\n", ", line 1: a header and no waypoints"),
+        ("q1,q2,q3,q4,q5\n0,0,0,0,0\n", ", line 1: column q6 is missing"),
+        ("q1,q2,q3,q4,q5,q7\n0,0,0,0,0,0\n", ", line 1, column 6, \"q7\": unknown column; known: q1..q6"),
+        ("q1,q2,q3,q4,q5,q6,q6_deg\n0,0,0,0,0,0,0\n", "column 7, \"q6_deg\": this column is there twice"),
+        ("t,q1,q2,q3,q4,q5,q6,qd1\n0,0,0,0,0,0,0,0\n", "a file with them is a trajectory"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0,0,0,0,x,0\n", ", line 3, column 5, q5: \"x\" is not a number"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0\n", ", line 2: 5 columns, the header has 6"),
+        ("q1;q2;q3;q4;q5;q6\n0;0;0;0;0;1,5\n", "has a decimal comma"),
+        ("t,pose\nsoon,home\n", ", line 2, column 1, t: \"soon\" is not a number"),
+        ("pose,q1,q2,q3,q4,q5,q6\nhome,0,0,0,0,0,0\n", "both the pose \"home\" and positions"),
+        ("pose,q1,q2,q3,q4,q5,q6\n,,,,,,\n", ", line 2: neither a pose nor positions"),
+        ("[{\"q1\": 0}]", ", waypoint 1: q2 is missing"),
+        ("[{\"q1\": 0, \"q1_deg\": 0}]", ", waypoint 1: both q1 and q1_deg"),
+        ("[\n {\"pose\": 3}]", ", line 2, column 11: JSON: invalid type"),
+        ("[{\"where\": 3}]", "JSON: unknown field `where`"),
+        ("[]", "no waypoints"),
+    ] {
+        let error = WaypointFile::parse(text).unwrap_err().to_string();
+        assert!(error.contains(words), "{text:?}: {error}");
+    }
+    let error = WaypointFile::parse("pose\nhome\nabove-tabel\n").unwrap().positions(&arm()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        ", line 3, column 1: the arm avena has no pose \"above-tabel\"; it has above-table, home"
+    );
+    assert!(error.diagnosis().next.contains("is \"above-table\" meant?"));
+    let many = "pose\n".to_owned() + &"home\n".repeat(WAYPOINTS_MAX + 1);
+    assert!(WaypointFile::parse(&many).unwrap_err().to_string().contains("10001 waypoints, more than 10000"));
+}
+
+proptest! {
+    /// Whatever a file holds, it is read or refused.
+    #[test]
+    fn any_text_is_read_or_refused(text in "(q[1-6](_deg)?,|t,|pose,|[0-9.e-]{1,4},|\n|[{}\\[\\]\":a-z]){0,60}") {
+        let _ = WaypointFile::parse(&text).map(|file| file.positions(&arm()));
+    }
+
+    #[test]
+    fn what_is_written_is_read(q in prop::collection::vec(prop::array::uniform6(-3.0..3.0f64), 1..20)) {
+        let back = read(&to_csv(&q));
+        prop_assert_eq!(back.len(), q.len());
+        for (a, b) in back.iter().zip(&q) {
+            for j in 0..6 {
+                prop_assert!((a.position[j] - b[j]).abs() < 1e-6);
+            }
+        }
+    }
+}

@@ -9,6 +9,7 @@ mod motion;
 mod offline;
 mod params;
 mod payload;
+mod plan;
 mod sim;
 
 use std::path::PathBuf;
@@ -20,10 +21,11 @@ pub use arm::{ArmCommand, ImportArgs};
 pub use bench::BenchCommand;
 pub use log::LogCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
-pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
+pub use motion::{CheckArgs, RunArgs, RunFiles, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use payload::PayloadCommand;
+pub use plan::{MoveArgs, PlanArgs, PoseCommand, Target};
 pub use sim::{DemoArgs, SimArgs, SimSpeed};
 
 /// The joint trajectory controller from your terminal.
@@ -133,6 +135,28 @@ pub enum Command {
     /// What the arm carries at its flange
     #[command(subcommand)]
     Payload(PayloadCommand),
+    /// Plan a motion through waypoints, as fast as the limits allow; nothing is sent
+    #[command(
+        after_help = "A waypoint file is CSV with the columns q1..q6 (rad) or q1_deg..q6_deg, or `pose` (a name from the arm file), and `t` (s)\n\
+                            where times are given; or JSON with the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
+                            the corners. Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and\n\
+                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
+                            jtc plan waypoints.csv -o cycle.csv\n  jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
+                            jtc plan cycle.json --arm my-arm.toml -o cycle.csv --payload 2,0,0,0.08"
+    )]
+    Plan(PlanArgs),
+    /// Move to joint positions or to a pose of the arm file, from where the arm is
+    #[command(
+        after_help = "Straight in joint space, within the limits of velocity, acceleration, jerk and torque, checked before anything is\n\
+                            sent; nobody looks for obstacles. It runs and ends as `jtc traj run` does: on a terminal space pauses and resumes,\n\
+                            s stops, + and - change the speed; Ctrl-C stops on the path.\n\nExamples:\n  \
+                            jtc move --to home --arm my-arm.toml\n  jtc move --to 0,0.5,-1,0,0.5,0\n  \
+                            jtc move --to 0,30,-60,0,30,0 --deg --speed 20"
+    )]
+    Move(MoveArgs),
+    /// Named positions in the arm file
+    #[command(subcommand)]
+    Pose(PoseCommand),
     /// Trajectories: check, run, pause, resume, stop
     #[command(subcommand)]
     Traj(TrajCommand),
@@ -238,6 +262,7 @@ impl Command {
             self,
             Command::Demo(_)
                 | Command::Jog(_)
+                | Command::Move(_)
                 | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay(_))
                 | Command::Teach(TeachCommand::Record { .. })
         )

@@ -55,7 +55,8 @@ pub enum TrajCommand {
                             program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
                             moves; if that happens on the way (full disk), it is reported at once, the motion goes on as it was checked, and\n\
                             the command ends with exit code 5.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
-                            jtc traj run motion.csv --speed 10 --record run.mcap"
+                            jtc traj run motion.csv --speed 10 --record run.mcap\n  \
+                            jtc traj run cycle.csv --approach --repeat 10"
     )]
     Run(RunArgs),
     /// Run again what a recording is of: its last execution, along the commanded path
@@ -102,6 +103,18 @@ pub struct RunArgs {
     /// Points of a segment, 1 to 1500, in at most 100 segments; default: short enough for the CRC to be strong
     #[arg(long, env = "JTC_POINTS_PER_SEGMENT", value_name = "N")]
     pub points_per_segment: Option<usize>,
+    /// Run it so many times; a path that does not end where it begins needs --approach
+    #[arg(long, env = "JTC_REPEAT", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub repeat: u32,
+    #[command(flatten)]
+    pub files: RunFiles,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
+}
+
+/// Files that a run writes.
+#[derive(Args, Clone, Debug)]
+pub struct RunFiles {
     /// Record the motion, .mcap or .csv
     #[arg(long, env = "JTC_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -110,8 +123,6 @@ pub struct RunArgs {
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub force: ForceArgs,
-    #[command(flatten)]
-    pub accept: AcceptArgs,
 }
 
 /// `jtc teach …`

@@ -12,6 +12,7 @@ use jtc_host::doctor::Finding;
 use serde_json::json;
 
 use crate::args::ArmCommand;
+pub use show::poses as poses_table;
 
 /// Does one of the family.
 pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {

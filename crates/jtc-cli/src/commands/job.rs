@@ -43,6 +43,8 @@ pub struct Job {
     pub words: String,
     /// Percent of the file's own speed.
     speed: f64,
+    /// It is of no file: its motion is made once the arm's place is known.
+    made: bool,
 }
 
 impl Job {
@@ -66,11 +68,40 @@ impl Job {
         let config = arm.config();
         let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
         let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
-        Ok(Self { loaded, trajectory, arm, config, device: Config::avena(), words, speed: args.speed })
+        let device = Config::avena();
+        Ok(Self { loaded, trajectory, arm, config, device, words, speed: args.speed, made: false })
+    }
+
+    /// Of no file: the motion comes by [`Job::take`]. `words` is the command as it is typed.
+    pub fn made(arm: Arm, words: String, out: &Output) -> Self {
+        for warning in &arm.warnings {
+            out.note(format!("note: {warning}"));
+        }
+        let loaded = Loaded {
+            trajectory: Trajectory::default(),
+            form: Form::Csv,
+            notes: Vec::new(),
+            overshoot: Vec::new(),
+            units_named: true,
+        };
+        let (trajectory, config, device) = (Trajectory::default(), arm.config(), Config::avena());
+        Self { loaded, trajectory, arm, config, device, words, speed: 100.0, made: true }
+    }
+
+    /// The motion of this job.
+    pub fn take(&mut self, trajectory: Trajectory) {
+        self.loaded.trajectory = trajectory.clone();
+        self.trajectory = trajectory;
     }
 
     /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
     pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> String {
+        if self.made {
+            return format!(
+                "`jtc status` shows where the arm is; `jtc {}` plans it anew from there",
+                self.words
+            );
+        }
         if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
             let words = &self.words;
             let columns = match self.loaded.form {
@@ -137,7 +168,8 @@ impl Job {
 
     /// A failure of this job, with the file's name where its hint leaves it open.
     pub fn named(&self, failure: Failure) -> Failure {
-        let hint = failure.hint.replace("traj run FILE", &format!("traj run {}", self.words));
+        let again = if self.made { self.words.clone() } else { format!("traj run {}", self.words) };
+        let hint = failure.hint.replace("traj run FILE", &again);
         Failure { hint, ..failure }
     }
 

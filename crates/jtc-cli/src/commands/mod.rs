@@ -15,9 +15,12 @@ mod jog;
 mod log;
 mod maintain;
 mod monitor;
+mod moves;
 mod params;
 mod payload;
+mod plan;
 mod ports;
+mod pose;
 mod report;
 mod reset;
 mod run;
@@ -47,6 +50,9 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Params(command) => params::params(&command, out),
         Command::Bench(command) => bench::bench(&command, out),
         Command::Payload(command) => payload::payload(&command, out),
+        Command::Plan(args) => plan::plan(&args, out),
+        Command::Move(args) => moves::move_to(&args, out),
+        Command::Pose(command) => pose::pose(&command, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),
         Command::Log(command) => log::log(&command, out),

@@ -1,43 +1,106 @@
-//! `jtc traj run`: check, upload, execute, follow, report.
+//! `jtc traj run`, and what other commands that move along a path share with it: check, upload, execute, follow, report.
 
 mod approach;
+mod conclude;
+mod leg;
+mod outputs;
 
-use std::path::Path;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::path::PathBuf;
+use std::time::Duration;
 
-use cli_kit::{ErrorKind, Failure, Output, OutputFile};
-use jtc_host::check::{ProblemKind, Verdict};
+use cli_kit::{ErrorKind, Failure, Output};
+use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
-use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
-use jtc_host::report::{self, ReportInput, RunFailure, Summary};
-use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
+use jtc_host::recording::{Format, RecordingInfo};
+use jtc_host::report::Summary;
+use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{
-    CheckError, CheckOptions, CheckedTrajectory, Error, MotionError, Sample, Session, StateError, words,
-};
-use jtc_wire::{ControllerState, Status};
-use serde_json::json;
+use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Session, StateError, words};
+use jtc_wire::{ControllerState, Joint, Status};
 
-use super::job::Job;
+use super::job::{Job, typed};
 use super::run_report;
-use crate::args::RunArgs;
-use crate::failure::output_lost;
+use crate::args::{LinkArgs, RunArgs, RunFiles};
 use crate::limits;
 use crate::operator::Operator;
 use crate::progress::Progress;
-use crate::tape::Tape;
+use conclude::{Done, Legs, conclude};
+use leg::{APPROACH, Leg, Reel, cancelled};
+use outputs::Outputs;
 
 /// How long the drives may take: 4 s for their first enable.
 pub(super) const BRING_UP: Duration = Duration::from_secs(15);
 
+/// What a motion is run with, whichever command asks for it.
+#[derive(Clone, Debug)]
+pub struct Course {
+    pub link: LinkArgs,
+    /// As recordings name it.
+    pub name: String,
+    /// Whose first point an approach leads to, as it is typed.
+    pub words: String,
+    /// Files that the command reads, which are no outputs.
+    pub inputs: Vec<PathBuf>,
+    /// Those that it writes.
+    pub files: RunFiles,
+    /// The arm was named, and has to be that of the controller.
+    pub arm_named: bool,
+    pub accept_device_limits: bool,
+    /// Where the arm stands elsewhere it is moved to the first point.
+    pub approach: bool,
+    /// Speed of an approach at most, %.
+    pub speed_pct: f64,
+    pub points_per_segment: Option<usize>,
+    /// How often the motion is run.
+    pub repeat: u32,
+}
+
+/// Makes the trajectory of a job once it is known where the arm stands.
+pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status) -> Result<(), Failure>;
+
+impl Course {
+    /// That of a trajectory file.
+    pub fn of(args: &RunArgs) -> Self {
+        let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        Self {
+            link: args.link.clone(),
+            name,
+            words: typed(&args.file),
+            inputs: std::iter::once(args.file.clone()).chain(args.check.arm.clone()).collect(),
+            files: args.files.clone(),
+            arm_named: args.check.arm.is_some(),
+            accept_device_limits: args.accept.accept_device_limits,
+            approach: args.approach,
+            speed_pct: args.check.speed,
+            points_per_segment: args.points_per_segment,
+            repeat: args.repeat,
+        }
+    }
+
+    fn upload(&self) -> UploadOptions {
+        UploadOptions { points_per_segment: self.points_per_segment, number: 0 }
+    }
+}
+
 /// Runs a trajectory from a file.
 pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
+    let course = Course::of(args);
+    perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
+}
+
+/// Runs a job: that of a file as it is, or one whose motion is made once the arm's place is known.
+pub fn perform(
+    course: &Course,
+    load: impl FnOnce(&Output) -> Result<Job, Failure>,
+    make: Option<Make<'_>>,
+    out: &Output,
+) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    if let Some(path) = &args.record {
+    if let Some(path) = &course.files.record {
         Format::of(path)?; // a wrong ending is reported before anything moves
     }
-    let mut job = Job::load(&args.file, &args.check, out)?;
-    perform(args, &mut job, &progress, out).map_err(|failure| job.named(failure))
+    let mut job = load(out)?;
+    drive(course, &mut job, make, &progress, out).map_err(|failure| job.named(failure))
 }
 
 /// The arm of the controller and that of the job are one (J-55): the controller's own where none was named, else a refusal. From
@@ -45,10 +108,10 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
 fn match_device(
     session: &mut Session<SerialPort>,
     job: &mut Job,
-    args: &RunArgs,
+    course: &Course,
     out: &Output,
 ) -> Result<(), Failure> {
-    let accepted = args.accept.accept_device_limits;
+    let accepted = course.accept_device_limits;
     let info = session.info()?;
     job.device = session.device_config()?;
     match info {
@@ -56,12 +119,12 @@ fn match_device(
         Some(info) if job.arm.hash().ok().flatten() == Some(info.hash) => {}
         Some(info) => {
             let has = session.device_arm()?;
-            if args.check.arm.is_none() {
+            if course.arm_named {
+                limits::same_arm(&job.arm, &has, accepted, out)?;
+            } else {
                 let name = if has.name == job.arm.name { "as it is set" } else { info.arm.as_str() };
                 out.note(format!("note: checked for the arm of the controller, {name}"));
                 job.arm = has;
-            } else {
-                limits::same_arm(&job.arm, &has, accepted, out)?;
             }
         }
     }
@@ -77,23 +140,53 @@ fn match_device(
     Ok(())
 }
 
-fn perform(args: &RunArgs, job: &mut Job, progress: &Progress, out: &Output) -> Result<(), Failure> {
-    let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
-    let verdict = job.verdict(&job.trajectory, None, options);
+/// A motion that is known before the arm is asked passes the check first, and one that is repeated leads back to its start.
+fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
+    let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {
         return Err(job.refuse(&verdict, out));
     }
     for warning in verdict.warnings() {
         out.note(format!("warning: {warning}"));
     }
+    let ends = job.trajectory.points.first().zip(job.trajectory.points.last());
+    let gap = |(first, last): (&jtc_host::Point, &jtc_host::Point)| {
+        let away = |joint: &Joint| (last.position[joint.index()] - first.position[joint.index()]).abs();
+        let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)))?;
+        Some((furthest, away(&furthest))).filter(|(_, far)| *far > job.config.start_tolerance_rad)
+    };
+    match ends.and_then(gap) {
+        Some((joint, far)) if course.repeat > 1 && !course.approach => {
+            let message = format!(
+                "{} ends {far:.3} rad from where it begins ({joint}), more than {} rad: it cannot be repeated as it is; nothing was sent",
+                course.words, job.config.start_tolerance_rad
+            );
+            Err(Failure::new(ErrorKind::Refused, "open-path", message)
+                .hint("`--approach` leads back to its first point before each run; or let the path end where it begins"))
+        }
+        _ => Ok(()),
+    }
+}
 
-    let mut outputs = Outputs::open(args).map_err(Failure::nothing_sent)?;
+fn drive(
+    course: &Course,
+    job: &mut Job,
+    make: Option<Make<'_>>,
+    progress: &Progress,
+    out: &Output,
+) -> Result<(), Failure> {
+    if make.is_none() {
+        checked_before(course, job, out)?;
+    }
+    let outputs = Outputs::open(course).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out, progress)?;
-    let mut session = args.link.session()?;
+    let mut session = course.link.session()?;
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
-    match_device(&mut session, job, args, out)?;
-    let job = &*job;
+    match_device(&mut session, job, course, out)?;
+    if let Some(make) = make {
+        make(job, &status)?;
+    }
     let speed = session.speed()?;
     if speed < 1.0 {
         out.note(format!(
@@ -102,176 +195,127 @@ fn perform(args: &RunArgs, job: &mut Job, progress: &Progress, out: &Output) -> 
         ));
     }
     operator.speed = session.has_extensions().then_some((speed * 100.0).round() as u8);
-    let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let source = session.port().name();
-    let mut record = |phase: &str, start_unix_ns| {
-        let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
-        let info = run_report::info(&job.arm, &source, &name, start_unix_ns);
-        let tape = outputs.begin(&info, out)?;
-        Ok((info, tape))
-    };
-    let mut motion = job.checked(&job.trajectory, &status, args, options);
-    let mut broken_off = None;
-    if let Err(CheckError::Refused(verdict)) = &motion
-        && args.approach
-        && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
-    {
-        let path = approach::approach(job, &status, args, out)?;
-        let leg = Leg::run(&mut session, &path, APPROACH, &mut operator, &mut record)?;
-        if matches!(leg.outcome, Ok(Outcome::Finished(_))) {
-            // The recording is that of the motion.
-            if let Some(tape) = leg.tape {
-                tape.abandon();
-            }
-            // From where the approach ended, not from where it should have.
-            motion = job.checked(&job.trajectory, &session.fresh_status()?, args, options);
-        } else {
-            broken_off = Some((leg, path));
-        }
-    }
-    let (leg, checked) = match broken_off {
-        Some(ended) => ended,
-        None => {
-            let motion = motion.map_err(|e| job.not_checked(e, out))?;
-            (Leg::run(&mut session, &motion, "motion", &mut operator, &mut record)?, motion)
-        }
-    };
+    let mut stage = Stage { course, job, outputs, out, reel: None };
+    let legs = stage.legs(&mut session, &mut operator, status)?;
     drop(operator);
-    conclude(job, leg, checked.verdict(), &session, outputs, out)
+    let Stage { outputs, reel, .. } = stage;
+    // Each motion begins it before it moves.
+    let reel =
+        reel.unwrap_or_else(|| Reel { info: RecordingInfo::of(&job.arm), tape: None, start: Duration::ZERO });
+    conclude(job, legs, reel, &session, outputs, out)
 }
 
-/// Writes the files of a run and prints how it ended.
-fn conclude(
-    job: &Job,
-    leg: Leg,
-    verdict: &Verdict,
-    session: &Session<SerialPort>,
+/// A run in the making.
+struct Stage<'a> {
+    course: &'a Course,
+    job: &'a Job,
     outputs: Outputs,
-    out: &Output,
-) -> Result<(), Failure> {
-    let Leg { phase, upload, mut info, tape, samples, outcome } = leg;
-    let link = session.statistics();
-    // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
-    let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
-    let broken = outcome.as_ref().err().map(|e| {
-        let found = RunFailure::find(&info, &samples);
-        let found = found.unwrap_or_else(|| RunFailure::ended_by(&info, &samples, e.to_string()));
-        match e {
-            Error::Motion(MotionError::RunFault { status, .. }) => found.with_status(status),
-            _ => found,
-        }
-    });
-    let word = match &outcome {
-        Ok(Outcome::Finished(_)) => "finished",
-        Ok(Outcome::Stopped(_)) => "stopped",
-        Err(_) => "fault",
-    };
-    let where_ =
-        if phase == APPROACH { format!(" on the {APPROACH} to the first point") } else { String::new() };
-    let reason = match &outcome {
-        Ok(_) => where_.trim_start().to_owned(),
-        Err(e) if where_.is_empty() => e.to_string(),
-        Err(e) => format!("{}: {e}", where_.trim_start()),
-    };
-    info.ending = Ending { outcome: word.into(), reason };
-    let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
-    let (files, lost) = outputs.write(tape, &input);
-    let summary = Summary::of(&info, &samples);
-    // A file that is lost is reported even when the run failed, but the run comes first.
-    for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
-        out.note(format!("jtc: {}", failure.message));
-    }
-    let of_run = outcome
-        .as_ref()
-        .err()
-        .map(|e| job.named(Failure { message: info.ending.reason.clone(), ..Failure::of(e) }));
-    let failure = of_run.or(lost.into_iter().next());
-    let error = failure.as_ref().map(Failure::to_json);
-    let value = json!({
-        "outcome": word,
-        "phase": phase,
-        "recorded_s": summary.recorded_s,
-        "executed_s": summary.executed_s,
-        "samples": summary.samples,
-        "joints": summary.joints,
-        "failure": broken,
-        "verdict": verdict,
-        "upload": upload,
-        "link": link,
-        "files": files,
-        "error": error,
-    });
-    out.result(&value, || {
-        let made: String = files.iter().map(|f| format!("\n{f}")).collect();
-        let line = run_report::link_line(&upload, &link);
-        format!(
-            "\n{word}{where_}: {:.2} s\n{}\n{line}{made}",
-            summary.executed_s,
-            run_report::verdict(broken.as_ref(), &summary)
-        )
-    });
-    match (outcome, failure) {
-        (_, Some(failure)) if out.is_json() => {
-            out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-            Err(Failure::printed(failure.kind))
-        }
-        (_, Some(failure)) => Err(failure),
-        (Ok(Outcome::Stopped(_)), None) => Err(Failure::printed(ErrorKind::Fault)),
-        (_, None) => Ok(()),
-    }
+    out: &'a Output,
+    reel: Option<Reel>,
 }
 
-/// The phase that a run begins with where the arm stands elsewhere.
-const APPROACH: &str = "approach";
+impl Stage<'_> {
+    /// All motions, until one is not finished or all are done.
+    fn legs(
+        &mut self,
+        session: &mut Session<SerialPort>,
+        operator: &mut Operator,
+        mut status: Status,
+    ) -> Result<Legs, Failure> {
+        let (mut done, mut samples) = (Vec::new(), Vec::new());
+        let repeat = self.course.repeat.max(1);
+        for n in 1..=repeat {
+            let (checked, phase) = self.next(&status)?;
+            let mut leg = self.leg(session, &checked, phase, operator)?;
+            let mut verdict = checked.verdict().clone();
+            if phase == APPROACH && leg.is_finished() {
+                self.approached(n == 1, leg, &mut done, &mut samples);
+                // From where the approach ended, not from where it should have.
+                let checked = self.job.checked(&self.job.trajectory, &session.fresh_status()?, self.course);
+                let checked = checked.map_err(|e| self.job.not_checked(e, self.out))?;
+                verdict = checked.verdict().clone();
+                leg = self.leg(session, &checked, "motion", operator)?;
+            }
+            let over = n == repeat || !leg.is_finished();
+            let cut = !over && operator.wants_the_end();
+            if over || cut {
+                return Ok(Legs { done, samples, last: leg, verdict, cut });
+            }
+            self.out.note(format!("run {n} of {repeat} finished"));
+            self.take(leg, &mut done, &mut samples);
+            status = session.fresh_status()?;
+        }
+        Err(cancelled("run"))
+    }
 
-/// One motion of a run, with what was seen of it.
-struct Leg {
-    phase: &'static str,
-    upload: UploadReport,
-    info: RecordingInfo,
-    tape: Option<Tape>,
-    samples: Vec<Sample>,
-    outcome: Result<Outcome, Error>,
-}
+    /// The motion from where the arm stands, or the way to its first point where that is asked for and needed.
+    fn next(&self, status: &Status) -> Result<(CheckedTrajectory, &'static str), Failure> {
+        let (job, course) = (self.job, self.course);
+        let refused = match job.checked(&job.trajectory, status, course) {
+            Ok(checked) => return Ok((checked, "motion")),
+            Err(error) => error,
+        };
+        if let CheckError::Refused(verdict) = &refused
+            && course.approach
+            && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
+        {
+            return Ok((approach::approach(job, status, course, self.out)?, APPROACH));
+        }
+        Err(job.not_checked(refused, self.out))
+    }
 
-impl Leg {
-    /// Uploads and executes. An error before the motion begins is the command's own; one in motion is the outcome.
-    fn run(
+    /// Runs one motion; the recording is begun with the first one.
+    fn leg(
+        &mut self,
         session: &mut Session<SerialPort>,
         checked: &CheckedTrajectory,
         phase: &'static str,
         operator: &mut Operator,
-        record: &mut impl FnMut(&str, u64) -> Result<(RecordingInfo, Option<Tape>), Failure>,
-    ) -> Result<Self, Failure> {
-        let warnings: Vec<String> = checked.verdict().warnings().map(ToString::to_string).collect();
-        let (points, duration_s) = (checked.trajectory().points.len(), checked.trajectory().duration_s());
-        let value =
-            json!({ "phase": phase, "duration_s": duration_s, "points": points, "warnings": warnings });
-        operator.progress.event("checked", value);
-        let upload = upload(session, checked, phase, operator)?;
-        operator.progress.event("uploaded", run_report::uploaded(phase, &upload));
-        if operator.wants_the_end() {
-            return Err(cancelled("upload"));
-        }
-        let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
-        let (info, tape) = record(phase, start_unix_ns).map_err(not_started)?;
-        let Run { outcome, samples } =
-            execute(session, checked, phase, tape.as_ref().map(Tape::sink), operator);
-        operator.progress.watch(session);
-        Ok(Self { phase, upload, info, tape, samples, outcome })
+    ) -> Result<Leg, Failure> {
+        let (job, course, out) = (self.job, self.course, self.out);
+        let source = session.port().name();
+        let (outputs, reel) = (&mut self.outputs, &mut self.reel);
+        let mut record = |phase: &str, start_unix_ns, now: Duration| {
+            if reel.is_none() {
+                let name = &course.name;
+                let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
+                let info = run_report::info(&job.arm, &source, &name, start_unix_ns);
+                let tape = outputs.begin(&info, out)?;
+                *reel = Some(Reel { info, tape, start: now });
+            }
+            let begun = reel.as_ref().map(|reel| {
+                let sink = reel.tape.as_ref().map(crate::tape::Tape::sink);
+                (sink, now.saturating_sub(reel.start).as_secs_f64())
+            });
+            Ok(begun.unwrap_or_default())
+        };
+        Leg::run(session, checked, phase, operator, &mut record)
     }
-}
 
-/// The person ended the command before it moved anything; `during` names what went on.
-fn cancelled(during: &str) -> Failure {
-    let message = format!("cancelled during the {during}; the motion was not started");
-    Failure { message, ..Failure::of(&Error::Cancelled) }
-}
+    /// An approach is over. The recording is that of the motion: before the first one it is begun again.
+    fn approached(
+        &mut self,
+        first: bool,
+        leg: Leg,
+        done: &mut Vec<Done>,
+        samples: &mut Vec<jtc_host::Sample>,
+    ) {
+        if !first {
+            return self.take(leg, done, samples);
+        }
+        if let Some(Reel { info, tape, .. }) = self.reel.take() {
+            done.push(Done { phase: leg.phase, summary: Summary::of(&info, &leg.samples) });
+            if let Some(tape) = tape {
+                tape.abandon();
+            }
+        }
+    }
 
-/// An output cannot be written, and nothing moved yet.
-fn not_started(failure: Failure) -> Failure {
-    Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
-        .hint("make room or name another place, and run again")
+    fn take(&mut self, leg: Leg, done: &mut Vec<Done>, samples: &mut Vec<jtc_host::Sample>) {
+        let Some(reel) = &self.reel else { return };
+        done.push(Done { phase: leg.phase, summary: Summary::of(&reel.info, &leg.samples) });
+        samples.extend(leg.samples);
+    }
 }
 
 /// Waits until the controller holds the arm with all drives enabled.
@@ -317,11 +361,11 @@ impl Job {
         &self,
         trajectory: &Trajectory,
         status: &Status,
-        args: &RunArgs,
-        upload: UploadOptions,
+        course: &Course,
     ) -> Result<CheckedTrajectory, CheckError> {
-        let accept_device_limits = args.accept.accept_device_limits;
-        let options = CheckOptions { upload, accept_device_limits, device: self.device.clone() };
+        let accept_device_limits = course.accept_device_limits;
+        let options =
+            CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() };
         CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)
     }
 
@@ -331,91 +375,5 @@ impl Job {
             CheckError::Refused(verdict) => self.refuse(&verdict, out),
             other => other.into(),
         }
-    }
-}
-
-fn upload(
-    session: &mut Session<SerialPort>,
-    checked: &CheckedTrajectory,
-    phase: &str,
-    operator: &Operator,
-) -> Result<UploadReport, Failure> {
-    operator.out.note(format!("uploading {} points", checked.trajectory().points.len()));
-    let bar = operator.out.bar(1, if phase == APPROACH { APPROACH } else { "upload" });
-    let report = session.upload(checked, |p| {
-        bar.set_length(p.segments as u64);
-        bar.set_position(p.segments_done as u64);
-        operator.progress.uploading(phase, p);
-        if operator.wants_the_end() { Flow::Cancel } else { Flow::Continue }
-    });
-    bar.finish_and_clear();
-    match report {
-        Err(Error::Cancelled) => Err(cancelled("upload")),
-        other => Ok(other?),
-    }
-}
-
-fn execute(
-    session: &mut Session<SerialPort>,
-    checked: &CheckedTrajectory,
-    what: &str,
-    sink: Option<SampleSink>,
-    operator: &mut Operator,
-) -> Run {
-    operator.motion_begins();
-    let duration_s = checked.trajectory().duration_s();
-    operator.progress.event("executing", json!({ "phase": what, "duration_s": duration_s }));
-    let bar = operator.out.motion_bar((duration_s * 1e3) as u64, what, operator.keys());
-    let record = move |sample: &Sample| {
-        if let Some(sink) = &sink {
-            sink.write(sample);
-        }
-    };
-    let run = session.run_observed(checked, record, |s| {
-        bar.set_position(u64::from(s.point));
-        bar.set_message(run_report::motion_line(s));
-        operator.progress.see(s);
-        operator.wish(s)
-    });
-    operator.motion_ended();
-    bar.finish_and_clear();
-    run
-}
-
-/// Files of a run, open since before it.
-struct Outputs {
-    record: Option<OutputFile>,
-    report: Option<OutputFile>,
-}
-
-impl Outputs {
-    fn open(args: &RunArgs) -> Result<Self, Failure> {
-        let mut others: Vec<&Path> = vec![&args.file];
-        others.extend(args.check.arm.as_deref());
-        let force = args.force.force;
-        let record = args.record.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
-        others.extend(args.record.as_deref());
-        let report = args.report.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
-        Ok(Self { record, report })
-    }
-
-    /// Begins the recording, from its start where it was begun before.
-    fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
-        self.record.as_mut().map(|file| Tape::begin(file, info, "the motion goes on", out)).transpose()
-    }
-
-    /// Completes all of them; one that is lost does not cost the other. Returns the names of those that are whole.
-    fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
-        let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
-        let report =
-            self.report.map(|file| (file.name(), file.write(report::html(input)).map_err(output_lost)));
-        let (mut files, mut lost) = (Vec::new(), Vec::new());
-        for (name, done) in record.into_iter().chain(report) {
-            match done {
-                Ok(()) => files.push(name),
-                Err(e) => lost.push(e),
-            }
-        }
-        (files, lost)
     }
 }

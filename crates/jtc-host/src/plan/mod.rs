@@ -45,6 +45,8 @@ const SHARE: f64 = 0.98;
 /// Share of the torque limit that a plan uses: the rest is for the controller's own corrections, or it would be at its limit for longer
 /// than it may (J-43).
 const TORQUE_SHARE: f64 = 0.9;
+/// Bearing temperature that a plan reckons with, °C: that of a cold hall. Friction is higher there than at the usual temperature.
+pub const COLD: f64 = 20.0;
 /// A motion that is slowed down by more than this is none any more.
 const SLOWEST: f64 = 50.0;
 /// Least and most by which one step slows a motion down.
@@ -59,6 +61,8 @@ pub struct Planner<'a> {
     pub model: Option<&'a ArmModel>,
     /// Friction compensation that the controller will add to it.
     pub friction: Option<&'a Friction>,
+    /// Lowest bearing temperature, °C, at which the friction may have to be overcome.
+    pub temperature: f64,
     /// Speed, 1 to 100 % of what the limits allow.
     pub speed_pct: f64,
     /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each waypoint.
@@ -101,7 +105,16 @@ impl<'a> Planner<'a> {
     /// Within the limits of `config` alone, as fast as they allow, with a stop at each waypoint.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
-        Self { config, model: None, friction: None, speed_pct: 100.0, blend: 0.0, jerk: true, upload }
+        Self {
+            config,
+            model: None,
+            friction: None,
+            temperature: COLD,
+            speed_pct: 100.0,
+            blend: 0.0,
+            jerk: true,
+            upload,
+        }
     }
 
     /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer.
@@ -113,7 +126,7 @@ impl<'a> Planner<'a> {
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let (limits, arm) = (self.limits(&[*from, *to])?, self.dynamics());
         let motion = jtc_plan::point_to_point(from, to, &limits, arm.as_ref())?;
-        self.checked(&motion, Some(*from), false)
+        self.checked(&motion, from, Some(*from), false)
     }
 
     /// Through waypoints, from rest to rest: straight legs in joint space, with corners rounded within the blend. Times that are given
@@ -126,11 +139,12 @@ impl<'a> Planner<'a> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         let (limits, arm) = (self.limits(&positions)?, self.dynamics());
         let motion = jtc_plan::through(waypoints, self.blend, &limits, arm.as_ref())?;
-        self.checked(&motion, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
+        let first = positions.first().copied().unwrap_or_default();
+        self.checked(&motion, &first, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
     }
 
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {
-        self.model.map(|model| ArmDynamics::new(self.config, model, self.friction))
+        self.model.map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
     }
 
     /// What a plan keeps to. A place that takes more than the usual share of a torque to be held, but not too much, can be left again.
@@ -158,6 +172,7 @@ impl<'a> Planner<'a> {
     fn checked(
         &self,
         motion: &Motion,
+        first: &[f64; JOINTS],
         start: Option<[f64; JOINTS]>,
         timed: bool,
     ) -> Result<Planned, PlanError> {
@@ -171,8 +186,10 @@ impl<'a> Planner<'a> {
         let (mut stretch, mut slowed) = (1.0, None::<Problem>);
         loop {
             let step = step_ms(motion.duration() * stretch)?;
-            let sampled = sampled(motion, stretch, step, timed)?;
-            let verdict = checker.check(&sampled.trajectory);
+            let sampled = sampled(motion, first, stretch, step, timed)?;
+            // Cold, and as before a run: where friction brakes, it is its lack that costs torque.
+            let cold = Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
+            let verdict = if cold.is_ok() { checker.check(&sampled.trajectory) } else { cold };
             let Some(worst) = verdict.refusals().next().cloned() else {
                 let scale = sampled.scale;
                 return Ok(Planned {

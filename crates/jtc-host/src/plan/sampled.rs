@@ -37,12 +37,18 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
 }
 
 /// The motion in `stretch` times its time. It takes a whole number of steps: without given times it is stretched by what is missing;
-/// where they are to be `kept`, the arm rests for the rest of the last step. The last point is exactly where the motion ends.
+/// where they are to be `kept`, the arm rests for the rest of the last step. The first point is `first`, the last one exactly where the motion ends.
 ///
 /// # Errors
 ///
 /// [`PlanError::TooLong`] where the step is too long for the motion's corners.
-pub(super) fn sampled(motion: &Motion, stretch: f64, step_ms: u16, kept: bool) -> Result<Sampled, PlanError> {
+pub(super) fn sampled(
+    motion: &Motion,
+    first: &[f64; JOINTS],
+    stretch: f64,
+    step_ms: u16,
+    kept: bool,
+) -> Result<Sampled, PlanError> {
     let h = f64::from(step_ms) * 1e-3;
     let seconds = motion.duration() * stretch;
     let steps = ((seconds / h - 1e-6).ceil() as usize).clamp(1, POINTS_MAX - 1);
@@ -51,9 +57,9 @@ pub(super) fn sampled(motion: &Motion, stretch: f64, step_ms: u16, kept: bool) -
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // Without a limit of jerk the acceleration jumps at the start; either side of the jump is right.
-    if let Some(first) = points.first_mut() {
-        first.velocity = [0.0; JOINTS];
+    // Both ends are what was asked for, to the last bit. Where the acceleration jumps at the start, either side of the jump is right.
+    if let Some(point) = points.first_mut() {
+        (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }
     points.push(rest);
     let aside = aside(&points, h, at);

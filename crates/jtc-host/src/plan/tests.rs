@@ -40,8 +40,7 @@ proptest! {
             Ok(planned) => {
                 let verdict = Checker { model, friction: friction.as_ref(), ..Checker::new(&config) }.check(&planned.trajectory);
                 prop_assert!(verdict.is_ok(), "{verdict}");
-                let first = planned.trajectory.points[0].position;
-                prop_assert!((0..JOINTS).all(|j| (first[j] - places[0][j]).abs() < 1e-9));
+                prop_assert_eq!(planned.trajectory.points[0].position, places[0]);
                 prop_assert_eq!(planned.trajectory.points.last().unwrap().position, *places.last().unwrap());
                 prop_assert_eq!(planned.waypoint_times.len(), places.len());
                 let end = planned.trajectory.duration_s() + 1e-9;

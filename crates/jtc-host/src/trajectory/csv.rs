@@ -231,6 +231,16 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
 impl Trajectory {
     /// As CSV with a header, all channels, full precision.
     pub fn to_csv(&self) -> String {
+        self.csv_with(|v| format!(",{v}"))
+    }
+
+    /// The same with 17 significant digits in each number.
+    pub fn to_exact_csv(&self) -> String {
+        // Adding zero makes −0 a plain one.
+        self.csv_with(|v| format!(",{:.16e}", v + 0.0))
+    }
+
+    fn csv_with(&self, number: impl Fn(f64) -> String) -> String {
         let mut out = String::from("t");
         for c in 0..3 * JOINTS {
             let _ = write!(out, ",{}", channel_name(c));
@@ -239,7 +249,7 @@ impl Trajectory {
         for (i, p) in self.points.iter().enumerate() {
             let _ = write!(out, "{}", (i * usize::from(self.step_ms)) as f64 / 1000.0);
             for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
-                let _ = write!(out, ",{v}");
+                out += &number(*v);
             }
             out.push('\n');
         }

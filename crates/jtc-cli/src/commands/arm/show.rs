@@ -148,7 +148,7 @@ fn of_controller(values: &[ArmValue]) -> String {
 }
 
 /// A row for each pose.
-pub(in crate::commands) fn poses(arm: &Arm, deg: bool) -> String {
+pub fn poses(arm: &Arm, deg: bool) -> String {
     let row = |(name, position): (&String, &[f64; 6])| {
         let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));
         std::iter::once(name.clone()).chain(cells).collect()

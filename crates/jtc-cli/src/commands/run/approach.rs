@@ -1,52 +1,49 @@
 //! The way from where the arm stands to the first point of a trajectory.
 
-use std::path::Path;
-
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::CheckError;
 use jtc_host::check::CheckedTrajectory;
 use jtc_host::plan::Planner;
-use jtc_host::session::UploadOptions;
 use jtc_wire::Status;
 use serde_json::json;
 
-use super::super::job::{Job, typed};
-use super::APPROACH;
-use crate::args::RunArgs;
+use super::super::job::Job;
+use super::{APPROACH, Course};
 
 /// A motion to the first point, checked.
 pub fn approach(
     job: &Job,
     status: &Status,
-    args: &RunArgs,
+    course: &Course,
     out: &Output,
 ) -> Result<CheckedTrajectory, Failure> {
     let here = status.positions();
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
     // Half of the limits: nobody has looked at this path for obstacles.
-    let speed = args.check.speed.min(50.0);
+    let speed = course.speed_pct.min(50.0);
     let friction = job.arm.friction();
     let planner = Planner { speed_pct: speed, ..job.planner(friction.as_ref()) };
-    let path = planner.to(&here, &first).map_err(|e| refused(&e.to_string(), &args.file))?.trajectory;
-    let checked = job.checked(&path, status, args, UploadOptions::default()).map_err(|e| {
-        let CheckError::Refused(verdict) = e else { return e.into() };
-        let failure = refused(&verdict.to_string(), &args.file);
-        if !out.is_json() {
-            return failure;
-        }
-        let error = failure.to_json();
-        let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
-        out.result(&value, String::new);
-        out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-        Failure::printed(failure.kind)
-    })?;
+    let path = planner.to(&here, &first).map_err(|e| refused(&e.to_string(), &course.words))?.trajectory;
+    let checked =
+        job.checked(&path, status, &Course { points_per_segment: None, ..course.clone() }).map_err(|e| {
+            let CheckError::Refused(verdict) = e else { return e.into() };
+            let failure = refused(&verdict.to_string(), &course.words);
+            if !out.is_json() {
+                return failure;
+            }
+            let error = failure.to_json();
+            let value =
+                json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
+            out.result(&value, String::new);
+            out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
+            Failure::printed(failure.kind)
+        })?;
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
     Ok(checked)
 }
 
 /// The way to the first point cannot be gone; the trajectory itself is sound.
-fn refused(why: &str, file: &Path) -> Failure {
-    let file = typed(file);
+fn refused(why: &str, file: &str) -> Failure {
     let message =
         format!("the straight way from where the arm stands to the first point of {file} is refused: {why}");
     let hint = format!(
@@ -63,7 +60,7 @@ mod tests {
     /// The file that was typed passed its check: what is refused is the way to it.
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
-        let failure = refused("joint 2: no stop in time", Path::new("my motion.csv"));
+        let failure = refused("joint 2: no stop in time", "'my motion.csv'");
         assert_eq!((failure.kind, failure.code), (ErrorKind::Refused, "approach"));
         assert!(failure.message.contains("first point of 'my motion.csv' is refused: joint 2"));
         assert!(

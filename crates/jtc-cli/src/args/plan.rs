@@ -1,0 +1,159 @@
+//! `jtc plan`, `jtc move`, `jtc pose`: motions made here, and the poses that they lead to.
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, Subcommand};
+use jtc_wire::JOINTS;
+
+use super::{AcceptArgs, ForceArgs, LinkArgs, RunFiles};
+
+/// Options of `jtc plan`.
+#[derive(Args, Debug)]
+pub struct PlanArgs {
+    /// Waypoints, CSV or JSON
+    pub file: PathBuf,
+    /// Trajectory to write, CSV
+    #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+    pub out: PathBuf,
+    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each
+    #[arg(long, env = "JTC_BLEND", value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub blend: f64,
+    /// Speed in percent of what the limits allow, 1 to 100
+    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
+    pub speed: f64,
+    /// Let the acceleration jump: faster, and harder on gears and load
+    #[arg(long, env = "JTC_NO_JERK_LIMIT", value_parser = FalseyValueParser::new())]
+    pub no_jerk_limit: bool,
+    /// Arm whose limits, masses and poses count, TOML or URDF; default: the built-in one
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    /// The numbers of the file are degrees, for files that do not name their unit
+    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    pub deg: bool,
+    /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m
+    #[arg(long, env = "JTC_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
+    pub payload: Option<jtc_core::Payload>,
+    /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque
+    #[arg(long, env = "JTC_TEMPERATURE", value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
+    pub temperature: f64,
+    /// Write a page with the motion, its limits and what binds when, .html
+    #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `jtc move`.
+#[derive(Args, Debug)]
+pub struct MoveArgs {
+    /// Joint positions, rad, or the name of a pose of the arm file
+    #[arg(long, env = "JTC_TO", value_name = "Q1,…,Q6|NAME", value_parser = target, allow_hyphen_values = true)]
+    pub to: Target,
+    /// The positions are degrees
+    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    pub deg: bool,
+    /// Speed in percent of what the limits allow, 1 to 100
+    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 50.0)]
+    pub speed: f64,
+    /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    #[command(flatten)]
+    pub link: LinkArgs,
+    #[command(flatten)]
+    pub files: RunFiles,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
+}
+
+/// Where a move leads.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// As typed, base to wrist.
+    Joints([f64; JOINTS]),
+    /// Name of a pose.
+    Pose(String),
+}
+
+/// Six numbers with commas between them, or a name.
+fn target(text: &str) -> Result<Target, String> {
+    let text = text.trim();
+    if !text.contains(',') && text.parse::<f64>().is_err() && !text.is_empty() {
+        return Ok(Target::Pose(text.to_owned()));
+    }
+    let number = |word: &str| {
+        let number = word.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        number.ok_or_else(|| format!("'{}' is no number", word.trim()))
+    };
+    let all = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let count = all.len();
+    let joints = all.try_into().map_err(|_| {
+        format!("{count} numbers, not 6: one for each joint, with commas between them and without blanks")
+    })?;
+    Ok(Target::Joints(joints))
+}
+
+/// `jtc pose …`
+#[derive(Debug, Subcommand)]
+pub enum PoseCommand {
+    /// Save where the arm is into the arm file
+    #[command(
+        after_help = "The arm stands still meanwhile. The rest of the file stays as it is, comments included.\n\nExamples:\n  \
+                            jtc pose save home --arm my-arm.toml\n  jtc pose save above-table --arm my-arm.toml --force"
+    )]
+    Save {
+        /// A letter, then letters, digits, _, - and .
+        name: String,
+        #[command(flatten)]
+        arm: PoseArm,
+        #[command(flatten)]
+        link: LinkArgs,
+        /// Write over a pose of this name
+        #[arg(long, env = "JTC_FORCE", value_parser = FalseyValueParser::new())]
+        force: bool,
+    },
+    /// All poses of the arm file
+    #[command(
+        after_help = "Examples:\n  jtc pose list --arm my-arm.toml\n  jtc --json pose list --arm my-arm.toml | jq .poses_rad.home"
+    )]
+    List {
+        #[command(flatten)]
+        arm: PoseArm,
+        /// Positions in degrees
+        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        deg: bool,
+    },
+    /// Take a pose out of the arm file
+    #[command(after_help = "Examples:\n  jtc pose remove above-table --arm my-arm.toml")]
+    Remove {
+        /// Name of the pose
+        name: String,
+        #[command(flatten)]
+        arm: PoseArm,
+    },
+}
+
+/// The file that holds the poses.
+#[derive(Args, Debug)]
+pub struct PoseArm {
+    /// Arm file, TOML; `jtc example arm` writes one, `jtc arm pull` that of the controller
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: PathBuf,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_is_six_numbers_or_a_name() {
+        assert_eq!(target("0, 0.5,-1,0,0,2e-1"), Ok(Target::Joints([0.0, 0.5, -1.0, 0.0, 0.0, 0.2])));
+        assert_eq!(target("home"), Ok(Target::Pose("home".into())));
+        for wrong in
+            ["", "1", "0,0,0,0,0", "0,0,0,0,0,0,0", "0,0,x,0,0,0", "0,0,nan,0,0,0", "inf", "0,,0,0,0,0"]
+        {
+            assert!(target(wrong).is_err(), "{wrong}");
+        }
+    }
+}

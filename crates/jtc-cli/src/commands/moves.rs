@@ -1,0 +1,78 @@
+//! `jtc move`: from where the arm is to joint positions or a pose.
+
+use cli_kit::{Failure, Output};
+use jtc_host::arm::Arm;
+use jtc_host::plan::{COLD, PlanError, Planner};
+
+use super::job::{Job, typed};
+use super::run::{Course, perform};
+use crate::args::{MoveArgs, Target};
+
+/// Plans the move once it is known where the arm stands, and runs it.
+pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
+    if !(1.0..=100.0).contains(&args.speed) {
+        return Err(Failure::nothing_sent(PlanError::Speed { percent: args.speed, most: 100.0 }));
+    }
+    let name = match &args.to {
+        Target::Pose(name) => name.clone(),
+        Target::Joints(q) => q.map(|v| format!("{v}")).join(","),
+    };
+    let course = Course {
+        link: args.link.clone(),
+        name: format!("move to {name}"),
+        words: name.clone(),
+        inputs: args.arm.iter().cloned().collect(),
+        files: args.files.clone(),
+        arm_named: args.arm.is_some(),
+        accept_device_limits: args.accept.accept_device_limits,
+        approach: false,
+        speed_pct: args.speed,
+        points_per_segment: None,
+        repeat: 1,
+    };
+    let words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
+    let arm = args
+        .arm
+        .as_deref()
+        .map(Arm::load)
+        .transpose()
+        .map_err(Failure::nothing_sent)?
+        .unwrap_or_else(Arm::avena);
+    let target = match &args.to {
+        Target::Joints(q) if args.deg => q.map(f64::to_radians),
+        Target::Joints(q) => *q,
+        Target::Pose(name) => arm.pose(name).map_err(Failure::nothing_sent)?,
+    };
+    let mut make = |job: &mut Job, status: &jtc_wire::Status| {
+        let friction = job.arm.friction();
+        let temperature = coldest(status);
+        let planner = Planner { speed_pct: args.speed, temperature, ..job.planner(friction.as_ref()) };
+        // The start is where the arm stands, the end what was asked for.
+        let planned = planner.to(&status.positions(), &target).map_err(|e| refused(&e, &name))?;
+        for note in &planned.notes {
+            out.note(format!("note: {note}"));
+        }
+        out.note(format!("move to {name}: {:.2} s", planned.trajectory.duration_s()));
+        job.take(planned.trajectory);
+        Ok(())
+    };
+    let load = |out: &Output| Ok(Job::made(arm, format!("move --to {name}{words}"), out));
+    perform(&course, load, Some(&mut make), out)
+}
+
+/// The lowest bearing temperature that is measured, °C, and no less than that of a cold hall where some are not.
+fn coldest(status: &jtc_wire::Status) -> f64 {
+    let measured = status.joints.iter().map(|joint| f64::from(joint.temperature));
+    measured.fold(COLD, f64::min)
+}
+
+/// There is no such move. Its waypoints are where the arm stands and where it is to go.
+fn refused(error: &PlanError, name: &str) -> Failure {
+    let failure = Failure::of(error);
+    let message = failure.message.replacen("waypoint 1, ", "where the arm stands, ", 1).replacen(
+        "waypoint 2, ",
+        &format!("{name}, "),
+        1,
+    );
+    Failure::nothing_sent(Failure { message: format!("no move to {name}: {message}"), ..failure })
+}

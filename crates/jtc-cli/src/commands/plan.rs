@@ -1,0 +1,191 @@
+//! `jtc plan`: a trajectory through waypoints, as fast as the limits allow.
+
+use std::path::Path;
+
+use cli_kit::{Failure, Output, OutputFile, figure, table};
+use jtc_core::{Config, JOINTS};
+use jtc_dynamics::Dynamics;
+use jtc_host::arm::Arm;
+use jtc_host::plan::{Bound, PlanError, Planned, Planner};
+use jtc_host::report::{Facts, ReportInput, html};
+use jtc_host::waypoints::WaypointFile;
+use jtc_host::{JointSample, Point, Sample};
+use jtc_wire::{ControllerState, Joint, TrajectoryState};
+use serde_json::json;
+
+use super::job::typed;
+use super::run_report;
+use crate::args::PlanArgs;
+
+/// Rows of the page that list what binds.
+const ROWS_MAX: usize = 200;
+
+/// Plans, checks and writes.
+pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
+    if !(-40.0..=120.0).contains(&args.temperature) {
+        return Err(Failure::usage(format!("--temperature {} °C is outside -40..120", args.temperature)));
+    }
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    for warning in &arm.warnings {
+        out.note(format!("note: {warning}"));
+    }
+    let file = WaypointFile::load(&args.file)?;
+    let file = if args.deg { file.in_degrees()? } else { file };
+    let waypoints = file.positions(&arm)?;
+    let mut inputs: Vec<&Path> = vec![&args.file];
+    inputs.extend(args.arm.as_deref());
+    let trajectory = OutputFile::open(&args.out, args.force.force, &inputs)?;
+    inputs.push(&args.out);
+    let page =
+        args.report.as_deref().map(|page| OutputFile::open(page, args.force.force, &inputs)).transpose()?;
+    let config = Config { payload: args.payload.unwrap_or_default(), ..arm.config() };
+    let friction = arm.friction();
+    let planner = Planner {
+        model: Some(&arm.model),
+        friction: friction.as_ref(),
+        temperature: args.temperature,
+        speed_pct: args.speed,
+        blend: args.blend,
+        jerk: !args.no_jerk_limit,
+        ..Planner::new(&config)
+    };
+    let planned = planner.through(&waypoints).map_err(|e| located(e, &file))?;
+    for note in &planned.notes {
+        out.note(format!("note: {note}"));
+    }
+    for warning in planned.verdict.warnings() {
+        out.note(format!("warning: {warning}"));
+    }
+    trajectory.write(planned.trajectory.to_exact_csv())?;
+    if let Some(page) = page {
+        page.write(report(&planned, &arm, &config, args))?;
+    }
+    print(&planned, waypoints.len(), args, out);
+    Ok(())
+}
+
+/// With the lines of the file that waypoints stand in.
+fn located(error: PlanError, file: &WaypointFile) -> Failure {
+    let failure = Failure::of(&error);
+    let mut message = failure.message.clone();
+    // "waypoint 3, joint 2: …": the first one that is named is where it is wrong.
+    let number = message.split_once("waypoint ").and_then(|(_, rest)| {
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        rest[..digits].parse().ok()
+    });
+    if let (PlanError::Plan(_), Some(place)) = (&error, number.and_then(|n| file.place_of(n))) {
+        message = format!("{place}: {message}");
+    }
+    Failure { message, ..failure }
+}
+
+fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
+    let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
+    let value = json!({
+        "file": args.out,
+        "duration_s": trajectory.duration_s(),
+        "points": trajectory.points.len(),
+        "step_ms": trajectory.step_ms,
+        "waypoints": waypoints,
+        "waypoint_times_s": waypoint_times,
+        "binding": binding,
+        "joints": verdict.joints,
+        "notes": notes,
+        "report": args.report,
+    });
+    out.result(&value, || {
+        let head = ["", "binds", ">peak rad/s", ">peak rad/s²", ">peak N·m"];
+        let row = |joint: &Joint| {
+            let f = &verdict.joints[joint.index()];
+            vec![
+                joint.to_string(),
+                binds(binding, *joint),
+                figure(f.velocity_peak_rad_s, 3),
+                figure(f.acceleration_peak_rad_s2, 3),
+                f.torque_peak_nm.map_or("-".into(), |t| figure(t, 1)),
+            ]
+        };
+        let rows: Vec<Vec<String>> = Joint::ALL.iter().map(row).collect();
+        let page = args.report.as_deref().map_or(String::new(), |page| format!("\n{}   open it in a browser", page.display()));
+        let arm = args.arm.as_deref().map_or(String::new(), |arm| format!(" --arm {}", typed(arm)));
+        format!(
+            "{}: {waypoints} waypoints, {:.3} s, {} points every {} ms\n{}next: jtc traj run {}{arm} --approach{page}",
+            args.out.display(),
+            trajectory.duration_s(),
+            trajectory.points.len(),
+            trajectory.step_ms,
+            table(&head, &rows),
+            typed(&args.out),
+        )
+    });
+}
+
+/// For how long which limit of a joint binds; a dash where none does.
+fn binds(binding: &[Bound], joint: Joint) -> String {
+    let mut limits: Vec<(&str, f64)> = Vec::new();
+    for bound in binding.iter().filter(|bound| bound.joint == joint) {
+        let seconds = bound.to_s - bound.from_s;
+        match limits.iter_mut().find(|(limit, _)| *limit == bound.limit) {
+            Some((_, all)) => *all += seconds,
+            None => limits.push((bound.limit, seconds)),
+        }
+    }
+    limits.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let words: Vec<String> = limits.iter().map(|(limit, s)| format!("{limit} {s:.2} s")).collect();
+    if words.is_empty() { "-".into() } else { words.join(", ") }
+}
+
+/// The page of a run, with what is commanded alone.
+fn report(planned: &Planned, arm: &Arm, config: &Config, args: &PlanArgs) -> String {
+    let name = args.out.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let info = run_report::info(arm, "planned, not run", &name, 0);
+    let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
+    let h = f64::from(planned.trajectory.step_ms) * 1e-3;
+    let samples: Vec<Sample> = planned
+        .trajectory
+        .points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| sample(i as f64 * h, p, &dynamics, config))
+        .collect();
+    let row =
+        |b: &Bound| (format!("{:.3} to {:.3} s", b.from_s, b.to_s), format!("{}: {}", b.joint, b.limit));
+    let mut rows: Vec<(String, String)> = planned.binding.iter().take(ROWS_MAX).map(row).collect();
+    if let Some(more) = planned.binding.len().checked_sub(ROWS_MAX).filter(|more| *more > 0) {
+        rows.push(("and".into(), format!("{more} more")));
+    }
+    let of_plan = [
+        ("Duration".to_owned(), format!("{:.3} s", planned.trajectory.duration_s())),
+        (
+            "Points".to_owned(),
+            format!("{} every {} ms", planned.trajectory.points.len(), planned.trajectory.step_ms),
+        ),
+        ("Blend".to_owned(), format!("{} rad", args.blend)),
+        ("Speed".to_owned(), format!("{} % of what the limits allow", args.speed)),
+    ];
+    let notes = planned.notes.iter().map(|note| ("Note".to_owned(), note.clone()));
+    let facts = [
+        Facts { title: "Plan".into(), rows: of_plan.into_iter().chain(notes).collect() },
+        Facts { title: "What binds when".into(), rows },
+    ];
+    html(&ReportInput { info: &info, samples: &samples, facts: &facts, failure: None })
+}
+
+fn sample(time_s: f64, p: &Point, dynamics: &Dynamics, config: &Config) -> Sample {
+    let torque = dynamics.inverse(&p.position, &p.velocity, &p.acceleration);
+    let joint = |j: usize| JointSample {
+        set_position: p.position[j],
+        set_velocity: p.velocity[j],
+        set_acceleration: p.acceleration[j],
+        torque_model: torque[j] + config.joints[j].rotor_inertia * p.acceleration[j],
+        ..JointSample::UNKNOWN
+    };
+    Sample {
+        time_s,
+        state: ControllerState::Operate.into(),
+        trajectory: TrajectoryState::Execute.into(),
+        point: (time_s * 1e3).round() as u32,
+        joints: std::array::from_fn::<_, JOINTS, _>(joint),
+        ..Sample::default()
+    }
+}

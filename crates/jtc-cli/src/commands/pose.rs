@@ -1,0 +1,89 @@
+//! `jtc pose`: named positions in the arm file.
+
+use std::path::Path;
+
+use cli_kit::{ErrorKind, Failure, Output};
+use jtc_host::arm::{Arm, remove_pose, save_pose};
+use jtc_host::{sample, words};
+use jtc_wire::Joint;
+use serde_json::json;
+
+use super::arm::poses_table;
+use super::job::typed;
+use crate::args::{LinkArgs, PoseCommand};
+
+/// Faster than this, rad/s, an arm is on its way: a pose is where it stands.
+const STANDS: f64 = 0.02;
+
+/// Does one of the family.
+pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
+    match command {
+        PoseCommand::Save { name, arm, link, force } => save(name, &arm.arm, link, *force, out),
+        PoseCommand::List { arm, deg } => list(&arm.arm, *deg, out),
+        PoseCommand::Remove { name, arm } => {
+            remove_pose(&arm.arm, name)?;
+            let value = json!({ "name": name, "file": arm.arm, "removed": true });
+            out.result(&value, || format!("{}: pose {name} removed", arm.arm.display()));
+            Ok(())
+        }
+    }
+}
+
+fn save(name: &str, file: &Path, link: &LinkArgs, force: bool, out: &Output) -> Result<(), Failure> {
+    // Before the controller is asked: what is wrong with name or file is wrong without it.
+    let arm = Arm::load(file)?;
+    if arm.poses.contains_key(name) && !force {
+        let path = file.to_owned();
+        return Err(jtc_host::arm::PoseError::Exists { path, name: name.into() }.into());
+    }
+    let status = link.session()?.fresh_status()?;
+    for joint in Joint::ALL {
+        let j = joint.index();
+        if !sample::is_measured(&status, j) || words::is_absent(&status, j) {
+            let message = format!("{joint}: its position is not known; nothing was saved");
+            return Err(Failure::new(ErrorKind::Device, "not-measured", message)
+                .hint("`jtc status` shows the joints, `jtc recover` brings them up"));
+        }
+        let speed = f64::from(status.joints[j].velocity);
+        if speed.abs() > STANDS {
+            let message = format!(
+                "{joint} moves at {speed:.2} rad/s, and a pose is where the arm stands; nothing was saved"
+            );
+            return Err(Failure::new(ErrorKind::Refused, "moving", message)
+                .hint("wait until it stands, or `jtc traj pause`"));
+        }
+    }
+    let position = status.positions();
+    save_pose(file, name, &position, force)?;
+    let arm = Arm::load(file)?;
+    let saved = arm.poses.get(name).copied().unwrap_or(position);
+    // Saved all the same: limits may be what is wrong.
+    if let Err(outside) = arm.pose(name) {
+        out.note(format!("warning: {outside}: no motion leads there"));
+    }
+    out.result(&json!({ "name": name, "file": file, "position_rad": saved }), || {
+        let cells = saved.map(|v| format!("{v:.4}")).join(", ");
+        format!(
+            "{}: pose {name} at {cells} rad\nnext: jtc move --to {name} --arm {}",
+            file.display(),
+            typed(file)
+        )
+    });
+    Ok(())
+}
+
+fn list(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
+    let arm = Arm::load(file)?;
+    out.result(&json!({ "file": file, "arm": arm.name, "poses_rad": arm.poses }), || {
+        if arm.poses.is_empty() {
+            return format!(
+                "{}: arm {} has no poses; jtc pose save NAME --arm {} saves where the arm is",
+                file.display(),
+                arm.name,
+                typed(file)
+            );
+        }
+        poses_table(&arm, deg)
+    });
+    Ok(())
+}

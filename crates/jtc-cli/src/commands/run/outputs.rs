@@ -1,0 +1,50 @@
+//! Files of a run: recording and report page.
+
+use std::path::Path;
+
+use cli_kit::{Failure, Output, OutputFile};
+use jtc_host::recording::RecordingInfo;
+use jtc_host::report::{self, ReportInput};
+
+use super::Course;
+use crate::failure::output_lost;
+use crate::tape::Tape;
+
+/// Files of a run, open since before it.
+pub struct Outputs {
+    record: Option<OutputFile>,
+    report: Option<OutputFile>,
+}
+
+impl Outputs {
+    pub fn open(course: &Course) -> Result<Self, Failure> {
+        let mut others: Vec<&Path> = course.inputs.iter().map(|path| path.as_path()).collect();
+        let force = course.files.force.force;
+        let record =
+            course.files.record.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
+        others.extend(course.files.record.as_deref());
+        let report =
+            course.files.report.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
+        Ok(Self { record, report })
+    }
+
+    /// Begins the recording, from its start where it was begun before.
+    pub fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
+        self.record.as_mut().map(|file| Tape::begin(file, info, "the motion goes on", out)).transpose()
+    }
+
+    /// Completes all of them; one that is lost does not cost the other. Returns the names of those that are whole.
+    pub fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
+        let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
+        let report =
+            self.report.map(|file| (file.name(), file.write(report::html(input)).map_err(output_lost)));
+        let (mut files, mut lost) = (Vec::new(), Vec::new());
+        for (name, done) in record.into_iter().chain(report) {
+            match done {
+                Ok(()) => files.push(name),
+                Err(e) => lost.push(e),
+            }
+        }
+        (files, lost)
+    }
+}

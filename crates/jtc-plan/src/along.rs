@@ -1,48 +1,228 @@
 //! Time laws for paths.
-use crate::motion::{Motion, Piece};
-use crate::path::Path;
-use crate::{ArmDynamics, Limits, PlanError, State, verify};
+use jtc_wire::Joint;
 
-/// As fast along a path as velocity, acceleration and torque allow.
+use crate::cells::{Cell, cells};
+use crate::compose::Section;
+use crate::law::Law;
+use crate::motion::Motion;
+use crate::path::Path;
+use crate::{ArmDynamics, Limits, PlanError, jerk, reach, verify};
+
+/// As fast along a path as velocity, acceleration and torque allow, from rest to rest: time-optimal path parameterisation by
+/// reachability analysis (Pham and Pham 2018). Where the limits have a jerk, the law of time is averaged over a window, so that the
+/// acceleration has ramps, and is slower at the corners by what that takes. What results is verified between its samples, too, and
+/// slowed down until all limits hold.
 ///
 /// # Errors
 ///
-/// See [`PlanError`].
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and [`PlanError::Path`] where the
+/// path leads outside or has no direction, [`PlanError::Torque`] where the torque does not suffice at any speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
-    limits.check()?;
-    let mut ends = vec![0.0];
-    ends.extend(path.stops());
-    ends.push(path.end());
-    let mut whole: Option<Motion> = None;
-    for pair in ends.windows(2) {
-        let section = verify::finished(section(path, pair[0], pair[1]), limits, None)?;
-        match &mut whole {
-            None => whole = Some(section),
-            Some(whole) => whole.append(&section),
-        }
-    }
-    let whole = whole.ok_or(PlanError::TooFew { count: 0 })?;
-    verify::finished(whole, limits, arm)
+    along_at(path, limits, arm, &|_| 1.0)
 }
 
-/// A second along a part of the path, by a quintic.
-fn section(path: &dyn Path, from: f64, to: f64) -> Motion {
-    const COUNT: usize = 200;
-    let state = |i: usize| {
-        let u = i as f64 / COUNT as f64;
-        let way = to - from;
-        let s = from + way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
-        let (v, a) =
-            (way * 30.0 * u * u * (1.0 - u) * (1.0 - u), way * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u));
-        // Of two legs that meet at a stop, this one.
-        let at = path.at(s.clamp(from + 1e-12 * way, to - 1e-12 * way));
-        State {
-            position: at.position,
-            velocity: at.first.map(|q| q * v),
-            acceleration: std::array::from_fn(|j| at.first[j] * a + at.second[j] * v * v),
+/// The same, where the waypoint (from 1) that was passed last decides at which share of the speed.
+pub(crate) fn along_at(
+    path: &dyn Path,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+    share: &dyn Fn(usize) -> f64,
+) -> Result<Motion, PlanError> {
+    limits.check()?;
+    let limits_of_motion = verify::with_table(limits, arm);
+    let mut motion: Option<Motion> = None;
+    for section in sections(path)? {
+        let planned = of_section(&section, &limits_of_motion, arm, share)?;
+        match &mut motion {
+            None => motion = Some(planned),
+            Some(motion) => motion.append(&planned),
         }
+    }
+    let motion = motion.ok_or(PlanError::Path { leg: 1, parameter: 0.0 })?;
+    verify::finished(motion, limits, arm)
+}
+
+/// The sections between the stops.
+fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
+    let end = path.end();
+    if !(end.is_finite() && end > 0.0) {
+        return Err(PlanError::Path { leg: 1, parameter: end });
+    }
+    let inside = |places: Vec<f64>| -> Vec<f64> {
+        let mut places: Vec<f64> = places.into_iter().filter(|s| *s > 0.0 && *s < end).collect();
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        places
     };
-    let h = 1.0 / COUNT as f64;
-    let pieces = (0..COUNT).map(|i| Piece::between(i as f64 * h, h, &state(i), &state(i + 1)));
-    Motion::new(pieces.collect(), path.at(to).position, vec![0.0, 1.0])
+    let (stops, breaks, waypoints) = (inside(path.stops()), inside(path.breaks()), path.waypoints());
+    let ends = |places: &[f64]| -> Vec<f64> {
+        std::iter::once(0.0).chain(places.iter().copied()).chain([end]).collect()
+    };
+    let between = |places: &[f64], from: f64, to: f64| -> Vec<f64> {
+        let first = places.partition_point(|s| *s <= from);
+        places[first..].iter().copied().take_while(|s| *s < to).collect()
+    };
+    let ends = ends(&stops);
+    let sections = ends.windows(2).map(|pair| {
+        let (from, to) = (pair[0], pair[1]);
+        let mut of_section = between(&waypoints, from, to);
+        // Waypoints that are given twice are passed twice.
+        let at = |place: f64| waypoints.iter().filter(move |s| **s == place).count();
+        let first = if from == 0.0 { at(from).max(1) - 1 } else { 0 };
+        of_section.splice(0..0, std::iter::repeat_n(from, first));
+        of_section.extend(std::iter::repeat_n(to, at(to)));
+        Section { path, from, to, breaks: between(&breaks, from, to), waypoints: of_section }
+    });
+    Ok(sections.collect())
+}
+
+fn of_section(
+    section: &Section,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+    share: &dyn Fn(usize) -> f64,
+) -> Result<Motion, PlanError> {
+    let leg = section.path.waypoint(section.from).unwrap_or(1);
+    let cells = cells(section, arm, limits, !limits.has_jerk())?;
+    let shares: Vec<f64> = cells
+        .iter()
+        .map(|cell| share(section.path.waypoint(section.from + 0.5 * (cell.from + cell.to)).unwrap_or(leg)))
+        .collect();
+    let caps = caps(section, &cells, &shares, limits, arm)?;
+    let mut plan = Plan { section, cells: &cells, caps, reached: Vec::new(), shares, limits, arm: None };
+    plan.reached.clone_from(&plan.caps);
+    let mut made = plan.make(None).map_err(|reason| PlanError::NoTimeLaw { leg, reason })?;
+    let Some(arm) = arm else { return Ok(made.motion) };
+    // Friction counts up to the highest speed in a cell, which is known better each time.
+    plan.arm = Some(arm);
+    let mut best: Option<Motion> = None;
+    for _ in 0..TORQUE_ROUNDS {
+        plan.reached = plan.reached_by(&made.law);
+        made = plan.make(made.shares).map_err(|reason| PlanError::NoTimeLaw { leg, reason })?;
+        let before = best.as_ref().map_or(f64::INFINITY, Motion::duration);
+        let shorter = made.motion.duration() < (1.0 - WORTH) * before;
+        if made.motion.duration() < before {
+            best = Some(made.motion);
+        }
+        if !shorter || !arm.has_friction() {
+            break;
+        }
+    }
+    best.ok_or(PlanError::NoTimeLaw { leg, reason: "its time is not finite".into() })
+}
+
+/// Highest squared speeds of the cells by the limits of speed, and by friction.
+fn caps(
+    section: &Section,
+    cells: &[Cell],
+    shares: &[f64],
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Vec<f64>, PlanError> {
+    let cap = |(cell, share): (&Cell, &f64)| {
+        let cap = cell.speed_cap(limits) * share * share;
+        let Some(arm) = arm else { return Ok(cap) };
+        cell.friction_cap(cap, limits, arm).map_err(|(joint, torque, limit): (Joint, f64, f64)| {
+            let waypoint = section.path.waypoint(section.from + cell.from).unwrap_or(1);
+            PlanError::Torque { waypoint, joint, torque, limit, holding: false }
+        })
+    };
+    cells.iter().zip(shares).map(cap).collect()
+}
+
+/// What a law of time is made from.
+pub(crate) struct Plan<'a> {
+    pub section: &'a Section<'a>,
+    pub cells: &'a [Cell],
+    /// Highest squared speed of each cell.
+    pub caps: Vec<f64>,
+    /// Squared speed up to which friction counts in each cell.
+    pub reached: Vec<f64>,
+    /// Of the speed, per cell.
+    pub shares: Vec<f64>,
+    pub limits: &'a Limits,
+    pub arm: Option<&'a ArmDynamics<'a>>,
+}
+
+/// A law of time and its motion.
+pub(crate) struct Made {
+    pub law: Law,
+    pub motion: Motion,
+    /// Of a law that is limited in jerk.
+    pub shares: Option<jerk::Shares>,
+}
+
+/// How often a section is planned with torque.
+const TORQUE_ROUNDS: usize = 5;
+/// By how much a round has to make it shorter for another one.
+const WORTH: f64 = 0.004;
+/// By what a cell's speed may be higher than it was the time before.
+const FASTER: f64 = 1.1;
+
+/// How often the cells in which a limit does not hold between the samples are slowed down alone, before all of the motion is.
+const REPAIRS: usize = 4;
+/// By how much all of the motion is slowed down without that.
+const LEFT_OVER: f64 = 1.001;
+
+impl Plan<'_> {
+    fn make(&self, shares: Option<jerk::Shares>) -> Result<Made, String> {
+        if self.limits.has_jerk() { jerk::limited(self, shares) } else { self.without_jerk() }
+    }
+
+    /// Squared speeds of the cells that are not much higher than those of a law.
+    fn reached_by(&self, law: &Law) -> Vec<f64> {
+        let speed = |s: f64| law.at(law.time_of(s)).1;
+        let mut before = 0.0;
+        let cells = self.cells.iter().zip(&self.caps).map(|(cell, &cap)| {
+            let (middle, after) = (speed(0.5 * (cell.from + cell.to)), speed(cell.to));
+            let fastest = FASTER * after.max(middle).max(before);
+            before = after;
+            cap.min(fastest * fastest)
+        });
+        cells.collect()
+    }
+
+    fn without_jerk(&self) -> Result<Made, String> {
+        let mut caps = self.reached.clone();
+        let mut shares: Vec<f64> = self.shares.iter().map(|s| s * s).collect();
+        let mut repairs = 0;
+        loop {
+            let vertices = reach::fastest(self.cells, &caps, &shares, self.limits, self.arm)?;
+            let law = Law::of_vertices(&vertices);
+            let motion = self.section.motion(&law, self.limits);
+            let slower = self.slower(&motion, &law, true);
+            let worst = slower.iter().copied().fold(1.0, f64::max);
+            if worst <= LEFT_OVER || repairs == REPAIRS {
+                return Ok(Made { law, motion, shares: None });
+            }
+            repairs += 1;
+            for ((cap, share), slower) in caps.iter_mut().zip(&mut shares).zip(slower) {
+                *cap /= slower * slower;
+                *share /= slower * slower;
+            }
+        }
+    }
+
+    /// By what the time in each cell has to be multiplied so that the limits hold in it.
+    pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
+        let mut slower = vec![1.0f64; self.cells.len()];
+        for piece in &motion.pieces {
+            let mut stretch = verify::kinematic_stretch(piece, self.limits);
+            if let Some(arm) = self.arm.filter(|_| with_torque) {
+                stretch = stretch.max(verify::torque_stretch(piece, self.limits, arm));
+            }
+            if stretch <= 1.0 {
+                continue;
+            }
+            let (from, to) = (law.at(piece.start).0, law.at(piece.start + piece.length).0);
+            let first = self.cells.partition_point(|c| c.to <= from);
+            for (cell, slower) in self.cells[first..].iter().zip(&mut slower[first..]) {
+                if cell.from >= to {
+                    break;
+                }
+                *slower = slower.max(1.0 + 1.1 * (stretch.min(3.0) - 1.0));
+            }
+        }
+        slower
+    }
 }

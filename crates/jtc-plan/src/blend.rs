@@ -1,20 +1,51 @@
 //! Straight legs between waypoints, with rounded corners.
-use crate::path::{Path, PathPoint};
-use crate::{JointVec, PlanError};
+use jtc_wire::Joint;
 
-/// Straight legs of joint space between waypoints, corners rounded within `blend` rad of the corner.
+use crate::path::{Path, PathPoint};
+use crate::{JOINTS, JointVec, PlanError};
+
+/// Waypoints closer than this, rad, are one.
+const SAME: f64 = 1e-9;
+/// Directions that differ less than this make no corner.
+const STRAIGHT: f64 = 1e-9;
+/// Directions whose sum is smaller than this lead back: a stop, no corner (some 3°).
+const BACK: f64 = 0.05;
+
+/// Straight legs of joint space between waypoints, with rounded corners: a leg is left, and the next one reached, within `blend`
+/// rad of the waypoint between them, counted by the joint that moves most.
+///
+/// In a corner the direction changes from that of one leg to that of the other along a step with a slope that rises, stays and falls,
+/// so that the curvature is continuous, the path stays in the triangle of the corner, and no joint overshoots. A corner takes at most half of each of its
+/// legs. Where two legs are one line there is no corner. The path stops where it leads back the way it came, where a waypoint is
+/// given twice in a row, and with a blend of 0 at every waypoint.
+///
+/// The parameter is the way of the joint that moves most, rad, along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
-    corners: Vec<JointVec>,
-    parameters: Vec<f64>,
+    /// Without repetitions.
+    corners: Vec<Corner>,
+    /// Index in `corners` of each waypoint given.
+    given: Vec<usize>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    position: JointVec,
+    parameter: f64,
+    /// Of the leg that begins here.
+    direction: JointVec,
+    /// Half of the rounding's parameters; 0: none.
+    half: f64,
+    stop: bool,
 }
 
 impl BlendedPath {
-    /// Through `waypoints` (rad), each corner rounded so that no joint is ever further than `blend` (rad) from it.
+    /// Through `waypoints` (rad).
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`], [`PlanError::NotFinite`], [`PlanError::Blend`].
+    /// [`PlanError::TooFew`] for fewer than two, [`PlanError::NotFinite`], [`PlanError::Blend`] for a negative blend or none,
+    /// [`PlanError::Path`] when all waypoints are the same.
     pub fn new(waypoints: &[JointVec], blend: f64) -> Result<Self, PlanError> {
         if waypoints.len() < 2 {
             return Err(PlanError::TooFew { count: waypoints.len() });
@@ -22,42 +53,177 @@ impl BlendedPath {
         if !(blend >= 0.0 && blend.is_finite()) {
             return Err(PlanError::Blend { value: blend });
         }
-        let mut parameters = vec![0.0];
-        for pair in waypoints.windows(2) {
-            let way = pair[0].iter().zip(&pair[1]).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
-            parameters.push(parameters[parameters.len() - 1] + way.max(1e-9));
+        let (mut corners, given) = distinct(waypoints)?;
+        if corners.len() < 2 {
+            return Err(PlanError::Path { leg: 1, parameter: 0.0 });
         }
-        Ok(Self { corners: waypoints.to_vec(), parameters })
+        let mut length_before = 0.0;
+        for i in 0..corners.len() - 1 {
+            let (from, to) = (corners[i], corners[i + 1].position);
+            let length = distance(&from.position, &to);
+            corners[i].direction = std::array::from_fn(|j| (to[j] - from.position[j]) / length);
+            corners[i + 1].parameter = from.parameter + length;
+            if i > 0 {
+                let half = blend.min(0.5 * length_before).min(0.5 * length);
+                let before = corners[i - 1].direction;
+                corners[i].round(&before, half);
+            }
+            length_before = length;
+        }
+        Ok(Self { corners, given })
+    }
+
+    /// Index of the leg that `s` is on, the next one at a corner.
+    fn leg(&self, s: f64) -> usize {
+        let after = self.corners.partition_point(|c| c.parameter <= s);
+        after.saturating_sub(1).min(self.corners.len() - 2)
+    }
+
+    /// On the straight leg.
+    fn on_leg(&self, leg: usize, s: f64) -> PathPoint {
+        let (from, to) = (&self.corners[leg], &self.corners[leg + 1]);
+        let (gone, left) = (s - from.parameter, to.parameter - s);
+        // From the nearer end, so that both are met exactly.
+        let position = std::array::from_fn(|j| {
+            if gone <= left {
+                from.position[j] + gone * from.direction[j]
+            } else {
+                to.position[j] - left * from.direction[j]
+            }
+        });
+        PathPoint { position, first: from.direction, second: [0.0; JOINTS] }
+    }
+
+    /// In the rounding of corner `i`.
+    fn in_corner(&self, i: usize, s: f64) -> PathPoint {
+        let (corner, before) = (&self.corners[i], &self.corners[i - 1].direction);
+        let whole = 2.0 * corner.half;
+        let (integral, step, slope) = step((s - corner.parameter + corner.half) / whole);
+        let mut point = PathPoint::default();
+        for j in 0..JOINTS {
+            let turn = corner.direction[j] - before[j];
+            point.position[j] =
+                corner.position[j] + (s - corner.parameter) * before[j] + turn * whole * integral;
+            point.first[j] = before[j] + turn * step;
+            point.second[j] = turn * slope / whole;
+        }
+        point
+    }
+}
+
+/// A step from 0 at 0 to 1 at 1 whose slope rises, stays and falls for a third each: of all whose slope is no higher than 3/2, the one
+/// with the least second derivative. Its integral, itself and its slope at `u`.
+fn step(u: f64) -> (f64, f64, f64) {
+    const THIRD: f64 = 1.0 / 3.0;
+    if u < THIRD {
+        (0.75 * u * u * u, 2.25 * u * u, 4.5 * u)
+    } else if u <= 2.0 * THIRD {
+        let v = u - THIRD;
+        (1.0 / 36.0 + v * (0.25 + 0.75 * v), 0.25 + 1.5 * v, 1.5)
+    } else {
+        let w = 1.0 - u;
+        (u - 0.5 + 0.75 * w * w * w, 1.0 - 2.25 * w * w, 4.5 * w)
+    }
+}
+
+impl Corner {
+    /// Decides how it is passed; `before`: direction of the leg that ends here.
+    fn round(&mut self, before: &JointVec, half: f64) {
+        let size = |sign: f64| {
+            let parts = before.iter().zip(&self.direction).map(|(a, b)| (b + sign * a).abs());
+            parts.fold(0.0, f64::max)
+        };
+        let (turn, sum) = (size(-1.0), size(1.0));
+        if turn > STRAIGHT {
+            self.stop |= sum < BACK || half <= 0.0;
+        }
+        if !self.stop && turn > STRAIGHT {
+            self.half = half;
+        }
     }
 }
 
 impl Path for BlendedPath {
     fn end(&self) -> f64 {
-        self.parameters[self.parameters.len() - 1]
+        self.corners[self.corners.len() - 1].parameter
     }
 
     fn at(&self, s: f64) -> PathPoint {
-        let last = self.corners.len() - 2;
-        let leg = self.parameters.partition_point(|p| *p <= s).saturating_sub(1).min(last);
+        let leg = self.leg(s);
         let (from, to) = (&self.corners[leg], &self.corners[leg + 1]);
-        let length = self.parameters[leg + 1] - self.parameters[leg];
-        let u = (s - self.parameters[leg]) / length;
-        PathPoint {
-            position: std::array::from_fn(|j| if u < 1.0 { from[j] + u * (to[j] - from[j]) } else { to[j] }),
-            first: std::array::from_fn(|j| (to[j] - from[j]) / length),
-            second: [0.0; 6],
+        if from.half > 0.0 && s < from.parameter + from.half {
+            self.in_corner(leg, s)
+        } else if to.half > 0.0 && s > to.parameter - to.half {
+            self.in_corner(leg + 1, s)
+        } else {
+            self.on_leg(leg, s)
         }
     }
 
     fn waypoint(&self, s: f64) -> Option<usize> {
-        Some(self.parameters.partition_point(|p| *p <= s).max(1))
+        let corner = self.corners.partition_point(|c| c.parameter <= s).max(1) - 1;
+        Some(self.given.partition_point(|&g| g <= corner).max(1))
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        let inner = &self.corners[1..self.corners.len() - 1];
+        let mut breaks = Vec::with_capacity(4 * inner.len());
+        for corner in inner {
+            if corner.half > 0.0 {
+                // Corners that meet have one break between them.
+                let begin = corner.parameter - corner.half;
+                if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
+                    breaks.push(begin);
+                }
+                // The step changes its form at each third.
+                let third = corner.half / 3.0;
+                breaks.extend([-third, third, corner.half].map(|d| corner.parameter + d));
+            } else {
+                breaks.push(corner.parameter);
+            }
+        }
+        // Nor do corners that meet a stop or an end.
+        breaks.retain(|b| *b > 0.0 && *b < self.end());
+        breaks
     }
 
     fn stops(&self) -> Vec<f64> {
-        self.parameters[1..self.parameters.len() - 1].to_vec()
+        let inner = &self.corners[1..self.corners.len() - 1];
+        inner.iter().filter(|c| c.stop).map(|c| c.parameter).collect()
     }
 
     fn waypoints(&self) -> Vec<f64> {
-        self.parameters.clone()
+        self.given.iter().map(|&g| self.corners[g].parameter).collect()
     }
+}
+
+/// Waypoints without repetitions, and which of them each is.
+fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanError> {
+    let mut corners: Vec<Corner> = Vec::with_capacity(waypoints.len());
+    let mut given = Vec::with_capacity(waypoints.len());
+    for (i, position) in waypoints.iter().enumerate() {
+        for joint in Joint::ALL {
+            let value = position[joint.index()];
+            if !value.is_finite() {
+                return Err(PlanError::NotFinite { waypoint: i + 1, joint, value });
+            }
+        }
+        match corners.last_mut() {
+            Some(last) if distance(&last.position, position) <= SAME => last.stop = true,
+            _ => corners.push(Corner {
+                position: *position,
+                parameter: 0.0,
+                direction: [0.0; JOINTS],
+                half: 0.0,
+                stop: false,
+            }),
+        }
+        given.push(corners.len() - 1);
+    }
+    Ok((corners, given))
+}
+
+/// Of the joint that moves most, rad.
+fn distance(a: &JointVec, b: &JointVec) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }

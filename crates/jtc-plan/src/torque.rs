@@ -16,24 +16,69 @@ pub struct ArmDynamics<'a> {
     friction: Option<&'a Friction>,
     temperature: f64,
     sign_width: f64,
+    ranges: FrictionRanges,
+}
+
+/// Steps of speed for which the range of a joint's friction is kept.
+const STEPS: usize = 128;
+
+/// Per joint, the lowest and highest friction (N·m) of all speeds from 0 up to each step, backward and forward.
+#[derive(Clone, Debug)]
+struct FrictionRanges {
+    /// rad/s.
+    step: JointVec,
+    ranges: Vec<[[(f64, f64); STEPS + 1]; 2]>,
 }
 
 impl<'a> ArmDynamics<'a> {
     /// The arm `model` with the payload, gravity and rotors of `config`, and `friction` where it is compensated for, at a bearing
     /// temperature of 30 °C.
     pub fn new(config: &Config, model: &ArmModel, friction: Option<&'a Friction>) -> Self {
-        Self {
+        let step = config.joints.each_ref().map(|j| j.velocity_max / STEPS as f64);
+        let arm = Self {
             dynamics: Dynamics::with_payload(model, config.gravity, &config.payload),
             rotor: config.joints.each_ref().map(|j| j.rotor_inertia),
             friction,
             temperature: 30.0,
             sign_width: config.friction_sign_width,
-        }
+            ranges: FrictionRanges { step, ranges: Vec::new() },
+        };
+        arm.with_ranges()
     }
 
     /// The same at another bearing temperature, °C.
     pub fn at_temperature(self, temperature: f64) -> Self {
-        Self { temperature, ..self }
+        Self { temperature, ..self }.with_ranges()
+    }
+
+    /// The controller compensates for friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        self.friction.is_some()
+    }
+
+    fn with_ranges(mut self) -> Self {
+        let ranges = (0..JOINTS).map(|j| {
+            [-1.0, 1.0].map(|sign| {
+                let (mut low, mut high) = (0.0f64, 0.0f64);
+                std::array::from_fn(|i| {
+                    let friction = self.friction(j, sign * i as f64 * self.ranges.step[j]);
+                    (low, high) = (low.min(friction), high.max(friction));
+                    (low, high)
+                })
+            })
+        });
+        self.ranges.ranges = ranges.collect();
+        self
+    }
+
+    /// Lowest and highest friction of the joint with index `j` at all speeds from 0 to `fastest` (rad/s, signed), N·m; beyond the
+    /// highest speed of the arm that of the highest.
+    pub(crate) fn friction_range(&self, j: usize, fastest: f64) -> (f64, f64) {
+        if self.friction.is_none() {
+            return (0.0, 0.0);
+        }
+        let step = (fastest.abs() / self.ranges.step[j]).ceil() as usize;
+        self.ranges.ranges[j][usize::from(fastest > 0.0)][step.min(STEPS)]
     }
 
     /// Joint torques that the controller commands at `state` where the arm follows exactly, N·m.

@@ -72,6 +72,30 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
+/// By what a piece's time has to be multiplied so that the torque suffices in it, by a few samples: as far as that which depends on the
+/// speed goes. 1 where it suffices, and where nothing that depends on the speed helps.
+pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
+    let count = (piece.length / TORQUE_STEP).ceil().clamp(1.0, 8.0) as usize;
+    let mut most = 1.0f64;
+    for i in 0..=count {
+        let state = piece.at(piece.length * i as f64 / count as f64);
+        let torque = arm.torque(&state);
+        if (0..JOINTS).all(|j| torque[j].abs() <= TORQUE_SHARE * limits.torque[j]) {
+            continue;
+        }
+        let hold = arm.holding(&state.position);
+        for j in 0..JOINTS {
+            let limit = TORQUE_SHARE * limits.torque[j];
+            let still = hold[j] + arm.friction(j, state.velocity[j]);
+            let (room, needed) = (limit - (still * torque[j].signum()), (torque[j] - still).abs());
+            if torque[j].abs() > limit && room > 0.0 {
+                most = most.max((needed / room).sqrt());
+            }
+        }
+    }
+    most
+}
+
 /// A bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth where it is above `limit`: the magnitudes of its
 /// Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {

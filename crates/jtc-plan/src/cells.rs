@@ -1,0 +1,256 @@
+//! A section of a path in cells, with what the limits of the joints mean for its parameter.
+use jtc_wire::Joint;
+
+use crate::compose::Section;
+use crate::path::PathPoint;
+use crate::profile::Bounds;
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
+
+/// Cells of a straight part, without and with torque, and of a curved one.
+const STRAIGHT: usize = 2;
+const STRAIGHT_WITH_TORQUE: usize = 10;
+const CURVED: usize = 4;
+/// A path of few parts has finer cells: this many in all.
+const CELLS_MIN: usize = 100;
+
+/// Share of what the torque limit leaves over for motion that the speed may take.
+const SPEED_TORQUE_SHARE: f64 = 0.8;
+/// Share of the torque limit that is planned with.
+pub(crate) const TORQUE_SHARE: f64 = 0.996;
+/// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
+const MOTION_SHARE: f64 = 0.05;
+
+/// The parts of the torque at a place, N·m: q̈ = q′·s̈ + q″·ṡ² makes it hold + mass·s̈ + speed·ṡ², and friction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Loads {
+    pub hold: JointVec,
+    pub mass: JointVec,
+    pub speed: JointVec,
+}
+
+impl Loads {
+    fn at(point: &PathPoint, arm: &ArmDynamics) -> Self {
+        let zero = [0.0; JOINTS];
+        let hold = arm.holding(&point.position);
+        let without = |mut torque: JointVec| {
+            torque.iter_mut().zip(&hold).for_each(|(t, h)| *t -= h);
+            torque
+        };
+        let mass = without(arm.rigid(&point.position, &zero, &point.first));
+        Self { hold, mass, speed: without(arm.rigid(&point.position, &point.first, &point.second)) }
+    }
+}
+
+/// One end of a cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End {
+    pub point: PathPoint,
+    pub loads: Option<Loads>,
+}
+
+/// A part of a section in which the path is one simple curve.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    /// Parameters, from the section's start.
+    pub from: f64,
+    pub to: f64,
+    pub ends: [End; 2],
+    /// Third derivative of the path, mean over the cell.
+    pub third: JointVec,
+}
+
+/// The cells of a section. For a law by its cells alone (`fine`) a straight part has more of them: its acceleration changes at their ends
+/// only.
+pub(crate) fn cells(
+    section: &Section,
+    arm: Option<&ArmDynamics>,
+    limits: &Limits,
+    fine: bool,
+) -> Result<Vec<Cell>, PlanError> {
+    let parts = section.breaks.len() + 1;
+    let mut cells = Vec::new();
+    for (from, to) in section.parts() {
+        let side = (from, to);
+        let inside = [0.25, 0.5, 0.75].map(|u| section.at(from + u * (to - from), side));
+        let bent = |p: &PathPoint| p.second.iter().any(|q| *q != 0.0);
+        let count = match (inside.iter().any(bent), arm) {
+            (true, _) => CURVED.max(CELLS_MIN / parts),
+            (false, None) if !fine => STRAIGHT,
+            (false, _) => STRAIGHT_WITH_TORQUE.max(CELLS_MIN / parts),
+        };
+        let end = |i: usize| {
+            let s = from + (to - from) * i as f64 / count as f64;
+            let point = section.at(if i == count { to } else { s }, side);
+            checked(section, &point, s, limits)?;
+            Ok(End { point, loads: arm.map(|arm| Loads::at(&point, arm)) })
+        };
+        let mut before = end(0)?;
+        for i in 0..count {
+            let after = end(i + 1)?;
+            let place = |i: usize| from + (to - from) * i as f64 / count as f64 - section.from;
+            let (a, b) = (place(i), place(i + 1));
+            let (p, q) = (&before.point.second, &after.point.second);
+            let third = std::array::from_fn(|j| (q[j] - p[j]) / (b - a));
+            cells.push(Cell { from: a, to: b, ends: [before, after], third });
+            before = after;
+        }
+    }
+    Ok(cells)
+}
+
+/// Whether a place is one that the arm can be at, and has a direction.
+fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Result<(), PlanError> {
+    let leg = section.path.waypoint(s).unwrap_or(1);
+    let numbers = point.first.iter().chain(&point.second);
+    if numbers.into_iter().any(|x| !x.is_finite()) {
+        return Err(PlanError::Path { leg, parameter: s });
+    }
+    // Rounding on the way between two positions at the limit.
+    for joint in Joint::ALL {
+        let (value, (min, max)) = (point.position[joint.index()], limits.position[joint.index()]);
+        if !(min - 1e-9..=max + 1e-9).contains(&value) {
+            return Err(PlanError::Position { waypoint: leg, joint, value, min, max });
+        }
+    }
+    Ok(())
+}
+
+/// What is left of the torque at one end of a cell for motion up (`high`) and down (`low`), N·m: the limit less what holds the arm and
+/// the worst friction of the way's direction up to the speed.
+pub(crate) struct Room {
+    pub high: JointVec,
+    pub low: JointVec,
+}
+
+impl Room {
+    /// Where the squared speed of the parameter is `cap` at most.
+    pub fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
+        let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS] };
+        for j in 0..JOINTS {
+            let limit = TORQUE_SHARE * limits.torque[j];
+            let fastest = end.point.first[j] * cap.sqrt();
+            let (low, high) = arm.friction_range(j, fastest);
+            room.high[j] = limit - loads.hold[j] - high;
+            room.low[j] = limit + loads.hold[j] + low;
+        }
+        room
+    }
+
+    /// The joint with the least of it, as a share of its torque limit.
+    fn least(&self, limits: &Limits) -> (f64, usize) {
+        let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
+        (0..JOINTS).map(|j| (share(j), j)).fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a })
+    }
+}
+
+impl Cell {
+    /// Highest squared speed by the limits of speed alone.
+    pub fn speed_cap(&self, limits: &Limits) -> f64 {
+        let mut cap = f64::INFINITY;
+        for end in &self.ends {
+            for j in 0..JOINTS {
+                let ratio = limits.velocity[j] / end.point.first[j].abs();
+                cap = cap.min(ratio * ratio);
+            }
+        }
+        cap
+    }
+
+    /// Squared speed, at most `cap`, at which friction leaves torque for motion.
+    ///
+    /// # Errors
+    ///
+    /// The joint that has none left however slow it is, with the torque that it would take and its limit.
+    pub fn friction_cap(
+        &self,
+        mut cap: f64,
+        limits: &Limits,
+        arm: &ArmDynamics,
+    ) -> Result<f64, (Joint, f64, f64)> {
+        const SLOWEST: f64 = 1e-4;
+        let fastest = cap;
+        for end in &self.ends {
+            let Some(loads) = &end.loads else { continue };
+            loop {
+                let (share, j) = Room::new(end, loads, cap, limits, arm).least(limits);
+                if share >= MOTION_SHARE {
+                    break;
+                }
+                if cap <= SLOWEST * fastest {
+                    // The last few percent are enough to creep.
+                    if share > 0.002 {
+                        break;
+                    }
+                    let joint = Joint::ALL[j];
+                    return Err((joint, (1.0 - share) * limits.torque[j], limits.torque[j]));
+                }
+                cap *= 0.8;
+            }
+        }
+        Ok(cap)
+    }
+
+    /// Limits of the parameter's speed, whose square is `cap` at most, and acceleration that each keep the joints within theirs, whatever
+    /// the other is; the curvature may take `share` of the limits of acceleration and jerk. Friction counts up to the squared
+    /// speed `reached`.
+    pub fn bounds(
+        &self,
+        cap: f64,
+        reached: f64,
+        share: f64,
+        limits: &Limits,
+        arm: Option<&ArmDynamics>,
+    ) -> Bounds {
+        let mut cap = cap;
+        for end in &self.ends {
+            for j in 0..JOINTS {
+                let curvature = end.point.second[j].abs();
+                cap = cap.min(share * limits.acceleration[j] / curvature);
+                let turn = share * limits.jerk[j] / self.third[j].abs();
+                cap = cap.min(turn.cbrt() * turn.cbrt());
+            }
+            if let (Some(loads), Some(arm)) = (&end.loads, arm) {
+                let room = Room::new(end, loads, cap.min(reached), limits, arm);
+                for j in 0..JOINTS {
+                    let room = if loads.speed[j] > 0.0 { room.high[j] } else { room.low[j] };
+                    cap = cap.min((SPEED_TORQUE_SHARE * room / loads.speed[j].abs()).max(1e-12));
+                }
+            }
+        }
+        let mut bounds = Bounds { from: self.from, to: self.to, cap, up: f64::INFINITY, down: f64::INFINITY };
+        for end in &self.ends {
+            self.accelerations(end, reached, limits, arm, &mut bounds);
+        }
+        bounds
+    }
+
+    fn accelerations(
+        &self,
+        end: &End,
+        reached: f64,
+        limits: &Limits,
+        arm: Option<&ArmDynamics>,
+        bounds: &mut Bounds,
+    ) {
+        let (cap, speed) = (bounds.cap, bounds.cap.sqrt());
+        let mut most = f64::INFINITY;
+        for j in 0..JOINTS {
+            let (first, second) = (end.point.first[j].abs(), end.point.second[j].abs());
+            most = most.min((limits.acceleration[j] - second * cap) / first);
+            // Half of the jerk that is left: the other half is for changing the acceleration.
+            let left = limits.jerk[j] - self.third[j].abs() * cap * speed;
+            most = most.min(0.5 * left / (3.0 * second * speed));
+        }
+        (bounds.up, bounds.down) = (bounds.up.min(most), bounds.down.min(most));
+        let (Some(loads), Some(arm)) = (&end.loads, arm) else { return };
+        let room = Room::new(end, loads, cap.min(reached), limits, arm);
+        for j in 0..JOINTS {
+            let (mass, by_speed) = (loads.mass[j], loads.speed[j] * cap.min(reached));
+            let high = room.high[j] - by_speed.max(0.0);
+            let low = room.low[j] + by_speed.min(0.0);
+            let (up, down) = if mass > 0.0 { (high, low) } else { (low, high) };
+            bounds.up = bounds.up.min((up / mass.abs()).max(1e-9));
+            bounds.down = bounds.down.min((down / mass.abs()).max(1e-9));
+        }
+    }
+}

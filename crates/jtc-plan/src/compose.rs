@@ -1,0 +1,123 @@
+//! A path and a law of time make a motion.
+use crate::law::Law;
+use crate::motion::{Motion, Piece};
+use crate::path::{Path, PathPoint};
+use crate::{JOINTS, JointVec, Limits, State};
+
+/// Shortest piece, s: the third derivative of a shorter one would be rounding.
+const SHORTEST: f64 = 2e-4;
+/// How far the middle of a piece may be off the path, rad.
+const AWAY: f64 = 1e-9;
+/// How far the acceleration in its middle may be off, as a share of its limit.
+const ACCELERATION_AWAY: f64 = 1e-3;
+/// How often a piece is halved for that.
+const HALVINGS: u8 = 7;
+
+/// A section of a path from stop to stop, and the places where it changes its form.
+pub(crate) struct Section<'a> {
+    pub path: &'a dyn Path,
+    pub from: f64,
+    pub to: f64,
+    /// Rising, strictly inside.
+    pub breaks: Vec<f64>,
+    /// Parameters of the waypoints that belong to it, rising: that of its start only where the path begins.
+    pub waypoints: Vec<f64>,
+}
+
+impl Section<'_> {
+    /// Place and derivatives at the parameter `s`, between two breaks on the side of `side`.
+    pub fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
+        self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
+    }
+
+    /// Begin and end of each part between two breaks.
+    pub fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
+        let ends = || self.breaks.iter().copied();
+        std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
+    }
+
+    /// The motion along it. Its first waypoint time is its start.
+    pub fn motion(&self, law: &Law, limits: &Limits) -> Motion {
+        let mut pieces = Vec::new();
+        for (part, (begin, end)) in self.parts().zip(self.times(law)) {
+            let part_of = |from: f64, to: f64| Part {
+                section: self,
+                law,
+                side: part,
+                from,
+                to,
+                acceleration: &limits.acceleration,
+            };
+            let first = law.phases.partition_point(|p| p.start <= begin + SHORTEST);
+            let inside = law.phases[first..].iter().map(|p| p.start).take_while(|t| *t < end - SHORTEST);
+            let mut from = begin;
+            for t in inside.chain([end]) {
+                if t - from >= SHORTEST || t == end {
+                    part_of(from, t).pieces(&mut pieces, HALVINGS);
+                    from = t;
+                }
+            }
+        }
+        let waypoints = self.waypoints.iter().map(|s| law.time_of(s - self.from));
+        let times = std::iter::once(0.0).chain(waypoints).collect();
+        Motion::new(pieces, self.path.at(self.to).position, times)
+    }
+
+    /// Begin and end of each part in time, none shorter than a piece.
+    fn times(&self, law: &Law) -> Vec<(f64, f64)> {
+        let mut times: Vec<f64> = vec![0.0];
+        for s in self.breaks.iter().chain([&self.to]) {
+            times.push(law.time_of(s - self.from));
+        }
+        times.windows(2).map(|pair| (pair[0], pair[1])).collect()
+    }
+}
+
+/// A stretch of time in one part of a section.
+struct Part<'a> {
+    section: &'a Section<'a>,
+    law: &'a Law,
+    side: (f64, f64),
+    from: f64,
+    to: f64,
+    acceleration: &'a JointVec,
+}
+
+impl Part<'_> {
+    /// Its pieces, as many as it takes to be on the path.
+    fn pieces(&self, pieces: &mut Vec<Piece>, halvings: u8) {
+        let (from, to) = (self.from, self.to);
+        if to <= from {
+            return;
+        }
+        let length = to - from;
+        let piece = Piece::between(from, length, &self.state(from, 1.0), &self.state(to, -1.0));
+        let middle = from + 0.5 * length;
+        if halvings > 0 && length > 2.0 * SHORTEST && self.is_off(&piece.at(0.5 * length), middle) {
+            Part { to: middle, ..*self }.pieces(pieces, halvings - 1);
+            Part { from: middle, ..*self }.pieces(pieces, halvings - 1);
+        } else {
+            pieces.push(piece);
+        }
+    }
+
+    fn is_off(&self, piece: &State, time: f64) -> bool {
+        let exact = self.state(time, 1.0);
+        (0..JOINTS).any(|j| {
+            let acceleration = (piece.acceleration[j] - exact.acceleration[j]).abs();
+            (piece.position[j] - exact.position[j]).abs() > AWAY
+                || acceleration > ACCELERATION_AWAY * self.acceleration[j]
+        })
+    }
+
+    /// State at `time`, after (1) or before (−1) what jumps there.
+    fn state(&self, time: f64, after: f64) -> State {
+        let (s, v, a) = self.law.beside(time, after);
+        let at = self.section.at(self.section.from + s, self.side);
+        State {
+            position: at.position,
+            velocity: at.first.map(|q| q * v),
+            acceleration: std::array::from_fn(|j| at.first[j] * a + at.second[j] * v * v),
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Laws of time: where on a section of a path a motion is when.
+
+/// A part of a law in which the third derivative of the parameter is constant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Phase {
+    /// s.
+    pub start: f64,
+    /// s.
+    pub length: f64,
+    /// Parameter, and its first three derivatives by time, at the start.
+    pub s: f64,
+    pub speed: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+}
+
+impl Phase {
+    /// Parameter and its first two derivatives, `t` seconds after the start.
+    pub fn at(&self, t: f64) -> (f64, f64, f64) {
+        let (v, a, j) = (self.speed, self.acceleration, self.jerk);
+        (self.s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j)
+    }
+}
+
+/// A law of time of a section of a path, from rest to rest; the parameter begins at 0 and never goes back.
+#[derive(Clone, Debug)]
+pub(crate) struct Law {
+    pub phases: Vec<Phase>,
+    /// Parameter at the end.
+    pub end: f64,
+}
+
+impl Law {
+    /// Along the vertices (parameter, squared speed), between which the squared speed is a straight line over the parameter: the
+    /// acceleration is constant.
+    pub fn of_vertices(vertices: &[(f64, f64)]) -> Self {
+        let mut phases = Vec::with_capacity(vertices.len());
+        let mut start = 0.0;
+        for pair in vertices.windows(2) {
+            let [(s, a), (to, b)] = [pair[0], pair[1]];
+            let (v, w) = (a.max(0.0).sqrt(), b.max(0.0).sqrt());
+            if to <= s || v + w <= 0.0 {
+                continue;
+            }
+            let length = 2.0 * (to - s) / (v + w);
+            phases.push(Phase { start, length, s, speed: v, acceleration: (w - v) / length, jerk: 0.0 });
+            start += length;
+        }
+        Self { phases, end: vertices.last().map_or(0.0, |v| v.0) }
+    }
+
+    /// s.
+    pub fn duration(&self) -> f64 {
+        self.phases.last().map_or(0.0, |p| p.start + p.length)
+    }
+
+    /// Parameter and its first two derivatives at `t`.
+    pub fn at(&self, t: f64) -> (f64, f64, f64) {
+        if t <= 0.0 {
+            return (0.0, 0.0, self.phases.first().map_or(0.0, |p| p.acceleration));
+        }
+        if t >= self.duration() {
+            return (self.end, 0.0, self.phases.last().map_or(0.0, |p| p.at(p.length).2));
+        }
+        let phase = &self.phases[self.phases.partition_point(|p| p.start <= t).saturating_sub(1)];
+        let (s, v, a) = phase.at(t - phase.start);
+        (s.clamp(0.0, self.end), v.max(0.0), a)
+    }
+
+    /// The same on one side of `t`, where the acceleration may jump: after it (1) or before it (−1).
+    pub fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
+        const NEAR: f64 = 1e-10;
+        let (s, speed, _) = self.at(t);
+        let inside = (t + after * NEAR).clamp(NEAR, self.duration() - NEAR);
+        (s, speed, self.at(inside).2)
+    }
+
+    /// When the parameter is `s`.
+    pub fn time_of(&self, s: f64) -> f64 {
+        if s <= 0.0 {
+            return 0.0;
+        }
+        if s >= self.end {
+            return self.duration();
+        }
+        let phase = &self.phases[self.phases.partition_point(|p| p.s <= s).saturating_sub(1)];
+        let (mut low, mut high) = (0.0, phase.length);
+        let mut t = 0.5 * high;
+        // Newton's method, kept between two bounds.
+        for _ in 0..60 {
+            let (at, speed, _) = phase.at(t);
+            if at < s {
+                low = t
+            } else {
+                high = t
+            }
+            let next = t - (at - s) / speed;
+            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+            if (next - t).abs() < 1e-13 * self.duration() {
+                break;
+            }
+            t = next;
+        }
+        phase.start + t
+    }
+
+    /// The same law, averaged over a window of `window` seconds: what jumped in its acceleration becomes a ramp of that length.
+    /// It takes as much longer. Of a law without jerk alone.
+    pub fn averaged(&self, window: f64) -> Self {
+        let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
+        let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
+        times.sort_by(f64::total_cmp);
+        let mut phases: Vec<Phase> = Vec::with_capacity(times.len());
+        let mut s = 0.0;
+        for pair in times.windows(2) {
+            let (start, length) = (pair[0], pair[1] - pair[0]);
+            if length <= 0.0 {
+                continue;
+            }
+            let now = |t: f64| if t >= self.duration() { (self.end, 0.0, 0.0) } else { self.at(t) };
+            let (head, tail) = (now(start), now(start - window));
+            let (speed, acceleration) = ((head.0 - tail.0) / window, (head.1 - tail.1) / window);
+            // In the middle no acceleration jumps.
+            let middle = start + 0.5 * length;
+            let inside = |t: f64| if t <= 0.0 { 0.0 } else { now(t).2 };
+            let jerk = (inside(middle) - inside(middle - window)) / window;
+            let phase = Phase { start, length, s, speed, acceleration, jerk };
+            s = phase.at(length).0;
+            phases.push(phase);
+        }
+        // What rounding has left over, divided among all.
+        let factor = if s > 0.0 { self.end / s } else { 1.0 };
+        for phase in &mut phases {
+            phase.s *= factor;
+        }
+        Self { phases, end: self.end }
+    }
+}

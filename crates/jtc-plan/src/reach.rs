@@ -1,0 +1,105 @@
+//! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018), as `copp` computes it.
+use copp::constraints::Constraints;
+use copp::solver::topp2_ra::{ReachSet2OptionsBuilder, Topp2ProblemBuilder, topp2_ra};
+use nalgebra::DMatrixView;
+
+use crate::cells::{Cell, End, Room};
+use crate::{ArmDynamics, JOINTS, Limits};
+
+/// Rows of a place: acceleration and torque of each joint, both ways.
+const ROWS: usize = 4 * JOINTS;
+
+/// One place's limits, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
+struct Rows {
+    by_speed: [f64; ROWS],
+    by_acceleration: [f64; ROWS],
+    limit: [f64; ROWS],
+}
+
+/// Vertices (parameter, squared speed) of the fastest law from rest to rest along the cells, whose squared speed is `caps` at most and
+/// whose accelerations and torques are `shares` of their limits at most.
+pub(crate) fn fastest(
+    cells: &[Cell],
+    caps: &[f64],
+    shares: &[f64],
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Vec<(f64, f64)>, String> {
+    let places: Vec<f64> = cells.iter().map(|c| c.from).chain(cells.last().map(|c| c.to)).collect();
+    let count = places.len();
+    // The lower of the caps on either side of a place.
+    let cap = |i: usize| {
+        let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
+        left.min(right).clamp(1e-18, 1e18)
+    };
+    let caps_of_places: Vec<f64> = (0..count).map(cap).collect();
+    let mut constraints = Constraints::with_capacity(JOINTS, count);
+    let failed = |e: copp::diag::ConstraintError| e.to_string();
+    constraints.with_s(places.as_slice()).map_err(failed)?;
+    constraints.with_constraint_1order(caps_of_places.as_slice(), 0).map_err(failed)?;
+    // A place belongs to the cell after it, and where that looks otherwise, also to the cell before it.
+    let after: Vec<Rows> = (0..count)
+        .map(|i| match cells.get(i) {
+            Some(cell) => Rows::new(&cell.ends[0], shares[i], caps_of_places[i], limits, arm),
+            None => Rows::new(&cells[count - 2].ends[1], shares[count - 2], caps_of_places[i], limits, arm),
+        })
+        .collect();
+    append(&mut constraints, &after, 0)?;
+    for i in 1..count - 1 {
+        let (left, right) = (&cells[i - 1].ends[1], &cells[i].ends[0]);
+        if left.point.first != right.point.first
+            || left.point.second != right.point.second
+            || shares[i - 1] < shares[i]
+        {
+            let before = Rows::new(left, shares[i - 1], caps_of_places[i], limits, arm);
+            append(&mut constraints, &[before], i)?;
+        }
+    }
+    let problem = Topp2ProblemBuilder::with_constraint(&constraints, (0, count - 1), (0.0, 0.0))
+        .build()
+        .map_err(|e| e.to_string())?;
+    let options = ReachSet2OptionsBuilder::new().build().map_err(|e| e.to_string())?;
+    let squares = topp2_ra(&problem, &options).map_err(|e| e.to_string())?;
+    if squares[1..count - 1].iter().any(|a| !(*a > 0.0 && a.is_finite())) {
+        return Err("the speed along the path is 0 where it does not stop".into());
+    }
+    Ok(places.into_iter().zip(squares).collect())
+}
+
+/// Adds the rows of the places from the one with index `first` on.
+fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<(), String> {
+    let flat = |part: fn(&Rows) -> &[f64; ROWS]| -> Vec<f64> { rows.iter().flat_map(|r| *part(r)).collect() };
+    let (a, b, c) = (flat(|r| &r.by_speed), flat(|r| &r.by_acceleration), flat(|r| &r.limit));
+    let matrix = |values| DMatrixView::from_slice(values, ROWS, rows.len());
+    constraints
+        .with_constraint_2order(&matrix(&a), &matrix(&b), &matrix(&c), first, false)
+        .map(|_| ())
+        .map_err(|e| e.to_string())
+}
+
+impl Rows {
+    fn new(end: &End, share: f64, cap: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> Self {
+        let mut rows =
+            Self { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };
+        let mut put = |row: usize, by_speed: f64, by_acceleration: f64, high: f64, low: f64| {
+            for (row, sign, limit) in [(row, 1.0, high), (row + JOINTS, -1.0, low)] {
+                rows.by_speed[row] = sign * by_speed;
+                rows.by_acceleration[row] = sign * by_acceleration;
+                rows.limit[row] = limit;
+            }
+        };
+        for j in 0..JOINTS {
+            let limit = share * limits.acceleration[j];
+            put(j, end.point.second[j], end.point.first[j], limit, limit);
+        }
+        if let (Some(loads), Some(arm)) = (&end.loads, arm) {
+            let room = Room::new(end, loads, cap, limits, arm);
+            for j in 0..JOINTS {
+                let least = 1e-3 * limits.torque[j];
+                let (high, low) = ((share * room.high[j]).max(least), (share * room.low[j]).max(least));
+                put(2 * JOINTS + j, loads.speed[j], loads.mass[j], high, low);
+            }
+        }
+        rows
+    }
+}

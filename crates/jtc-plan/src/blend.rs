@@ -73,6 +73,11 @@ impl BlendedPath {
         Ok(Self { corners, given })
     }
 
+    /// Whether two waypoints are so near to each other that there is no leg between them.
+    pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
+        distance(a, b) <= SAME
+    }
+
     /// Index of the leg that `s` is on, the next one at a corner.
     fn leg(&self, s: f64) -> usize {
         let after = self.corners.partition_point(|c| c.parameter <= s);

@@ -4,8 +4,10 @@ use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Shortest piece, s: the third derivative of a shorter one would be rounding.
+/// Shortest piece where jerk is limited, s: the third derivative of a shorter one would be rounding.
 const SHORTEST: f64 = 2e-4;
+/// Shortest piece where it is not, s: for the second derivative.
+const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
 /// How far the middle of a piece may be off the path, rad.
 const AWAY: f64 = 1e-9;
 /// How far the acceleration in its middle may be off, as a share of its limit.
@@ -39,6 +41,7 @@ impl Section<'_> {
     /// The motion along it. Its first waypoint time is its start.
     pub fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
+        let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };
         for (part, (begin, end)) in self.parts().zip(self.times(law)) {
             let part_of = |from: f64, to: f64| Part {
                 section: self,
@@ -48,17 +51,18 @@ impl Section<'_> {
                 to,
                 acceleration: &limits.acceleration,
             };
-            let first = law.phases.partition_point(|p| p.start <= begin + SHORTEST);
-            let inside = law.phases[first..].iter().map(|p| p.start).take_while(|t| *t < end - SHORTEST);
+            let first = law.phases.partition_point(|p| p.start <= begin + shortest);
+            let inside = law.phases[first..].iter().map(|p| p.start).take_while(|t| *t < end - shortest);
             let mut from = begin;
             for t in inside.chain([end]) {
-                if t - from >= SHORTEST || t == end {
+                if t - from >= shortest || t == end {
                     part_of(from, t).pieces(&mut pieces, HALVINGS);
                     from = t;
                 }
             }
         }
-        let waypoints = self.waypoints.iter().map(|s| law.time_of(s - self.from));
+        let time = |s: &f64| if *s == self.to { law.duration() } else { law.time_of(s - self.from) };
+        let waypoints = self.waypoints.iter().map(time);
         let times = std::iter::once(0.0).chain(waypoints).collect();
         Motion::new(pieces, self.path.at(self.to).position, times)
     }
@@ -66,9 +70,8 @@ impl Section<'_> {
     /// Begin and end of each part in time, none shorter than a piece.
     fn times(&self, law: &Law) -> Vec<(f64, f64)> {
         let mut times: Vec<f64> = vec![0.0];
-        for s in self.breaks.iter().chain([&self.to]) {
-            times.push(law.time_of(s - self.from));
-        }
+        times.extend(self.breaks.iter().map(|s| law.time_of(s - self.from)));
+        times.push(law.duration());
         times.windows(2).map(|pair| (pair[0], pair[1])).collect()
     }
 }
@@ -91,7 +94,13 @@ impl Part<'_> {
             return;
         }
         let length = to - from;
-        let piece = Piece::between(from, length, &self.state(from, 1.0), &self.state(to, -1.0));
+        let mut start = self.state(from, 1.0);
+        // Where it follows another one there is no jump, not even one of rounding.
+        if let Some(last) = pieces.last() {
+            let end = last.at(last.length);
+            (start.position, start.velocity) = (end.position, end.velocity);
+        }
+        let piece = Piece::between(from, length, &start, &self.state(to, -1.0));
         let middle = from + 0.5 * length;
         if halvings > 0 && length > 2.0 * SHORTEST && self.is_off(&piece.at(0.5 * length), middle) {
             Part { to: middle, ..*self }.pieces(pieces, halvings - 1);

@@ -35,7 +35,7 @@ pub fn point_to_point(
 /// The same without torque.
 fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     if from == to {
-        return Ok(standing(from));
+        return Ok(standing(from, to, 2));
     }
     if !limits.has_jerk() {
         return Ok(trapezoid::straight_or_joined(from, to, limits));
@@ -43,10 +43,14 @@ fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pl
     ruckig(from, to, limits)
 }
 
-/// A rest.
-pub(crate) fn standing(at: &JointVec) -> Motion {
-    let rest = State::rest(*at);
-    Motion::new(vec![Piece::between(0.0, STANDING, &rest, &rest)], *at, vec![0.0, STANDING])
+/// A rest, from a place to what counts as the same, at which there are `waypoints`.
+pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Motion {
+    let piece = Piece::between(0.0, STANDING, &State::rest(*from), &State::rest(*to));
+    let mut times = vec![0.0; waypoints];
+    if let Some(last) = times.last_mut() {
+        *last = STANDING;
+    }
+    Motion::new(vec![piece], *to, times)
 }
 
 /// By Ruckig, the joint of the longest way deciding where the others may follow it on a straight line.

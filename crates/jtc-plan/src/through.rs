@@ -1,5 +1,5 @@
 //! Through waypoints, with given times.
-use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along};
+use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, p2p};
 
 /// A waypoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ impl From<JointVec> for Waypoint {
 }
 
 /// From the first waypoint to the last, as fast as the limits allow, on straight legs whose corners are rounded within `blend` rad;
-/// 0: a stop at each waypoint.
+/// 0: a stop at each waypoint. Waypoints that are all the same are a rest of 10 ms.
 ///
 /// # Errors
 ///
@@ -33,5 +33,11 @@ pub fn through(
         limits.holds(&waypoint.position, i + 1)?;
     }
     let positions: Vec<JointVec> = waypoints.iter().map(|w| w.position).collect();
+    if let [first, others @ ..] = &positions[..]
+        && !others.is_empty()
+        && others.iter().all(|p| BlendedPath::are_one(first, p))
+    {
+        return Ok(p2p::standing(first, &positions[positions.len() - 1], positions.len()));
+    }
     along(&BlendedPath::new(&positions, blend)?, limits, arm)
 }

@@ -56,6 +56,11 @@ impl<'a> ArmDynamics<'a> {
         self.friction.is_some()
     }
 
+    /// Speed at which the sign of the friction polynomial is whole, rad/s; `None` where there is none.
+    pub(crate) fn sign_width(&self) -> Option<f64> {
+        matches!(self.friction, Some(Friction::Polynomial(_))).then_some(self.sign_width)
+    }
+
     fn with_ranges(mut self) -> Self {
         let ranges = (0..JOINTS).map(|j| {
             [-1.0, 1.0].map(|sign| {

@@ -17,8 +17,11 @@ impl Trapezoid {
     /// The fastest one.
     fn new(way: f64, velocity: f64, acceleration: f64) -> Self {
         let distance = way.abs();
+        if distance == 0.0 {
+            return Self { acceleration: 0.0, ramp: 0.0, cruise: 0.0 };
+        }
         let ramp = (velocity / acceleration).min((distance / acceleration).sqrt());
-        let cruise = if ramp > 0.0 { (distance / (acceleration * ramp) - ramp).max(0.0) } else { 0.0 };
+        let cruise = (distance / (acceleration * ramp) - ramp).max(0.0);
         Self { acceleration: acceleration.copysign(way), ramp, cruise }
     }
 

@@ -9,7 +9,7 @@ use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 /// Of a limit that the arithmetic may exceed it by.
 const ROUNDING: f64 = 1e-9;
 /// Distance of the samples of the torque, s.
-const TORQUE_STEP: f64 = 0.005;
+const TORQUE_STEP: f64 = 0.004;
 /// What the torque may reach of its limit at the samples: between them it may be higher.
 const TORQUE_SHARE: f64 = 0.999;
 /// Samples of the torque at most; a longer motion has them further apart.
@@ -75,10 +75,9 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
 /// By what a piece's time has to be multiplied so that the torque suffices in it, by a few samples: as far as that which depends on the
 /// speed goes. 1 where it suffices, and where nothing that depends on the speed helps.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
-    let count = (piece.length / TORQUE_STEP).ceil().clamp(1.0, 8.0) as usize;
     let mut most = 1.0f64;
-    for i in 0..=count {
-        let state = piece.at(piece.length * i as f64 / count as f64);
+    for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm) {
+        let state = piece.at(t);
         let torque = arm.torque(&state);
         if (0..JOINTS).all(|j| torque[j].abs() <= TORQUE_SHARE * limits.torque[j]) {
             continue;
@@ -99,12 +98,17 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
 /// A bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth where it is above `limit`: the magnitudes of its
 /// Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {
+    hull(&bernstein(polynomial)[..polynomial.len()], limit, 6)
+}
+
+/// Bernstein coefficients on 0..1.
+fn bernstein(polynomial: &[f64]) -> [f64; 5] {
     let degree = polynomial.len() - 1;
     let mut bernstein = [0.0; 5];
     for (i, b) in bernstein.iter_mut().enumerate().take(degree + 1) {
         *b = (0..=i).map(|k| polynomial[k] * BINOMIAL[i][k] / BINOMIAL[degree][k]).sum();
     }
-    hull(&bernstein[..=degree], limit, 6)
+    bernstein
 }
 
 const BINOMIAL: [[f64; 5]; 5] = [
@@ -146,7 +150,7 @@ struct Load {
 /// Slows a motion down until the torque suffices.
 fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
     holds_where_it_rests(&motion, limits, arm)?;
-    let loads = loads(&motion, arm);
+    let loads = loads(&motion, limits, arm);
     let over = |factor: f64| {
         loads.iter().find_map(|load| {
             let slow = 1.0 / factor;
@@ -201,23 +205,48 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     Ok(())
 }
 
-fn loads(motion: &Motion, arm: &ArmDynamics) -> Vec<Load> {
+/// Moments of a piece, s from its start, at which its torque is sampled: both ends, since the acceleration may jump there, what lies between
+/// them no further apart than `step`, and where a joint becomes so fast that the sign of its friction is whole. Where its accelerations
+/// are not between those of its ends there are more.
+fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
+    let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
+    let count = (piece.length / step).ceil().max(least) as usize;
+    let mut moments: Vec<f64> = (0..=count).map(|i| piece.length * i as f64 / count as f64).collect();
+    if let Some(width) = arm.sign_width() {
+        let (first, last) = (piece.at(0.0).velocity, piece.at(piece.length).velocity);
+        for (v, w) in first.iter().zip(&last) {
+            for edge in [-width, width] {
+                if (v - edge) * (w - edge) < 0.0 {
+                    moments.push(piece.length * (edge - v) / (w - v));
+                }
+            }
+        }
+    }
+    moments
+}
+
+/// Whether a joint's acceleration in the piece may be outside of those at its ends.
+fn bulges(piece: &Piece, limits: &Limits) -> bool {
+    let h = piece.length;
+    piece.coefficients.iter().zip(&limits.acceleration).any(|([_, _, c2, c3, c4, c5], limit)| {
+        let b = bernstein(&[2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h * h * h]);
+        let slack = 1e-3 * limit;
+        let (low, high) = (b[0].min(b[3]) - slack, b[0].max(b[3]) + slack);
+        b[1].min(b[2]) < low || b[1].max(b[2]) > high
+    })
+}
+
+fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
     let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
     let mut loads = Vec::new();
-    let mut next = 0.0;
     for piece in &motion.pieces {
-        let end = piece.start + piece.length;
-        // Both sides of a jump, and what lies between them.
-        let inside = std::iter::successors(Some(f64::max(next, piece.start)), |t| Some(t + step));
-        let inside = inside.take_while(|t| *t < end).chain([end]);
-        for t in inside {
-            let s = piece.at(t - piece.start);
+        for t in moments(piece, step, limits, arm) {
+            let s = piece.at(t);
             let hold = arm.holding(&s.position);
-            let mut whole = arm.rigid(&s.position, &s.velocity, &s.acceleration);
-            whole.iter_mut().zip(&hold).for_each(|(w, h)| *w -= h);
-            loads.push(Load { time: t, hold, motion: whole, velocity: s.velocity });
+            let mut motion = arm.rigid(&s.position, &s.velocity, &s.acceleration);
+            motion.iter_mut().zip(&hold).for_each(|(m, h)| *m -= h);
+            loads.push(Load { time: piece.start + t, hold, motion, velocity: s.velocity });
         }
-        next = if piece.length < step { next.max(piece.start + step) } else { end };
     }
     loads
 }

@@ -21,7 +21,7 @@ pub use arm::{ArmCommand, ImportArgs};
 pub use bench::BenchCommand;
 pub use log::LogCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
-pub use motion::{CheckArgs, RunArgs, RunFiles, TeachCommand, TrajCommand};
+pub use motion::{CheckArgs, ContinueArgs, RunArgs, RunFiles, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use payload::PayloadCommand;
@@ -263,7 +263,7 @@ impl Command {
             Command::Demo(_)
                 | Command::Jog(_)
                 | Command::Move(_)
-                | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay(_))
+                | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay { .. } | TrajCommand::Continue(_))
                 | Command::Teach(TeachCommand::Record { .. })
         )
     }

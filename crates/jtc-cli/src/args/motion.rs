@@ -59,12 +59,29 @@ pub enum TrajCommand {
                             jtc traj run cycle.csv --approach --repeat 10"
     )]
     Run(RunArgs),
-    /// Run again what a recording is of: its last execution, along the commanded path
+    /// Run again what a recording is of: its last execution, along the commanded path or the measured one
     #[command(
-        after_help = "As `jtc traj run`, which takes recordings too; here any other file is refused.\n\nExamples:\n  \
-                            jtc traj replay run.mcap --approach\n  jtc traj replay run.csv --speed 50 --record again.mcap"
+        after_help = "As `jtc traj run`, which takes recordings too; here any other file is refused. --measured takes what was measured\n\
+                            every 40 ms: of a motion by hand nothing was commanded.\n\nExamples:\n  \
+                            jtc traj replay run.mcap --approach\n  jtc traj replay run.csv --speed 50 --record again.mcap\n  \
+                            jtc traj replay taught.mcap --measured --approach"
     )]
-    Replay(RunArgs),
+    Replay {
+        #[command(flatten)]
+        run: RunArgs,
+        /// What was measured: the last motion by hand, or else the last execution
+        #[arg(long, env = "JTC_MEASURED", value_parser = FalseyValueParser::new())]
+        measured: bool,
+    },
+    /// Go on with a run that an error, a stop or a lost link broke off
+    #[command(
+        after_help = "The recording of that run shows how far it got; an MCAP file holds the whole trajectory as well, for a CSV file\n\
+                            --trajectory names it. Where the arm stands on the path behind that place, the rest begins there; else an approach\n\
+                            leads to the place at which the run was seen last. The rest speeds up from standstill and follows the same path.\n\n\
+                            Examples:\n  jtc traj run cycle.csv --record run.mcap\n  jtc traj continue run.mcap\n  \
+                            jtc traj continue run.csv --trajectory cycle.csv --record rest.mcap"
+    )]
+    Continue(ContinueArgs),
     /// Pause on the path
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),
@@ -112,6 +129,26 @@ pub struct RunArgs {
     pub accept: AcceptArgs,
 }
 
+/// Options of `jtc traj continue`.
+#[derive(Args, Debug)]
+pub struct ContinueArgs {
+    /// Recording of the run that was broken off, .mcap or .csv
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// The trajectory that was run, as it was run; default: the one in the recording
+    #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Arm whose limits and masses count, TOML or URDF; default: that of the controller
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    #[command(flatten)]
+    pub link: LinkArgs,
+    #[command(flatten)]
+    pub files: RunFiles,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
+}
+
 /// Files that a run writes.
 #[derive(Args, Clone, Debug)]
 pub struct RunFiles {
@@ -138,7 +175,10 @@ pub enum TeachCommand {
     #[command(
         after_help = "The file is written while the arm is led: a killed program leaves what was led up to then. If it cannot be\n\
                             written to (full disk), the recording ends at once and the arm is held, with exit code 5.\n\n\
-                            Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20"
+                            With --waypoints the file holds as few of the positions as keep the others within --tolerance of the straight legs\n\
+                            between them, for `jtc plan`; until the end it holds the motion.\n\n\
+                            Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20\n  \
+                            jtc teach record waypoints.csv --waypoints --tolerance 0.02"
     )]
     Record {
         /// Trajectory file to write, CSV
@@ -150,5 +190,11 @@ pub enum TeachCommand {
         /// End after so many seconds
         #[arg(long, env = "JTC_DURATION", value_name = "S")]
         duration: Option<f64>,
+        /// Write waypoints instead of the motion
+        #[arg(long, env = "JTC_WAYPOINTS", value_parser = FalseyValueParser::new())]
+        waypoints: bool,
+        /// How far the motion may be from the legs between waypoints, rad of the joint that is furthest
+        #[arg(long, env = "JTC_TOLERANCE", value_name = "RAD", default_value_t = 0.01)]
+        tolerance: f64,
     },
 }

@@ -35,7 +35,13 @@ pub struct PlanArgs {
     #[arg(long, env = "JTC_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
     pub payload: Option<jtc_core::Payload>,
     /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque
-    #[arg(long, env = "JTC_TEMPERATURE", value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        env = "JTC_TEMPERATURE",
+        value_name = "C",
+        default_value_t = 20.0,
+        allow_hyphen_values = true
+    )]
     pub temperature: f64,
     /// Write a page with the motion, its limits and what binds when, .html
     #[arg(long, env = "JTC_REPORT", value_name = "FILE")]

@@ -27,6 +27,15 @@ pub fn typed(path: &Path) -> String {
     }
 }
 
+/// The arm that was named, or the built-in one; its warnings go to stderr.
+fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    for warning in &arm.warnings {
+        out.note(format!("note: {warning}"));
+    }
+    Ok(arm)
+}
+
 /// A trajectory at the speed asked for, and the arm that it is checked against.
 pub struct Job {
     /// What the file was, and what was derived from it.
@@ -50,11 +59,17 @@ pub struct Job {
 impl Job {
     /// Reads the files; notes and warnings go to stderr.
     pub fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
-        let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-        for warning in &arm.warnings {
-            out.note(format!("note: {warning}"));
-        }
+        let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
+        Self::with(arm, loaded, file, args, out)
+    }
+
+    /// The same of a trajectory that was read already.
+    pub fn of(loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
+        Self::with(arm_of(args, out)?, loaded, file, args, out)
+    }
+
+    fn with(arm: Arm, loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let loaded = if args.deg { loaded.in_degrees().map_err(|e| e.in_file(file))? } else { loaded };
         let overshoot = overshoot_words(&loaded.overshoot);
         for note in loaded.notes.iter().chain(&overshoot) {

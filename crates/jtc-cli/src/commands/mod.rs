@@ -2,6 +2,7 @@
 
 mod arm;
 mod bench;
+mod continued;
 mod decode;
 mod demo;
 mod doctor;

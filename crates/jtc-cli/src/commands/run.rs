@@ -6,6 +6,7 @@ mod leg;
 mod outputs;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
@@ -279,7 +280,8 @@ impl Stage<'_> {
             if reel.is_none() {
                 let name = &course.name;
                 let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
-                let info = run_report::info(&job.arm, &source, &name, start_unix_ns);
+                let mut info = run_report::info(&job.arm, &source, &name, start_unix_ns);
+                info.commanded = Some(Arc::new(job.trajectory.clone()));
                 let tape = outputs.begin(&info, out)?;
                 *reel = Some(Reel { info, tape, start: now });
             }

@@ -27,12 +27,15 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
-        TeachCommand::Record { file, force, link, duration } => record(
-            OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?,
-            link,
-            *duration,
-            out,
-        ),
+        TeachCommand::Record { file, force, link, duration, waypoints, tolerance } => {
+            if *waypoints && !(1e-6..=1.0).contains(tolerance) {
+                let message =
+                    format!("a tolerance of {tolerance} rad is outside 0.000001..1; nothing was sent");
+                return Err(Failure::usage(message).hint("0.01 rad is half a degree"));
+            }
+            let output = OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?;
+            record(output, link, *duration, waypoints.then_some(*tolerance), out)
+        }
     }
 }
 
@@ -48,7 +51,14 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
+/// Records until the person or the time ends it; with a tolerance (rad) as waypoints.
+fn record(
+    file: OutputFile,
+    link: &LinkArgs,
+    duration: Option<f64>,
+    thin: Option<f64>,
+    out: &Output,
+) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let (teaching, begun) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
     let stop = stop_at_once_with(*out, Arc::clone(&teaching), Arc::clone(&begun))?;
@@ -91,7 +101,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
         }
     }
     // What was recorded is completed first, whatever becomes of the link.
-    let written = lost.map_or_else(|| finish(taught, out), Err);
+    let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     if failed.is_none() && !was_on {
         session.teach(false)?;
         teaching.store(false, Ordering::Relaxed);
@@ -136,11 +146,19 @@ fn without_error(s: Status) -> Result<Status, Failure> {
     Err(failure.hint(words::next_step(&s)))
 }
 
-fn finish(taught: TaughtFile, out: &Output) -> Result<(), Failure> {
+fn finish(taught: TaughtFile, thin: Option<f64>, out: &Output) -> Result<(), Failure> {
     let name = taught.name().to_owned();
-    let Some(text) = taught.finish()? else {
+    let Some(text) = taught.finish(thin)? else {
         return Err(Failure::usage("the arm was not moved: nothing was written"));
     };
+    if thin.is_some() {
+        let count = text.lines().count().saturating_sub(1);
+        out.result(&json!({ "file": name, "waypoints": count }), || {
+            let typed = typed(Path::new(&name));
+            format!("{name}: {count} waypoints\nnext: jtc plan {typed} -o motion.csv --blend 0.05")
+        });
+        return Ok(());
+    }
     let loaded = Loaded::parse(&text, None)?;
     for note in &loaded.notes {
         out.note(format!("note: {note}"));

@@ -13,8 +13,8 @@ use jtc_wire::Joint;
 use serde_json::json;
 
 use super::job::{Job, typed};
-use super::run;
-use crate::args::{CheckArgs, LinkArgs, TrajCommand};
+use super::{continued, run};
+use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 use crate::progress::Progress;
 
 /// Does one of the family.
@@ -25,15 +25,8 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         }
         TrajCommand::Info { file, deg } => info(file, *deg, out),
         TrajCommand::Run(args) => run::run(args, out),
-        TrajCommand::Replay(args) => {
-            if Loaded::load(&args.file, None)?.form != Form::Recording {
-                let message = format!("{} is no recording of a run", args.file.display());
-                return Err(
-                    Failure::usage(message).hint(format!("`jtc traj run {}` runs it", typed(&args.file)))
-                );
-            }
-            run::run(args, out)
-        }
+        TrajCommand::Replay { run: args, measured } => replay(args, *measured, out),
+        TrajCommand::Continue(args) => continued::continued(args, out),
         TrajCommand::Pause(link) => send(
             || link.session().map_err(may_be_moving),
             Session::pause,
@@ -47,6 +40,17 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         }
         TrajCommand::Speed { percent, link } => speed(*percent, link, out),
     }
+}
+
+/// Runs what a recording is of.
+fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
+    let recorded = if measured { Loaded::load_measured(&args.file) } else { Loaded::load(&args.file, None) }?;
+    if recorded.form != Form::Recording {
+        let message = format!("{} is no recording of a run", args.file.display());
+        return Err(Failure::usage(message).hint(format!("`jtc traj run {}` runs it", typed(&args.file))));
+    }
+    let load = |out: &Output| Job::of(recorded, &args.file, &args.check, out);
+    run::perform(&run::Course::of(args), load, None, out)
 }
 
 /// Shows or sets the speed override.

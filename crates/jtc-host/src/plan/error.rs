@@ -48,9 +48,11 @@ impl Diagnose for PlanError {
             Self::Speed { .. } => {
                 Diagnosis::new(ErrorKind::Usage, "speed", "100 is as fast as the limits allow")
             }
-            Self::TooLong { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
-            }
+            Self::TooLong { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "too-long",
+                "plan it in parts, at a higher speed, or with corners that are rounded (`--blend`)",
+            ),
         }
     }
 }

@@ -45,6 +45,9 @@ const SHARE: f64 = 0.98;
 /// Share of the torque limit that a plan uses: the rest is for the controller's own corrections, or it would be at its limit for longer
 /// than it may (J-43).
 const TORQUE_SHARE: f64 = 0.9;
+/// Time in which the rest of a trajectory gets to its speed, s, and longer ones where the check refuses that.
+const RAMP_S: f64 = 0.5;
+const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Bearing temperature that a plan reckons with, °C: that of a cold hall. Friction is higher there than at the usual temperature.
 pub const COLD: f64 = 20.0;
 /// A motion that is slowed down by more than this is none any more.
@@ -143,8 +146,41 @@ impl<'a> Planner<'a> {
         self.checked(&motion, &first, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
     }
 
+    /// The rest of a trajectory from `from_ms` of its path on, where the arm stands at `start`: on the same path, at its own times once it has
+    /// sped up, as fast as the check allows that.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError::Refused`] when the check refuses the rest however slowly it begins, [`PlanError::TooLong`].
+    pub fn rest(
+        &self,
+        trajectory: &Trajectory,
+        from_ms: u32,
+        start: Option<[f64; JOINTS]>,
+    ) -> Result<Trajectory, PlanError> {
+        let checker = Checker {
+            model: self.model,
+            friction: self.friction,
+            start,
+            upload: self.upload,
+            ..Checker::new(self.config)
+        };
+        let mut ramps = RAMPS_S.into_iter();
+        let mut ramp_s = RAMP_S;
+        loop {
+            let rest = rest_of(trajectory, from_ms, ramp_s)?;
+            let verdict = checker.check(&rest);
+            match ramps.next() {
+                _ if verdict.is_ok() => return Ok(rest),
+                Some(longer) => ramp_s = longer,
+                None => return Err(PlanError::Refused(Box::new(verdict))),
+            }
+        }
+    }
+
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {
-        self.model.map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
+        self.model
+            .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
     }
 
     /// What a plan keeps to. A place that takes more than the usual share of a torque to be held, but not too much, can be left again.
@@ -188,8 +224,13 @@ impl<'a> Planner<'a> {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
             // Cold, and as before a run: where friction brakes, it is its lack that costs torque.
-            let cold = Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
+            let cold =
+                Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict = if cold.is_ok() { checker.check(&sampled.trajectory) } else { cold };
+            // Corners closer than its steps are no motion that a longer trajectory could carry.
+            if step > STEP_MS && verdict.warnings().next().is_some() {
+                return Err(PlanError::TooLong { seconds: sampled.trajectory.duration_s() });
+            }
             let Some(worst) = verdict.refusals().next().cloned() else {
                 let scale = sampled.scale;
                 return Ok(Planned {

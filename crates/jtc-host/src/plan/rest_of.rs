@@ -29,7 +29,7 @@ pub fn where_it_stands(
         let at = trajectory.at_ms(ms)?.position;
         let away_rad = (0..JOINTS).map(|j| (at[j] - position[j]).abs()).fold(0.0, f64::max);
         match &mut nearest {
-            Some(before) if away_rad < before.away_rad => *before = Standstill { ms, away_rad },
+            Some(before) if away_rad <= before.away_rad => *before = Standstill { ms, away_rad },
             // The path has left the place again: a later passage is another one.
             Some(_) if away_rad > tolerance => break,
             None if away_rad <= tolerance => nearest = Some(Standstill { ms, away_rad }),

@@ -1,6 +1,8 @@
 //! The description that a recording carries: the arm, its limits, where the samples come from.
 
-use crate::Arm;
+use std::sync::Arc;
+
+use crate::{Arm, Trajectory};
 
 /// One joint's name and limits.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +70,8 @@ pub struct RecordingInfo {
     pub flange: [f64; 6],
     /// How the run ended.
     pub ending: Ending,
+    /// The whole trajectory that the run is of, in MCAP files: what is needed to go on where it was broken off.
+    pub commanded: Option<Arc<Trajectory>>,
 }
 
 impl RecordingInfo {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Seek, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use host_kit::mcap::each_record;
 use jtc_wire::{Code, NodeState};
@@ -12,6 +13,7 @@ use mcap::{Compression, McapError, WriteOptions};
 use super::cdr::{Decoder, Encoder};
 use super::{Ending, Recording, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
+use crate::trajectory::Loaded;
 
 /// Name of the metadata record with the [`RecordingInfo`].
 const METADATA: &str = "openjtc";
@@ -23,6 +25,8 @@ const CONTROL_TOPIC: &str = "/jtc/control";
 const STATE_TOPIC: &str = "/jtc/state";
 /// A log of a flight recorder as it was fetched (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
+/// The trajectory that is run, in the header-less form of 19 columns of integers.
+const TRAJECTORY_TOPIC: &str = "/jtc/trajectory";
 
 impl From<McapError> for RecordingError {
     fn from(e: McapError) -> Self {
@@ -58,6 +62,13 @@ impl<W: Write + Seek> McapWriter<W> {
         let joint = out.add_schema(schema::JOINT_STATE, "ros2msg", schema::JOINT_STATE_TEXT.as_bytes())?;
         let control = out.add_schema(schema::CONTROL, "ros2msg", schema::CONTROL_TEXT.as_bytes())?;
         let state = out.add_schema(schema::STATE, "ros2msg", schema::STATE_TEXT.as_bytes())?;
+        if let Some(text) = info.commanded.as_ref().and_then(|t| t.to_int16_csv().ok()) {
+            let channel = out.add_channel(0, TRAJECTORY_TOPIC, "openjtc", &none)?;
+            let time = info.start_unix_ns;
+            let header =
+                MessageHeader { channel_id: channel, sequence: 0, log_time: time, publish_time: time };
+            out.write_to_known_channel(&header, text.as_bytes())?;
+        }
         Ok(Self {
             states: out.add_channel(joint, STATES_TOPIC, "cdr", &none)?,
             commands: out.add_channel(joint, COMMANDS_TOPIC, "cdr", &none)?,
@@ -189,6 +200,7 @@ type Gathered = (Sample, BTreeSet<u16>);
 pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let mut info: Option<RecordingInfo> = None;
     let mut ending: Option<Ending> = None;
+    let mut commanded = None;
     let mut topics = BTreeMap::new();
     let mut samples: BTreeMap<u64, Gathered> = BTreeMap::new();
     let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
@@ -209,6 +221,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
                 let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
                 let topic = topics.get(&header.channel_id).ok_or(unknown)?;
                 if topic == LOG_TOPIC {
+                    return Ok(());
+                }
+                if topic == TRAJECTORY_TOPIC {
+                    let read =
+                        std::str::from_utf8(&data).ok().and_then(|text| Loaded::parse(text, None).ok());
+                    commanded = read.map(|read| Arc::new(read.trajectory));
                     return Ok(());
                 }
                 let (sample, came) = samples.entry(header.log_time).or_default();
@@ -241,8 +259,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         .into_iter()
         .map(|(time_ns, (sample, _))| Sample { time_s: seconds(&info, time_ns), ..sample })
         .collect();
-    if let (Some(info), Some(ending)) = (&mut info, &ending) {
-        info.ending = ending.clone();
+    if let Some(info) = &mut info {
+        info.commanded = commanded;
+        if let Some(ending) = &ending {
+            info.ending = ending.clone();
+        }
     }
     let ending = ending.or_else(|| info.as_ref().map(|i| i.ending.clone())).unwrap_or_default();
     Ok(Recording::new(info, ending, samples, cut))

@@ -60,6 +60,7 @@ impl RecordingInfo {
             joints,
             flange: split(&text("flange_origin")),
             ending: Ending { outcome: text("outcome"), reason: text("reason") },
+            commanded: None,
         }
     }
 }

@@ -8,6 +8,7 @@
 //! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] gives what
 //! is missing.
 
+mod broken_off;
 #[cfg(feature = "mcap")]
 mod cdr;
 mod csv;
@@ -27,6 +28,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+pub use broken_off::{BrokenOff, NothingLeft};
 pub use error::RecordingError;
 pub use info::{Ending, JointInfo, RecordingInfo};
 pub use live::{FLUSH, LiveRecorder, SampleSink};

@@ -6,7 +6,7 @@ use jtc_core::JOINTS;
 use jtc_wire::RawPoint;
 
 use super::fit::{FitError, Samples};
-use super::{Form, Loaded, Point, Trajectory};
+use super::{Form, Loaded, Point, ScaleError, Trajectory};
 use crate::file::{FileError, Place, number, rows, short};
 
 /// Columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
@@ -238,6 +238,23 @@ impl Trajectory {
     pub fn to_exact_csv(&self) -> String {
         // Adding zero makes −0 a plain one.
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
+    }
+
+    /// In the header-less form of 19 columns of integers: exactly what the wire carries.
+    ///
+    /// # Errors
+    ///
+    /// The first number that a trajectory frame cannot carry.
+    pub fn to_int16_csv(&self) -> Result<String, ScaleError> {
+        let mut out = String::new();
+        for (i, raw) in self.raw()?.iter().enumerate() {
+            let _ = write!(out, "{}", i * usize::from(self.step_ms));
+            for v in raw.position.iter().chain(&raw.velocity).chain(&raw.acceleration) {
+                let _ = write!(out, ",{v}");
+            }
+            out.push('\n');
+        }
+        Ok(out)
     }
 
     fn csv_with(&self, number: impl Fn(f64) -> String) -> String {

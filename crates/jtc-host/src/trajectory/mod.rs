@@ -98,6 +98,15 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
+    /// From a recording, as it was measured instead of as it was commanded: its last motion by hand, or else its last execution.
+    ///
+    /// # Errors
+    ///
+    /// A file that is no recording, or holds no such motion.
+    pub fn load_measured(path: &Path) -> Result<Self, FileError> {
+        replay::load_measured(path)
+    }
+
     /// The same numbers as degrees, degrees/s and degrees/s²; an error where the file names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {

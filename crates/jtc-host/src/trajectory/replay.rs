@@ -7,7 +7,7 @@ use std::path::Path;
 
 use jtc_core::JOINTS;
 
-use jtc_wire::TrajectoryState;
+use jtc_wire::{ControllerState, TrajectoryState};
 
 use super::fit::Samples;
 use super::{Form, Loaded, Point};
@@ -17,6 +17,11 @@ use crate::sample::Sample;
 
 /// Points further apart than this are left as they are, ms.
 const GRID_MS: u32 = 10;
+
+/// Distance of measured positions, s: closer ones show the noise of the encoders as speed.
+const MEASURED_S: f64 = 0.04;
+/// Movement below this is standing still, rad.
+const STILL: f64 = 0.002;
 
 /// First words of the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
@@ -29,17 +34,7 @@ pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
 
 /// Reads a recording and takes its last execution out of it.
 pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
-    let recording = Recording::read(path).map_err(|e| match e {
-        RecordingError::Io { path, source } => FileError::Io { path, source },
-        // Its words begin with the name of the file.
-        other => {
-            let words = other.to_string();
-            let name = path.display().to_string();
-            let problem =
-                words.strip_prefix(&name).map_or(words.as_str(), |w| w.trim_start_matches([':', ',', ' ']));
-            FileError::form(problem.to_owned()).in_file(path)
-        }
-    })?;
+    let recording = read(path)?;
     let mut loaded = executed(&recording.samples).map_err(|e| match (e, &recording.cut) {
         (FileError::At { path, place, problem }, Some(cut)) => {
             FileError::At { path, place, problem: format!("{problem}; {cut}") }
@@ -50,6 +45,66 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
         loaded.notes.insert(0, format!("{}: {cut}", path.display()));
     }
     loaded.map_err(|e| e.in_file(path))
+}
+
+fn read(path: &Path) -> Result<Recording, FileError> {
+    Recording::read(path).map_err(|e| match e {
+        RecordingError::Io { path, source } => FileError::Io { path, source },
+        // Its words begin with the name of the file.
+        other => {
+            let words = other.to_string();
+            let name = path.display().to_string();
+            let problem =
+                words.strip_prefix(&name).map_or(words.as_str(), |w| w.trim_start_matches([':', ',', ' ']));
+            FileError::form(problem.to_owned()).in_file(path)
+        }
+    })
+}
+
+/// Reads a recording and takes what was measured out of it: its last teaching, or else its last execution.
+pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
+    let recording = read(path)?;
+    let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
+    if let Some(cut) = recording.cut {
+        loaded.notes.insert(0, format!("{}: {cut}", path.display()));
+    }
+    Ok(loaded)
+}
+
+/// The last motion by hand, or else of a trajectory, as it was measured, without the standing still before and after it.
+fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
+    let taught = |s: &Sample| s.state == ControllerState::Teaching;
+    let by_hand = samples.iter().any(taught);
+    let counts = |s: &Sample| if by_hand { taught(s) } else { s.is_operating() };
+    let end = samples.iter().rposition(counts).map_or(0, |i| i + 1);
+    let begin = samples[..end].iter().rposition(|s| !counts(s)).map_or(0, |i| i + 1);
+    let mut path = Samples::default();
+    for sample in &samples[begin..end] {
+        let position = sample.joints.map(|joint| joint.position);
+        let due = path.times.last().is_none_or(|t| sample.time_s - t >= MEASURED_S - 1e-6);
+        if due && position.iter().all(|q| q.is_finite()) {
+            path.times.push(sample.time_s);
+            path.position.push(position);
+        }
+    }
+    let moved = |a: &[f64; JOINTS], b: &[f64; JOINTS]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > STILL);
+    let first = path.position.first().and_then(|rest| path.position.iter().position(|q| moved(q, rest)));
+    let last = path.position.last().and_then(|rest| path.position.iter().rposition(|q| moved(q, rest)));
+    let (Some(first), Some(last)) = (first, last) else {
+        let problem = "the recording holds no motion by hand and no execution in which the arm moves";
+        return Err(FileError::at(Place::default(), problem));
+    };
+    // With a resting pose at each end.
+    let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
+    let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
+    let start = times.first().copied().unwrap_or(0.0);
+    let times = times.into_iter().map(|t| ((t - start) * 1e3).round() * 1e-3).collect();
+    let fitted = Samples { times, position, ..Samples::default() }.fit();
+    let fitted = fitted.map_err(|e| FileError::form(e.to_string()))?;
+    let what = if by_hand { "teaching" } else { "execution" };
+    let mut loaded = Loaded::fitted(fitted, Form::Recording);
+    loaded.notes.insert(0, format!("the last {what} in the recording, as it was measured"));
+    Ok(loaded)
 }
 
 /// Places of a path that were seen, at the controller's milliseconds.
@@ -203,6 +258,39 @@ mod tests {
             let seen = (point.position[5], point.velocity[5], point.acceleration[5]);
             assert_eq!(seen, (joint.set_position, joint.set_velocity, joint.set_acceleration), "{i}");
         }
+    }
+
+    /// What a hand led, between rests of any length, whatever was executed before.
+    #[test]
+    fn a_motion_by_hand_is_found_as_it_was_measured() {
+        let at = |ms: u32| {
+            let u = ((f64::from(ms) - 1000.0) / 2000.0).clamp(0.0, 1.0);
+            let joint = JointSample { position: 0.4 * u * u * (3.0 - 2.0 * u), ..JointSample::UNKNOWN };
+            Sample {
+                time_s: 7.0 + f64::from(ms) * 1e-3,
+                state: ControllerState::Teaching.into(),
+                joints: [joint; JOINTS],
+                ..Sample::default()
+            }
+        };
+        let mut samples: Vec<Sample> = (0..9).map(|k| sample(Execute, 40 * k)).collect();
+        samples.extend((0..=4000).map(at));
+        let led = measured(&samples).unwrap().trajectory;
+        assert!((1.8..2.1).contains(&led.duration_s()), "{}", led.duration_s());
+        let (first, last) = (led.points[0], led.points.last().unwrap());
+        assert!(first.position[3].abs() < 2e-3 && (last.position[3] - 0.4).abs() < 2e-3);
+        assert_eq!((first.velocity, last.velocity), ([0.0; JOINTS], [0.0; JOINTS]));
+        // Without any, what was executed.
+        let run: Vec<Sample> = (0..50)
+            .map(|k| Sample {
+                time_s: f64::from(k) * 0.04,
+                state: ControllerState::Operate.into(),
+                ..sample(Execute, 40 * k)
+            })
+            .collect();
+        let executed = measured(&run).unwrap().trajectory;
+        assert!((executed.points.last().unwrap().position[0] - 0.3).abs() < 3e-3);
+        assert!(measured(&samples[9..500]).unwrap_err().to_string().contains("no motion by hand"));
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write;
+use std::io::{Seek, Write};
 
 use cli_kit::{Failure, OutputFile};
+use jtc_host::waypoints::{self, thinned};
 
 use crate::failure::recording_broken_off;
 
@@ -108,16 +109,27 @@ impl TaughtFile {
         moving.map_or(0, |i| i + 2).min(self.rows.len())
     }
 
-    /// Takes the rest at the end off, and returns what the file holds; none when the arm was not moved and nothing was written.
-    pub fn finish(self) -> Result<Option<String>, Failure> {
+    /// Takes the rest at the end off, and returns what the file holds; none when the arm was not moved and nothing was written. With a
+    /// tolerance (rad) these are waypoints in the place of the motion.
+    pub fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
-        let Self { name, file, mut text, rows, .. } = self;
-        let Some(file) = file else { return Ok(None) };
+        let Self { name, file, mut text, mut rows, .. } = self;
+        let Some(mut file) = file else { return Ok(None) };
         if kept >= LEAST {
             text.truncate(rows[kept - 1].end);
+            rows.truncate(kept);
         }
-        let settle = || {
+        if let Some(tolerance) = thin {
+            let positions: Vec<[f64; 6]> = rows.iter().map(|row| row.position).collect();
+            let kept = thinned(&positions, tolerance);
+            text = waypoints::to_csv(kept.iter().filter_map(|i| positions.get(*i)));
+        }
+        let mut settle = || {
             if file.metadata()?.is_file() {
+                if thin.is_some() {
+                    file.rewind()?;
+                    file.write_all(text.as_bytes())?;
+                }
                 file.set_len(text.len() as u64)?;
                 file.sync_all()?;
             }
@@ -162,7 +174,7 @@ mod tests {
                 assert!((last - pose(k)[1]).abs() < 1e-6, "{k}: {last}");
             }
         }
-        let text = taught.finish().unwrap().unwrap();
+        let text = taught.finish(None).unwrap().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
         let led = Loaded::load(&path, None).unwrap().trajectory;
         assert!((0.9..=1.16).contains(&led.duration_s()), "{} s", led.duration_s());
@@ -170,6 +182,22 @@ mod tests {
             led.points[0].position[1].abs() < 1e-9
                 && (led.points.last().unwrap().position[1] - 0.5).abs() < 0.002
         );
+    }
+
+    /// A straight way has its two ends, whatever its speed was; the motion that was in the file before is gone.
+    #[test]
+    fn a_motion_by_hand_becomes_waypoints() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("waypoints.csv");
+        let mut taught = TaughtFile::new(OutputFile::open(&path, false, &[]).unwrap());
+        for k in 0..45 {
+            taught.take(f64::from(k) * GRID_S, pose(k)).unwrap();
+        }
+        taught.finish(Some(0.01)).unwrap().unwrap();
+        let read = waypoints::WaypointFile::load(&path).unwrap();
+        let positions = read.positions(&jtc_host::Arm::avena()).unwrap();
+        assert_eq!(positions.len(), 2, "{:?}", std::fs::read_to_string(&path));
+        assert!(positions[0].position[1].abs() < 1e-9 && (positions[1].position[1] - 0.5).abs() < 0.002);
     }
 
     #[test]
@@ -180,7 +208,7 @@ mod tests {
         for k in 0..50 {
             taught.take(f64::from(k) * GRID_S, [0.001 * f64::from(k % 2); 6]).unwrap();
         }
-        assert!(!taught.is_begun() && taught.finish().unwrap().is_none());
+        assert!(!taught.is_begun() && taught.finish(None).unwrap().is_none());
         assert!(!path.exists());
     }
 

@@ -1,0 +1,291 @@
+//! Moves to poses, waypoints that are run, runs that are repeated, replayed and gone on with, against the simulator.
+#![cfg(unix)]
+
+mod common;
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::Stdio;
+
+use common::{Sim, jtc, slow_motion};
+use serde_json::Value;
+
+const FAST: [&str; 3] = ["--speed", "max", "--no-throttle"];
+const WAYPOINTS: &str =
+    "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.5,0.2,-0.4,0.3,0.6,0\n0.1,0.4,-0.9,0,0.6,0.5\n0,0,0,0,0,0\n";
+
+fn ready() -> Sim {
+    Sim::start(&FAST).held()
+}
+
+fn arm(sim: &Sim) -> String {
+    sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
+}
+
+/// Where the simulated arm is, rad.
+fn place(sim: &Sim) -> Vec<f64> {
+    let status = sim.json(&["status"], 0);
+    status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
+}
+
+fn at(sim: &Sim, q: [f64; 6]) {
+    for (joint, (is, should)) in place(sim).into_iter().zip(q).enumerate() {
+        assert!((is - should).abs() < 3e-3, "joint {}: {is} instead of {should}", joint + 1);
+    }
+}
+
+#[test]
+fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
+    let sim = ready();
+    let arm = arm(&sim);
+    let before = std::fs::read_to_string(&arm).unwrap();
+    sim.jtc(&["pose", "save", "home", "--arm", &arm]).ends(0);
+    let moved = sim.json(&["move", "--to", "0.4,0.2,-0.5,0.3,0.6,-0.2"], 0);
+    assert_eq!((&moved["outcome"], &moved["phase"]), (&"finished".into(), &"motion".into()));
+    at(&sim, [0.4, 0.2, -0.5, 0.3, 0.6, -0.2]);
+    let saved = sim.json(&["pose", "save", "up", "--arm", &arm], 0);
+    assert!((saved["position_rad"][4].as_f64().unwrap() - 0.6).abs() < 3e-3, "{saved}");
+    sim.json(&["move", "--to", "home", "--arm", &arm, "--speed", "100"], 0);
+    at(&sim, [0.0; 6]);
+    sim.json(&["move", "--to", "10,0,0,0,0,-20", "--deg"], 0);
+    at(&sim, [10f64.to_radians(), 0.0, 0.0, 0.0, 0.0, (-20f64).to_radians()]);
+    let list = jtc(&["--json", "pose", "list", "--arm", &arm]).ends(0).json();
+    assert_eq!(list["poses_rad"].as_object().unwrap().len(), 2);
+    // One that is there is written over on demand only; removed, it is gone, and the file as it was but for its end.
+    let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
+    assert!(refused.err.contains("pose \"up\" is there already"), "{}", refused.err);
+    sim.jtc(&["pose", "save", "up", "--arm", &arm, "--force"]).ends(0);
+    jtc(&["pose", "remove", "up", "--arm", &arm]).ends(0);
+    let left = jtc(&["pose", "list", "--arm", &arm]).ends(0).out;
+    assert!(left.contains("home") && !left.contains("up "), "{left}");
+    assert!(std::fs::read_to_string(&arm).unwrap().starts_with(before.trim_end()));
+}
+
+#[test]
+fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
+    let sim = ready();
+    let arm = arm(&sim);
+    sim.jtc(&["pose", "save", "home", "--arm", &arm]).ends(0);
+    for (words, code, message) in [
+        (
+            vec!["move", "--to", "hone", "--arm", &arm],
+            2,
+            "has no pose \"hone\"; it has home; nothing was sent",
+        ),
+        (vec!["move", "--to", "home"], 2, "has no pose \"home\"; it has none"),
+        (vec!["move", "--to", "0,0,0"], 2, "3 numbers, not 6"),
+        (
+            vec!["move", "--to", "0,1.6,0,0,0,0"],
+            4,
+            "joint 2: 1.6 rad is outside -1.57..1.57 rad; nothing was sent",
+        ),
+        (vec!["move", "--to", "90,0,0,0,0,0"], 4, "90 rad is outside"),
+        (
+            vec!["move", "--to", "0,0,0,0,0,0", "--speed", "0"],
+            2,
+            "speed 0 % is not within 1..100 %; nothing was sent",
+        ),
+        (vec!["move", "--to", "0.1,0,0,0,0,0", "--record", "run.txt"], 2, "run.txt"),
+        (vec!["pose", "save", "1st", "--arm", &arm], 2, "is no name of a pose"),
+        (vec!["pose", "save", "new", "--arm", "nothing.toml"], 2, "nothing.toml: No such file"),
+    ] {
+        let output = sim.jtc(&words).ends(code);
+        assert!(output.err.contains(message), "{words:?}: {}", output.err);
+    }
+    let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
+    assert!(output.err.contains("is \"home\" meant?"), "{}", output.err);
+    at(&sim, [0.0; 6]);
+    // As `traj run` does: only from HoldPos.
+    let sim = Sim::start(&FAST);
+    let (moved, run) = (sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]), sim.path("motion.csv"));
+    std::fs::write(&run, slow_motion(20)).unwrap();
+    let run = sim.jtc(&["traj", "run", &run]);
+    assert!(moved.code == 1 && run.code == 1 && run.err.ends_with(&moved.err), "{}{}", moved.err, run.err);
+}
+
+/// Waypoints in a file become a motion that is run several times by one command, with the figures of each run.
+#[test]
+fn waypoints_are_run_several_times() {
+    let sim = ready();
+    let (file, out) = (sim.file("waypoints.csv", WAYPOINTS), sim.path("cycle.csv"));
+    jtc(&["plan", &file, "-o", &out, "--blend", "0.1"]).ends(0);
+    let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
+    let words = ["traj", "run", &out, "--repeat", "3", "--record", &record, "--report", &page];
+    let value = sim.json(&words, 0);
+    let runs = value["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 3, "{value}");
+    for (n, run) in runs.iter().enumerate() {
+        assert_eq!((run["run"].as_u64(), &run["outcome"]), (Some(n as u64 + 1), &"finished".into()));
+        for joint in run["joints"].as_array().unwrap() {
+            assert!(joint["max_error_mrad"].as_f64().unwrap() < 5.0, "{joint}");
+            assert!(joint["torque_share"].as_f64().unwrap() < 0.97, "{joint}");
+        }
+    }
+    assert!(std::fs::metadata(&page).unwrap().len() > 1000);
+    // The recording holds all of them, and the trajectory.
+    let report = jtc(&["--json", "report", &record, "--out", &sim.path("all.html")]).ends(0).json();
+    assert!(report["recorded_s"].as_f64().unwrap() > 1.2 * value["recorded_s"].as_f64().unwrap(), "{report}");
+    let again = sim.json(&["traj", "replay", &record, "--approach"], 0);
+    assert_eq!(again["outcome"], "finished");
+}
+
+/// A path that does not end where it begins is repeated with a way back only.
+#[test]
+fn an_open_path_is_repeated_with_approaches() {
+    let sim = ready();
+    let file = sim.file("open.csv", "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0.1,-0.2,0,0.3,0\n");
+    let out = sim.path("there.csv");
+    jtc(&["plan", &file, "-o", &out]).ends(0);
+    let refused = sim.jtc(&["traj", "run", &out, "--repeat", "2"]).ends(4);
+    assert!(refused.err.contains("ends 0.400 rad from where it begins (joint 1)"), "{}", refused.err);
+    at(&sim, [0.0; 6]);
+    let value = sim.json(&["traj", "run", &out, "--repeat", "2", "--approach"], 0);
+    let phases: Vec<&str> =
+        value["runs"].as_array().unwrap().iter().map(|r| r["phase"].as_str().unwrap()).collect();
+    assert_eq!(phases, ["motion", "approach", "motion"], "{value}");
+    at(&sim, [0.4, 0.1, -0.2, 0.0, 0.3, 0.0]);
+}
+
+/// A small arm of the UR5's proportions, as a description: imported, simulated, and led through waypoints.
+#[test]
+fn another_arm_is_led_through_waypoints() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("ur5.urdf"), ur5()).unwrap();
+    jtc(&["arm", "import", &path("ur5.urdf"), "-o", &path("ur5.toml")]).ends(0);
+    let (arm, urdf_waypoints) = (path("ur5.toml"), path("waypoints.csv"));
+    let text = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n30,-60,70,-20,40,10\n-20,-40,50,-60,10,50\n0,0,0,0,0,0\n";
+    std::fs::write(&urdf_waypoints, text).unwrap();
+    let out = path("cycle.csv");
+    let planned = jtc(&["--json", "plan", &urdf_waypoints, "-o", &out, "--arm", &arm, "--blend", "0.05"])
+        .ends(0)
+        .json();
+    assert!(planned["duration_s"].as_f64().unwrap() > 1.0, "{planned}");
+    let sim = Sim::start_in(dir, &[&FAST[..], &["--arm", &arm]].concat()).held();
+    let value = sim.json(&["traj", "run", &out, "--arm", &arm, "--repeat", "2"], 0);
+    assert_eq!(
+        (&value["outcome"], value["runs"].as_array().unwrap().len()),
+        (&"finished".into(), 2),
+        "{value}"
+    );
+    for joint in value["joints"].as_array().unwrap() {
+        assert!(joint["max_error_mrad"].as_f64().unwrap() < 10.0, "{joint}");
+    }
+}
+
+/// Origins, axes, masses and limits of a UR5, with bodies as rods.
+fn ur5() -> String {
+    let half = std::f64::consts::FRAC_PI_2;
+    let joints = [
+        ("shoulder_pan", "0 0 0.089159", 0.0, "0 0 1", 3.7, "0 0 0", 150.0),
+        ("shoulder_lift", "0 0.13585 0", half, "0 1 0", 8.393, "0 0 0.28", 150.0),
+        ("elbow", "0 -0.1197 0.425", 0.0, "0 1 0", 2.275, "0 0 0.25", 150.0),
+        ("wrist_1", "0 0 0.39225", half, "0 1 0", 1.219, "0 0.0 0", 28.0),
+        ("wrist_2", "0 0.093 0", 0.0, "0 0 1", 1.219, "0 0 0", 28.0),
+        ("wrist_3", "0 0 0.09465", 0.0, "0 1 0", 0.1879, "0 0 0", 28.0),
+    ];
+    let mut text = String::from(
+        "<robot name=\"ur5\"><link name=\"base\"><inertial><mass value=\"4\"/>\
+        <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link>",
+    );
+    let mut parent = "base".to_owned();
+    for (name, xyz, pitch, axis, mass, com, effort) in joints {
+        let inertia = 0.02 * mass;
+        text += &format!(
+            "<link name=\"{name}_link\"><inertial><origin xyz=\"{com}\"/><mass value=\"{mass}\"/><inertia ixx=\"{inertia}\" ixy=\"0\" \
+             ixz=\"0\" iyy=\"{inertia}\" iyz=\"0\" izz=\"{inertia}\"/></inertial></link>\
+             <joint name=\"{name}\" type=\"revolute\"><origin xyz=\"{xyz}\" rpy=\"0 {pitch} 0\"/><parent link=\"{parent}\"/>\
+             <child link=\"{name}_link\"/><axis xyz=\"{axis}\"/><limit lower=\"-2.9\" upper=\"2.9\" effort=\"{effort}\" velocity=\"1.5\"/></joint>"
+        );
+        parent = format!("{name}_link");
+    }
+    text + "</robot>"
+}
+
+/// Starts a recorded run in real time and waits until the arm has moved for a second.
+fn moving(sim: &Sim, file: &str, record: &str) -> std::process::Child {
+    moving_with(sim, &[file, "--record", record])
+}
+
+fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
+    let mut child = sim
+        .command(&[&["--json", "traj", "run"], words].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut err = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    loop {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended early");
+        let event: Value = serde_json::from_str(&line).unwrap_or_default();
+        if event["path_s"].as_f64().is_some_and(|s| s > 1.0) {
+            break;
+        }
+    }
+    std::thread::spawn(move || err.read_to_string(&mut String::new()));
+    child
+}
+
+/// Stopped by a person, or broken off with its program: the rest is run from the place where the arm stands, once.
+#[test]
+fn a_run_that_was_broken_off_goes_on_where_the_arm_stands() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let file = sim.file("motion.csv", &slow_motion(60));
+    for (record, signal) in [("stopped.mcap", "-INT"), ("killed.mcap", "-KILL")] {
+        let record = sim.path(record);
+        let mut child = moving(&sim, &file, &record);
+        cli_kit::trial::signal(&child, signal);
+        child.wait().unwrap();
+        if signal == "-KILL" {
+            sim.jtc(&["traj", "stop"]).ends(0);
+            std::thread::sleep(std::time::Duration::from_millis(800));
+        }
+        let before = place(&sim);
+        assert!(before[0] > 0.01, "{before:?}");
+        let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
+        assert!(output.err.contains("the arm stands at"), "{}", output.err);
+        let value = output.json();
+        assert_eq!((&value["outcome"], value["runs"].as_array().unwrap().len()), (&"finished".into(), 1));
+        let executed = value["executed_s"].as_f64().unwrap();
+        assert!((3.0..5.5).contains(&executed), "{executed} s of the 6 s are left");
+        at(&sim, [0.0; 6]);
+    }
+    // A run at another speed has other points.
+    let half = sim.path("half.csv");
+    let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
+    cli_kit::trial::signal(&child, "-INT");
+    child.wait().unwrap();
+    let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
+    assert!(output.err.contains("at another speed"), "{}", output.err);
+    // Nothing is left of a run that was finished, and a CSV file does not hold the path.
+    let (other, whole, rest) =
+        (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
+    sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
+    let output = sim.jtc(&["traj", "continue", &whole]).ends(2);
+    assert!(output.err.contains("does not hold the whole trajectory"), "{}", output.err);
+    let output = sim.jtc(&["traj", "continue", &whole, "--trajectory", &other, "--record", &rest]).ends(4);
+    assert!(output.err.contains("nothing is left of it"), "{}", output.err);
+    assert!(!std::path::Path::new(&rest).exists());
+}
+
+/// After an error the arm is brought back first; where it was moved meanwhile, an approach leads to the place.
+#[test]
+fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
+    let faults =
+        "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
+    let sim = Sim::with_faults(&FAST, faults).held();
+    let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
+    sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
+    let refused = sim.jtc(&["traj", "continue", &record]).ends(1);
+    assert!(refused.err.contains("jtc recover"), "{}", refused.err);
+    sim.jtc(&["recover"]).ends(0);
+    sim.jtc(&["move", "--to", "0,0,0,0,0,0"]).ends(0);
+    let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
+    assert!(output.err.contains("an approach leads there"), "{}", output.err);
+    let value = output.json();
+    let phases: Vec<&str> =
+        value["runs"].as_array().unwrap().iter().map(|r| r["phase"].as_str().unwrap()).collect();
+    assert_eq!((phases, &value["outcome"]), (vec!["approach", "motion"], &"finished".into()));
+    at(&sim, [0.0; 6]);
+}

@@ -1,0 +1,221 @@
+//! `jtc plan`: trajectories through waypoints, and what is refused of them.
+
+mod common;
+
+use common::jtc;
+use serde_json::Value;
+
+/// A directory with files.
+struct Dir(tempfile::TempDir);
+
+impl Dir {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    fn file(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.0.path().join(name).exists()
+    }
+}
+
+const WAYPOINTS: &str =
+    "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.5,0.2,-0.4,0.3,0.6,0\n0.1,0.4,-0.9,0,0.6,0.5\n0,0,0,0,0,0\n";
+
+fn json(words: &[&str], code: i32) -> Value {
+    jtc(&[&["--json", "plan"], words].concat()).ends(code).json()
+}
+
+/// Time and positions of each line of a trajectory.
+fn rows(file: &str) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some("t,q1,q2,q3,q4,q5,q6,qd1,qd2,qd3,qd4,qd5,qd6,qdd1,qdd2,qdd3,qdd4,qdd5,qdd6")
+    );
+    lines
+        .map(|line| {
+            // 17 significant digits: one before the point and 16 behind it.
+            for cell in line.split(',').skip(1) {
+                let digits = cell.trim_start_matches('-').split_once('e').expect("an exponent").0;
+                assert_eq!(digits.len(), 18, "{cell}");
+            }
+            line.split(',').map(|cell| cell.parse().unwrap()).collect()
+        })
+        .collect()
+}
+
+/// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is no slower without a
+/// limit; what is printed is what is in the file.
+#[test]
+fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
+    let dir = Dir::new();
+    let waypoints = dir.file("waypoints.csv", WAYPOINTS);
+    let mut durations = Vec::new();
+    for (name, options, blend) in [
+        ("stops.csv", vec![], 1e-3),
+        ("jumps.csv", vec!["--no-jerk-limit"], 1e-3),
+        ("blended.csv", vec!["--blend", "0.1"], 0.1 + 1e-3),
+        ("half.csv", vec!["--blend", "0.1", "--speed", "50"], 0.1 + 1e-3),
+    ] {
+        let out = dir.path(name);
+        let value = json(&[&[&waypoints, "-o", &out], &options[..]].concat(), 0);
+        let rows = rows(&out);
+        let duration = value["duration_s"].as_f64().unwrap();
+        assert_eq!(value["points"].as_u64().unwrap() as usize, rows.len());
+        assert!((rows.last().unwrap()[0] - duration).abs() < 1e-9);
+        let last_end = value["binding"].as_array().unwrap().iter().fold(0.0, |before: f64, bound| {
+            let (from, to) = (bound["from_s"].as_f64().unwrap(), bound["to_s"].as_f64().unwrap());
+            assert!(from <= to && to <= duration + 1e-9 && from >= before - 1e-9, "{bound}");
+            assert!(
+                (1..=6).contains(&bound["joint"].as_u64().unwrap()) && bound["limit"].is_string(),
+                "{bound}"
+            );
+            from
+        });
+        assert!(last_end > 0.0, "nothing binds: {value}");
+        let check = jtc(&["--json", "traj", "check", &out]).ends(0).json();
+        assert_eq!(check["verdict"]["problems"].as_array().unwrap().len(), 0, "{name}: {check}");
+        for line in WAYPOINTS.lines().skip(1) {
+            let q: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            let away = |row: &Vec<f64>| (0..6).map(|j| (row[1 + j] - q[j]).abs()).fold(0.0, f64::max);
+            let nearest = rows.iter().map(away).fold(f64::INFINITY, f64::min);
+            // Between two points at 1.5 rad/s and 10 ms it is 7.5 mrad away at most.
+            assert!(nearest <= blend + 8e-3, "{name}: {nearest} rad from {line}");
+        }
+        for end in [&rows[0], rows.last().unwrap()] {
+            assert!(end[1..13].iter().all(|v| v.abs() < 1e-9), "{name}: {end:?}");
+        }
+        durations.push(duration);
+    }
+    let [stops, jumps, blended, half] = durations[..] else { panic!("four") };
+    assert!(jumps < stops && blended < stops && half > 1.5 * blended, "{durations:?}");
+}
+
+/// Units, poses and JSON lead to the same motion.
+#[test]
+fn the_forms_of_waypoints_are_the_same_motion() {
+    let dir = Dir::new();
+    let arm = include_str!("../../../arms/avena.toml").to_owned()
+        + "\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\nup = [0.1, 0.2, -0.4, 0.3, 0.6, 0.0]\n";
+    let arm = dir.file("arm.toml", &arm);
+    let degrees = [0.1f64, 0.2, -0.4, 0.3, 0.6, 0.0].map(|q| q.to_degrees().to_string()).join(",");
+    let mut durations = Vec::new();
+    for (name, text, deg) in [
+        ("a.csv", "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.1,0.2,-0.4,0.3,0.6,0\n".to_owned(), false),
+        ("b.csv", "pose\nhome\nup\n".to_owned(), false),
+        ("c.csv", format!("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n{degrees}\n"), true),
+        (
+            "d.json",
+            r#"[{"pose": "home"}, {"q1": 0.1, "q2": 0.2, "q3": -0.4, "q4": 0.3, "q5": 0.6, "q6": 0}]"#.into(),
+            false,
+        ),
+    ] {
+        let (file, out) = (dir.file(name, &text), dir.path(&format!("{name}.out.csv")));
+        let deg: &[&str] = if deg { &["--deg"] } else { &[] };
+        let value = json(&[&[&file, "-o", &out, "--arm", &arm], deg].concat(), 0);
+        durations.push(value["duration_s"].as_f64().unwrap());
+    }
+    assert!(durations.iter().all(|d| (d - durations[0]).abs() < 1e-9), "{durations:?}");
+}
+
+#[test]
+fn what_cannot_be_planned_is_refused_with_its_line() {
+    let dir = Dir::new();
+    let good = dir.file("good.csv", WAYPOINTS);
+    let head = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n";
+    let out = dir.path("out.csv");
+    let old =
+        include_str!("../../../arms/avena.toml").to_owned() + "\n[poses]\nabove-table = [0, 0, 0, 0, 0, 0]\n";
+    let arm = dir.file("arm.toml", &old);
+    let with = |name: &str, text: &str| dir.file(name, text);
+    let outside = with("outside.csv", &format!("{head}0,1.6,0,0,0,0\n"));
+    let one = with("one.csv", head);
+    let same = with("same.csv", &format!("{head}0,0,0,0,0,0\n"));
+    let word = with("word.csv", &format!("{head}0,0,zero,0,0,0\n"));
+    let pose = with("pose.csv", "pose\nabove-table\nabove-tabel\n");
+    let missing = dir.path("missing.csv");
+    for (words, code, message) in [
+        (vec![missing.as_str()], 2, "missing.csv: No such file"),
+        (vec![&word], 2, "word.csv, line 3, column 3, q3: \"zero\" is not a number"),
+        (
+            vec![&pose, "--arm", &arm],
+            2,
+            "pose.csv, line 3, column 1: the arm avena has no pose \"above-tabel\"; it has above-table",
+        ),
+        (vec![&one], 2, "1 waypoints are no motion"),
+        (vec![&same], 4, "coincide"),
+        (vec![&outside], 4, "outside.csv, line 3: waypoint 2, joint 2: 1.6 rad is outside -1.57..1.57 rad"),
+        (vec![&good, "--blend", "-0.1"], 2, "blend of -0.1 rad"),
+        (vec![&good, "--speed", "0"], 2, "speed 0 % is not within 1..100 %"),
+        (vec![&good, "--speed", "101"], 2, "speed 101 % is not within 1..100 %"),
+        (vec![&good, "--payload", "25,0,0,0.1"], 4, "good.csv, line"),
+        (vec![&good, "--temperature", "500"], 2, "500 °C"),
+    ] {
+        let output = jtc(&[&["plan"], &words[..], &["-o", &out]].concat()).ends(code);
+        assert!(output.err.contains(message), "{words:?}: {}", output.err);
+        assert!(!dir.has("out.csv"), "{words:?} leaves an output");
+    }
+    // Suggestions, in the hint.
+    let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
+    assert!(output.err.contains("is \"above-table\" meant?"), "{}", output.err);
+    // Outputs that are there, or are the input.
+    jtc(&["plan", &good, "-o", &out]).ends(0);
+    let output = jtc(&["plan", &good, "-o", &out]).ends(4);
+    assert!(
+        output.err.contains("out.csv is there already") && output.err.contains("--force"),
+        "{}",
+        output.err
+    );
+    jtc(&["plan", &good, "-o", &out, "--force"]).ends(0);
+    jtc(&["plan", &good, "-o", &good, "--force"]).ends(4);
+}
+
+/// Many waypoints are a motion like any other; one that no trajectory can carry is refused.
+#[test]
+fn ten_thousand_waypoints_are_planned_or_too_long() {
+    let dir = Dir::new();
+    let mut text = String::from("q1,q2,q3,q4,q5,q6\n");
+    for i in 0..10_000 {
+        let q = |k: i32| 0.4 * (0.002 * f64::from(i) + f64::from(k)).sin();
+        text += &format!("{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}\n", q(0), q(1), q(2), q(3), q(4), q(5));
+    }
+    let (file, out) = (dir.file("many.csv", &text), dir.path("out.csv"));
+    let value = json(&[&file, "-o", &out, "--blend", "0.001"], 0);
+    assert_eq!(value["waypoints"], 10_000);
+    assert_eq!(value["waypoint_times_s"].as_array().unwrap().len(), 10_000);
+    jtc(&["traj", "check", &out]).ends(0);
+    let output = jtc(&["plan", &file, "-o", &out, "--force"]).ends(4);
+    assert!(
+        output.err.contains("more than 12000 points can hold") && output.err.contains("--blend"),
+        "{}",
+        output.err
+    );
+}
+
+/// The page shows the motion, the limits, and what binds when; it is whole in itself.
+#[test]
+fn the_report_names_what_binds_when() {
+    let dir = Dir::new();
+    let (file, out, page) = (dir.file("w.csv", WAYPOINTS), dir.path("out.csv"), dir.path("plan.html"));
+    let value = json(&[&file, "-o", &out, "--report", &page], 0);
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("What binds when") && text.contains("planned, not run"));
+    let bound = &value["binding"][0];
+    let words = format!("joint {}: {}", bound["joint"], bound["limit"].as_str().unwrap());
+    assert!(text.contains(&words), "{words}");
+    assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
+    // A page that is there already: nothing is written.
+    let other = dir.path("other.csv");
+    jtc(&["plan", &file, "-o", &other, "--report", &page]).ends(4);
+    assert!(!dir.has("other.csv"));
+}

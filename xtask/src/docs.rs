@@ -29,5 +29,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         run(troubles.env("UPDATE_DOCS", "1"))?;
         println!("wrote the part of docs/troubles.md about {part}");
     }
+    let mut cycle = cargo(&["test", "--package", "jtc-cli", "--test", "cycle"]);
+    run(cycle.env("UPDATE_DOCS", "1"))?;
+    println!("wrote what the commands of docs/from-two-poses-to-a-cycle.md print");
     Ok(ExitCode::SUCCESS)
 }

@@ -20,6 +20,9 @@ pub const FORMS: &str = include_str!("example/forms.md");
 /// Faults of a simulated run.
 const FAULTS: &str = include_str!("example/faults.toml");
 
+/// Waypoints of a cycle.
+const CYCLE: &str = include_str!("example/cycle.csv");
+
 /// Furthest bend of each joint of the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
 /// Duration, s, and time between points, ms, of the example motion.
@@ -55,7 +58,7 @@ impl Example {
 }
 
 /// All of them.
-pub const EXAMPLES: [Example; 7] = [
+pub const EXAMPLES: [Example; 8] = [
     Example {
         name: "motion",
         file: "motion.csv",
@@ -69,6 +72,13 @@ pub const EXAMPLES: [Example; 7] = [
         what: "trajectory of nine positions in degrees, joined smoothly",
         next: "jtc traj check {}",
         text: waypoints_csv,
+    },
+    Example {
+        name: "cycle",
+        file: "cycle-waypoints.csv",
+        what: "waypoints in degrees without times, for `jtc plan`: from the zero pose around and back to it",
+        next: "jtc plan {} -o cycle.csv --blend 0.05",
+        text: || CYCLE.to_owned(),
     },
     Example {
         name: "json",
@@ -171,14 +181,16 @@ fn joint_trajectory() -> String {
 mod tests {
     use super::*;
     use crate::check::Checker;
+    use crate::plan::Planner;
     use crate::trajectory::Loaded;
+    use crate::waypoints::WaypointFile;
     use jtc_core::Config;
 
     /// Each trajectory can be run on the built-in arm from where `jtc sim` starts.
     #[test]
     fn the_trajectories_pass_the_check_from_the_zero_pose() {
         let arm = Arm::avena();
-        for example in EXAMPLES.iter().filter(|e| !e.file.ends_with(".toml")) {
+        for example in EXAMPLES.iter().filter(|e| !e.file.ends_with(".toml") && e.name != "cycle") {
             let read = Loaded::parse(&example.text(), Some(&arm.joint_names)).unwrap();
             let config = Config::avena();
             let friction = arm.friction();
@@ -192,6 +204,25 @@ mod tests {
             assert!(verdict.is_ok(), "{}: {:?}", example.name, verdict.problems);
             assert!(read.trajectory.points[0].position.iter().all(|q| q.abs() < 1e-9), "{}", example.name);
             assert!((read.trajectory.duration_s() - DURATION_S).abs() < 1e-9, "{}", example.name);
+        }
+    }
+
+    /// The waypoints are planned as they are, and a cycle ends where it begins.
+    #[test]
+    fn the_waypoints_of_a_cycle_can_be_planned() {
+        let arm = Arm::avena();
+        let (config, friction) = (arm.config(), arm.friction());
+        let file = WaypointFile::parse(CYCLE).unwrap();
+        let waypoints = file.positions(&arm).unwrap();
+        let planner =
+            Planner { model: Some(&arm.model), friction: friction.as_ref(), ..Planner::new(&config) };
+        for blend in [0.0, 0.05] {
+            let planned = Planner { blend, ..planner.clone() }.through(&waypoints).unwrap();
+            assert_eq!(
+                planned.trajectory.points.last().unwrap().position,
+                planned.trajectory.points[0].position
+            );
+            assert!(planned.notes.is_empty(), "{:?}", planned.notes);
         }
     }
 
@@ -218,18 +249,28 @@ mod tests {
         for part in FORMS.split("```").skip(1).step_by(2) {
             let (kind, text) = part.split_once('\n').unwrap();
             match kind {
+                "csv" | "json" if text.contains("pose") => {
+                    let poses = [("home", [0.0; JOINTS]), ("pick", [0.2; JOINTS])]
+                        .map(|(name, q)| (name.to_owned(), q));
+                    let arm = Arm { poses: poses.into(), ..arm.clone() };
+                    WaypointFile::parse(text)
+                        .unwrap()
+                        .positions(&arm)
+                        .unwrap_or_else(|e| panic!("{e}: {text}"));
+                }
                 "csv" | "json" | "yaml" => {
                     Loaded::parse(text, Some(&arm.joint_names)).unwrap_or_else(|e| panic!("{e}: {text}"));
                 }
                 "toml" => assert!(
                     text.lines()
-                        .all(|line| line.is_empty() || AVENA_TOML.contains(line.split(" #").next().unwrap())),
+                        .all(|line| line.is_empty() || AVENA_TOML.contains(line.split(" #").next().unwrap()))
+                        || text.starts_with("[poses]"),
                     "{text}"
                 ),
                 other => panic!("a block of {other}"),
             }
             blocks += 1;
         }
-        assert_eq!(blocks, 6);
+        assert_eq!(blocks, 9);
     }
 }

@@ -162,6 +162,14 @@ impl Desk {
         self.seen(child.wait().unwrap().code(), &text)
     }
 
+    /// Types a line where the simulator runs.
+    #[allow(dead_code)]
+    pub fn write_line(&mut self, line: &str) {
+        if let Some(sim) = &mut self.sim {
+            sim.write_line(line);
+        }
+    }
+
     /// Keeps the port as another program does.
     pub fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()

@@ -12,6 +12,12 @@ pub enum PlanError {
     /// There is no such motion; waypoint, joint, value and limit are in it.
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
+    /// Waypoints that are all the same.
+    #[error("all {count} waypoints are at the same place: that is no motion")]
+    Nowhere {
+        /// Waypoints given.
+        count: usize,
+    },
     /// The check refuses the motion, however slow it is.
     #[error("{0}")]
     Refused(Box<Verdict>),
@@ -44,6 +50,9 @@ impl Diagnose for PlanError {
                 let slower = "give later times, or leave the times out";
                 let too_fast = verdict.slower(100.0).is_some();
                 Diagnosis::new(ErrorKind::Refused, "check", if too_fast { slower } else { what })
+            }
+            Self::Nowhere { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "waypoints", "give a waypoint that is elsewhere")
             }
             Self::Speed { .. } => {
                 Diagnosis::new(ErrorKind::Usage, "speed", "100 is as fast as the limits allow")

@@ -137,9 +137,12 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`], with the waypoint that is meant.
+    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`].
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
+        if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
+            return Err(PlanError::Nowhere { count: positions.len() });
+        }
         let (limits, arm) = (self.limits(&positions)?, self.dynamics());
         let motion = jtc_plan::through(waypoints, self.blend, &limits, arm.as_ref())?;
         let first = positions.first().copied().unwrap_or_default();

@@ -192,7 +192,10 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
     let missing = |from: usize| (from..from + JOINTS).find(|c| place_of[*c].is_none());
     let none = |from: usize| (from..from + JOINTS).all(|c| place_of[c].is_none());
     if place_of[0].is_none() {
-        return Err(FileError::at(Place::line(header_line), "column t (time in s) is missing"));
+        return Err(FileError::at(
+            Place::line(header_line),
+            "column t (time in s) is missing; `jtc plan` makes a trajectory of waypoints without times",
+        ));
     }
     for from in [1, 1 + JOINTS, 1 + 2 * JOINTS] {
         if let Some(c) = missing(from).filter(|_| from == 1 || !none(from)) {

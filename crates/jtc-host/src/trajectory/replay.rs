@@ -35,6 +35,9 @@ pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
 /// Reads a recording and takes its last execution out of it.
 pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
+    if let Some(whole) = held(&recording) {
+        return Ok(whole);
+    }
     let mut loaded = executed(&recording.samples).map_err(|e| match (e, &recording.cut) {
         (FileError::At { path, place, problem }, Some(cut)) => {
             FileError::At { path, place, problem: format!("{problem}; {cut}") }
@@ -45,6 +48,18 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
         loaded.notes.insert(0, format!("{}: {cut}", path.display()));
     }
     loaded.map_err(|e| e.in_file(path))
+}
+
+/// The trajectory that the recording of a finished run holds, exactly as it was run.
+fn held(recording: &Recording) -> Option<Loaded> {
+    let whole = recording.info.as_ref()?.commanded.as_deref()?;
+    (recording.ending.outcome == "finished" && recording.cut.is_none()).then(|| Loaded {
+        trajectory: whole.clone(),
+        form: Form::Recording,
+        notes: vec!["the trajectory that the recording holds, as it was run".to_owned()],
+        overshoot: Vec::new(),
+        units_named: true,
+    })
 }
 
 fn read(path: &Path) -> Result<Recording, FileError> {

@@ -1,0 +1,148 @@
+//! docs/from-two-poses-to-a-cycle.md: each of its commands is run by the real program against `jtc sim`. `UPDATE_DOCS=1` writes what
+//! they print again.
+#![cfg(target_os = "linux")]
+
+mod common;
+#[path = "troubles/desk.rs"]
+#[allow(dead_code)]
+mod desk;
+/// The page needs no files beside those that its commands write.
+mod files {
+    pub fn write(_: &std::path::Path) {}
+}
+
+use desk::Desk;
+use test_kit::page::{Page, Printed, blurred};
+
+const PAGE: &str = "from-two-poses-to-a-cycle.md";
+
+/// Runs a command that has to succeed; what it prints was measured.
+fn done(desk: &Desk, command: &str) -> Printed {
+    let seen = desk.run(command);
+    assert_eq!(seen.code, 0, "{command}: {}", seen.text);
+    Printed { code: seen.code, text: seen.text.lines().map(measured).collect() }
+}
+
+/// The same where no figure differs from run to run.
+fn exact(desk: &Desk, command: &str) -> Printed {
+    let seen = desk.run(command).0;
+    assert_eq!(seen.code, 0, "{command}: {}", seen.text);
+    seen
+}
+
+/// A line with its measured figures blurred, but not the words that were typed.
+fn measured(line: &str) -> String {
+    let (typed, rest) = match line.split_once(": ") {
+        Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
+        _ => (String::new(), line),
+    };
+    typed + &blurred(rest)
+}
+
+#[test]
+fn the_page_shows_what_its_commands_print() {
+    let desk = Desk::simulated(&["--speed", "max", "--no-throttle"]);
+    done(&desk, "jtc recover --defaults");
+    poses(&desk);
+    plan(&desk);
+    runs(&desk);
+    broken_off();
+    taught();
+}
+
+fn poses(desk: &Desk) {
+    let mut page = Page::new(PAGE, "poses");
+    page.case("An arm file to begin with", "jtc example arm", &exact(desk, "jtc example arm"));
+    for (title, command) in [
+        ("Here is home", "jtc pose save home --arm my-arm.toml"),
+        ("To another place", "jtc move --to 20,15,-30,0,25,0 --deg --speed 20"),
+        ("That is where something is picked up", "jtc pose save pick --arm my-arm.toml"),
+        ("What the file has of it", "tail -n 3 my-arm.toml"),
+        ("Home again", "jtc move --to home --arm my-arm.toml --speed 50"),
+        ("All poses", "jtc --json pose list --arm my-arm.toml"),
+    ] {
+        page.case(title, command, &done(desk, command));
+    }
+    let slip = "jtc move --to hoem --arm my-arm.toml";
+    page.case("A slip of the hand", slip, &desk.run(slip).blurred());
+    page.finish();
+}
+
+fn plan(desk: &Desk) {
+    let mut page = Page::new(PAGE, "plan");
+    for (title, command) in [
+        (
+            "Two poses are a motion",
+            "printf 'pose\\nhome\\npick\\nhome\\n' > poses.csv; jtc plan poses.csv -o there-and-back.csv --arm my-arm.toml",
+        ),
+        ("More waypoints, to try", "jtc example cycle"),
+        ("The file", "cat cycle-waypoints.csv"),
+        ("Their motion", "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05 --report plan.html"),
+        ("The check that every run makes", "jtc traj check cycle.csv"),
+    ] {
+        // The poses of the first one were measured.
+        let printed = if command.contains("poses.csv") { done(desk, command) } else { exact(desk, command) };
+        page.case(title, command, &printed);
+    }
+    page.finish();
+}
+
+fn runs(desk: &Desk) {
+    let mut page = Page::new(PAGE, "run");
+    for (title, command) in [
+        ("Three times", "jtc traj run cycle.csv --repeat 3 --record run.mcap"),
+        (
+            "The pose of the plan above",
+            "jtc traj run there-and-back.csv --arm my-arm.toml --repeat 2 --approach",
+        ),
+        ("What a recording is of", "jtc traj replay run.mcap"),
+    ] {
+        page.case(title, command, &done(desk, command));
+    }
+    page.finish();
+}
+
+/// In real time, so that there is a motion to stop.
+fn broken_off() {
+    let mut page = Page::new(PAGE, "continue");
+    let desk = Desk::simulated(&["--no-throttle"]);
+    for command in [
+        "jtc recover --defaults",
+        "jtc example cycle",
+        "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05",
+    ] {
+        done(&desk, command);
+    }
+    let run = "jtc traj run cycle.csv --speed 40 --record broken.mcap";
+    page.case_of_a_moment("Ctrl-C in the middle of it", run, || {
+        let run = format!("{run} --force");
+        done(&desk, "jtc move --to 0,0,0,0,0,0 --speed 100");
+        let in_motion = |jtc: &std::process::Child, _: &common::Sim| {
+            std::thread::sleep(std::time::Duration::from_millis(1500));
+            cli_kit::trial::signal(jtc, "-INT");
+        };
+        desk.moving(&run, in_motion).blurred()
+    });
+    let on = "jtc traj continue broken.mcap";
+    page.case("And on", on, &done(&desk, on));
+    page.finish();
+}
+
+/// A hand leads the simulated arm.
+fn taught() {
+    let mut page = Page::new(PAGE, "teach");
+    let mut desk = Desk::simulated(&["--no-throttle"]);
+    for command in ["jtc recover --defaults", "jtc example lead"] {
+        done(&desk, command);
+    }
+    let lead = desk.dir().join("lead.csv");
+    desk.write_line(&format!("hand {}", lead.display()));
+    for (title, command) in [
+        ("Led for some seconds", "jtc teach record taught.csv --waypoints --tolerance 0.02 --duration 8"),
+        ("Its motion", "jtc plan taught.csv -o taught-motion.csv --blend 0.02 --speed 50"),
+        ("Run", "jtc traj run taught-motion.csv --approach"),
+    ] {
+        page.case(title, command, &done(&desk, command));
+    }
+    page.finish();
+}

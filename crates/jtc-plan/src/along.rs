@@ -71,7 +71,8 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
         let first = if from == 0.0 { at(from).max(1) - 1 } else { 0 };
         of_section.splice(0..0, std::iter::repeat_n(from, first));
         of_section.extend(std::iter::repeat_n(to, at(to)));
-        Section { path, from, to, breaks: between(&breaks, from, to), waypoints: of_section }
+        let parts_of_path = breaks.len() + 1;
+        Section { path, from, to, breaks: between(&breaks, from, to), waypoints: of_section, parts_of_path }
     });
     Ok(sections.collect())
 }
@@ -91,14 +92,15 @@ fn of_section(
     let caps = caps(section, &cells, &shares, limits, arm)?;
     let mut plan = Plan { section, cells: &cells, caps, reached: Vec::new(), shares, limits, arm: None };
     plan.reached.clone_from(&plan.caps);
-    let mut made = plan.make(None).map_err(|reason| PlanError::NoTimeLaw { leg, reason })?;
-    let Some(arm) = arm else { return Ok(made.motion) };
+    let failed = |reason| PlanError::NoTimeLaw { leg, reason };
+    let Some(arm) = arm else { return Ok(plan.make(None, REPAIRS).map_err(failed)?.motion) };
+    let mut made = plan.make(None, 0).map_err(failed)?;
     // Friction counts up to the highest speed in a cell, which is known better each time.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
     for _ in 0..TORQUE_ROUNDS {
         plan.reached = plan.reached_by(&made.law);
-        made = plan.make(made.shares).map_err(|reason| PlanError::NoTimeLaw { leg, reason })?;
+        made = plan.make(made.shares, REPAIRS).map_err(failed)?;
         let before = best.as_ref().map_or(f64::INFINITY, Motion::duration);
         let shorter = made.motion.duration() < (1.0 - WORTH) * before;
         if made.motion.duration() < before {
@@ -153,7 +155,7 @@ pub(crate) struct Made {
 }
 
 /// How often a section is planned with torque.
-const TORQUE_ROUNDS: usize = 5;
+const TORQUE_ROUNDS: usize = 4;
 /// By how much a round has to make it shorter for another one.
 const WORTH: f64 = 0.004;
 /// By what a cell's speed may be higher than it was the time before.
@@ -165,8 +167,9 @@ const REPAIRS: usize = 4;
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
-    fn make(&self, shares: Option<jerk::Shares>) -> Result<Made, String> {
-        if self.limits.has_jerk() { jerk::limited(self, shares) } else { self.without_jerk() }
+    /// The law and its motion. The cells in which a limit does not hold between the samples are slowed down up to `repairs` times.
+    fn make(&self, shares: Option<jerk::Shares>, repairs: usize) -> Result<Made, String> {
+        if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
     /// Squared speeds of the cells that are not much higher than those of a law.
@@ -182,20 +185,23 @@ impl Plan<'_> {
         cells.collect()
     }
 
-    fn without_jerk(&self) -> Result<Made, String> {
+    fn without_jerk(&self, repairs: usize) -> Result<Made, String> {
         let mut caps = self.reached.clone();
         let mut shares: Vec<f64> = self.shares.iter().map(|s| s * s).collect();
-        let mut repairs = 0;
+        let mut repaired = 0;
         loop {
             let vertices = reach::fastest(self.cells, &caps, &shares, self.limits, self.arm)?;
             let law = Law::of_vertices(&vertices);
             let motion = self.section.motion(&law, self.limits);
-            let slower = self.slower(&motion, &law, true);
-            let worst = slower.iter().copied().fold(1.0, f64::max);
-            if worst <= LEFT_OVER || repairs == REPAIRS {
+            if repairs == 0 {
                 return Ok(Made { law, motion, shares: None });
             }
-            repairs += 1;
+            let slower = self.slower(&motion, &law, true);
+            let worst = slower.iter().copied().fold(1.0, f64::max);
+            if worst <= LEFT_OVER || repaired == repairs {
+                return Ok(Made { law, motion, shares: None });
+            }
+            repaired += 1;
             for ((cap, share), slower) in caps.iter_mut().zip(&mut shares).zip(slower) {
                 *cap /= slower * slower;
                 *share /= slower * slower;

@@ -6,17 +6,23 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Cells of a straight part, without and with torque, and of a curved one.
-const STRAIGHT: usize = 2;
-const STRAIGHT_WITH_TORQUE: usize = 10;
-const CURVED: usize = 4;
-/// A path of few parts has finer cells: this many in all.
-const CELLS_MIN: usize = 100;
+/// Into how many cells the parts of a path are divided.
+struct Division {
+    straight: usize,
+    straight_with_torque: usize,
+    curved: usize,
+    /// Of a path of few parts, in all.
+    least: usize,
+}
+
+const COARSE: Division = Division { straight: 2, straight_with_torque: 10, curved: 4, least: 80 };
+/// For a law whose acceleration changes at the ends of cells only.
+const FINE: Division = Division { straight: 16, straight_with_torque: 16, curved: 9, least: 400 };
 
 /// Share of what the torque limit leaves over for motion that the speed may take.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the torque limit that is planned with.
-pub(crate) const TORQUE_SHARE: f64 = 0.996;
+pub(crate) const TORQUE_SHARE: f64 = 0.999;
 /// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
 const MOTION_SHARE: f64 = 0.05;
 
@@ -59,25 +65,27 @@ pub(crate) struct Cell {
     pub third: JointVec,
 }
 
-/// The cells of a section. For a law by its cells alone (`fine`) a straight part has more of them: its acceleration changes at their ends
-/// only.
+/// The cells of a section. For a law whose acceleration changes at their ends only there are more (`fine`).
 pub(crate) fn cells(
     section: &Section,
     arm: Option<&ArmDynamics>,
     limits: &Limits,
     fine: bool,
 ) -> Result<Vec<Cell>, PlanError> {
-    let parts = section.breaks.len() + 1;
+    let division = if fine { FINE } else { COARSE };
     let mut cells = Vec::new();
     for (from, to) in section.parts() {
         let side = (from, to);
         let inside = [0.25, 0.5, 0.75].map(|u| section.at(from + u * (to - from), side));
-        let bent = |p: &PathPoint| p.second.iter().any(|q| *q != 0.0);
-        let count = match (inside.iter().any(bent), arm) {
-            (true, _) => CURVED.max(CELLS_MIN / parts),
-            (false, None) if !fine => STRAIGHT,
-            (false, _) => STRAIGHT_WITH_TORQUE.max(CELLS_MIN / parts),
+        let is_straight = inside.iter().all(|p| p.second == [0.0; JOINTS]);
+        let least =
+            if is_straight && arm.is_none() && !fine { 1 } else { division.least / section.parts_of_path };
+        let count = match (is_straight, arm) {
+            (false, _) => division.curved,
+            (true, None) => division.straight,
+            (true, Some(_)) => division.straight_with_torque,
         };
+        let count = count.max(least);
         let end = |i: usize| {
             let s = from + (to - from) * i as f64 / count as f64;
             let point = section.at(if i == count { to } else { s }, side);

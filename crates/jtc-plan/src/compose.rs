@@ -24,6 +24,8 @@ pub(crate) struct Section<'a> {
     pub breaks: Vec<f64>,
     /// Parameters of the waypoints that belong to it, rising: that of its start only where the path begins.
     pub waypoints: Vec<f64>,
+    /// Parts between the breaks of all of the path.
+    pub parts_of_path: usize,
 }
 
 impl Section<'_> {

@@ -17,8 +17,6 @@ const ATTEMPTS: usize = 24;
 /// What the curvature may take of acceleration and jerk, in attempts one after the other: where a path keeps its speed in its curves, nearly
 /// all; where it has to change it there, less.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// How often the cells in which a limit does not hold are slowed down alone, before all of the motion is.
-const REPAIRS: usize = 4;
 /// By how much all of the motion is slowed down without that.
 const LEFT_OVER: f64 = 1.002;
 /// Share of the jerk limit that the window is made for.
@@ -34,12 +32,12 @@ pub(crate) struct Shares {
 }
 
 /// The best of some laws that use more or less of the limits, or that with these `shares`.
-pub(crate) fn limited(plan: &Plan, shares: Option<Shares>) -> Result<Made, String> {
+pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Result<Made, String> {
     let none = || String::from("no attempt took a finite time");
     let shares = shares.or_else(|| best_shares(plan)).ok_or_else(none)?;
     let bounds = bounds(plan, shares);
     let mut best = Attempt::new(plan, &bounds, true);
-    best.repair(plan, bounds);
+    best.repair(plan, bounds, repairs);
     if !best.duration().is_finite() {
         return Err(none());
     }
@@ -109,9 +107,9 @@ impl Attempt {
     }
 
     /// Slows the cells down in which a limit does not hold, as long as that is faster than slowing down all.
-    fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>) {
+    fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>, repairs: usize) {
         let mut slower = self.slower.clone();
-        for _ in 0..REPAIRS {
+        for _ in 0..repairs {
             if slower.iter().all(|s| *s <= LEFT_OVER) {
                 break;
             }

@@ -4,6 +4,7 @@ use copp::solver::topp2_ra::{ReachSet2OptionsBuilder, Topp2ProblemBuilder, topp2
 use nalgebra::DMatrixView;
 
 use crate::cells::{Cell, End, Room};
+use crate::path::PathPoint;
 use crate::{ArmDynamics, JOINTS, Limits};
 
 /// Rows of a place: acceleration and torque of each joint, both ways.
@@ -38,21 +39,15 @@ pub(crate) fn fastest(
     constraints.with_s(places.as_slice()).map_err(failed)?;
     constraints.with_constraint_1order(caps_of_places.as_slice(), 0).map_err(failed)?;
     // A place belongs to the cell after it, and where that looks otherwise, also to the cell before it.
-    let after: Vec<Rows> = (0..count)
-        .map(|i| match cells.get(i) {
-            Some(cell) => Rows::new(&cell.ends[0], shares[i], caps_of_places[i], limits, arm),
-            None => Rows::new(&cells[count - 2].ends[1], shares[count - 2], caps_of_places[i], limits, arm),
-        })
-        .collect();
+    let share = |i: usize| shares[i.saturating_sub(1)].min(shares[i.min(count - 2)]);
+    let end = |i: usize| cells.get(i).map_or(&cells[count - 2].ends[1], |cell| &cell.ends[0]);
+    let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm);
+    let after: Vec<Rows> = (0..count).map(|i| rows(end(i), i)).collect();
     append(&mut constraints, &after, 0)?;
     for i in 1..count - 1 {
-        let (left, right) = (&cells[i - 1].ends[1], &cells[i].ends[0]);
-        if left.point.first != right.point.first
-            || left.point.second != right.point.second
-            || shares[i - 1] < shares[i]
-        {
-            let before = Rows::new(left, shares[i - 1], caps_of_places[i], limits, arm);
-            append(&mut constraints, &[before], i)?;
+        let left = &cells[i - 1].ends[1];
+        if differ(&left.point, &end(i).point) {
+            append(&mut constraints, &[rows(left, i)], i)?;
         }
     }
     let problem = Topp2ProblemBuilder::with_constraint(&constraints, (0, count - 1), (0.0, 0.0))
@@ -64,6 +59,12 @@ pub(crate) fn fastest(
         return Err("the speed along the path is 0 where it does not stop".into());
     }
     Ok(places.into_iter().zip(squares).collect())
+}
+
+/// Whether a path goes on otherwise than it came.
+fn differ(a: &PathPoint, b: &PathPoint) -> bool {
+    let far = |a: f64, b: f64| (a - b).abs() > 1e-9 * (1.0 + a.abs() + b.abs());
+    (0..JOINTS).any(|j| far(a.first[j], b.first[j]) || far(a.second[j], b.second[j]))
 }
 
 /// Adds the rows of the places from the one with index `first` on.

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-9;
 /// Distance of the samples of the torque, s.
 const TORQUE_STEP: f64 = 0.004;
 /// What the torque may reach of its limit at the samples: between them it may be higher.
-const TORQUE_SHARE: f64 = 0.999;
+const TORQUE_SHARE: f64 = 0.9995;
 /// Samples of the torque at most; a longer motion has them further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
 /// The slowest that a motion is made for its torque, as a factor of its time.

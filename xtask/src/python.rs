@@ -56,9 +56,10 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 16] = [
+const CHECKS: [Check; 17] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
+    Check { script: "plan/check_plan.py", program: Some("examples/plans"), demo_files: &[] },
     Check { script: "arms/check_import.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "arms/check_driving.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
@@ -91,6 +92,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         for (package, example) in [
             ("jtc-dynamics", "reference"),
             ("jtc-sim", "free_fall"),
+            ("jtc-plan", "plans"),
             ("can-link", "echo"),
             ("can-link", "socketcand_server"),
             ("can-link", "slcan_adapter"),

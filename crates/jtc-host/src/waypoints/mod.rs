@@ -76,7 +76,7 @@ pub enum WaypointError {
         /// Line and column.
         place: Place,
         /// What is wrong with the name.
-        source: PoseError,
+        source: Box<PoseError>,
     },
 }
 
@@ -149,7 +149,7 @@ impl WaypointFile {
             Target::Pose(name) => arm.pose(name).map_err(|source| WaypointError::Pose {
                 path: self.path.clone(),
                 place: w.place.clone(),
-                source,
+                source: Box::new(source),
             }),
         };
         let waypoint = |w: &FileWaypoint| {

@@ -148,7 +148,7 @@ fn uploads_survive_a_bad_line() {
 fn a_trajectory_runs_to_its_end_and_is_followed() {
     let mut s = ready(Some(921_600));
     let config = Config::avena();
-    let t = plan::joint_move(&[0.0; 6], &[0.4, -0.3, 0.2, 0.1, 0.2, -0.5], &config, 100.0).unwrap();
+    let t = plan::joint_move(&[0.0; 6], &[0.4, -0.3, 0.2, 0.1, 0.2, -0.5], &config, 60.0).unwrap();
     let (t, _) = upload(&mut s, &t).unwrap();
     s.execute(&t).unwrap();
     let mut seen = 0;

@@ -8,6 +8,7 @@ mod cells;
 mod compose;
 mod error;
 mod jerk;
+pub mod kinematics;
 mod law;
 mod limits;
 mod motion;

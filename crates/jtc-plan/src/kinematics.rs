@@ -1,0 +1,170 @@
+//! Inverse kinematics: joint positions for poses of the flange, and lines of the flange.
+mod chain;
+mod closed_form;
+mod error;
+mod flange_path;
+mod leg;
+mod orientation;
+mod search;
+mod singular;
+mod subproblems;
+mod target;
+#[cfg(test)]
+#[path = "../tests/robots/mod.rs"]
+mod test_arms;
+mod trace;
+mod turns;
+
+use jtc_dynamics::{ArmModel, JOINTS, JointVec, Pose};
+use jtc_wire::Joint;
+use nalgebra::Vector6;
+
+use chain::{Chain, Frame};
+use closed_form::{EXACT, Geometry, NEAR};
+pub use error::PoseError;
+pub use flange_path::FlangePath;
+pub use leg::{Leg, RADIUS};
+pub use orientation::{Orientation, quaternion_of, rpy_of};
+pub use singular::{SINGULAR, SingularKind, Singularity};
+pub use target::{Target, resolve};
+
+/// Iterations that refine a solution of a closed form: two where the arm is what the form takes it for, more next to a singular pose.
+const REFINE: usize = 25;
+/// Iterations of a search.
+const SEARCH: usize = 60;
+
+/// The kinematics of an arm within its position limits: poses of the flange from joint positions, and back.
+///
+/// Poses are those of the flange in the base frame, with positions in m; joint positions are in rad. A solution brings the
+/// flange to the pose within 1 nm and 1 nrad.
+///
+/// Arms with a spherical wrist, and those with three parallel axes like the default arm's and Universal Robots', are recognised from
+/// the numbers of the model, and all solutions are computed in closed form. For any other arm they are found by iteration from many
+/// starting values, always the same ones; that finds nearly every solution, but one may be missed.
+#[derive(Clone, Debug)]
+pub struct Kinematics {
+    chain: Chain,
+    limits: [(f64, f64); JOINTS],
+    /// What has a closed form.
+    exact: Option<Geometry>,
+    /// What nearly has one.
+    near: Option<Geometry>,
+}
+
+impl Kinematics {
+    /// That of `model`, which must have passed [`ArmModel::check`], with the lowest and the highest position of each joint, rad.
+    pub fn new(model: &ArmModel, position_limits: &[(f64, f64); JOINTS]) -> Self {
+        let chain = Chain::new(model);
+        let exact = Geometry::of(&chain.zero, EXACT);
+        let near = Geometry::of(&chain.zero, NEAR);
+        Self { chain, limits: *position_limits, exact, near }
+    }
+
+    /// Whether all solutions are computed in closed form.
+    pub fn is_closed_form(&self) -> bool {
+        self.exact.is_some()
+    }
+
+    /// Lowest and highest position of each joint, rad.
+    pub fn limits(&self) -> &[(f64, f64); JOINTS] {
+        &self.limits
+    }
+
+    /// The pose of the flange at the joint positions `q`.
+    pub fn flange(&self, q: &JointVec) -> Pose {
+        self.chain.flange(q)
+    }
+
+    /// The joint positions within the limits that bring the flange to `target`, of all solutions the nearest to `near`: with the
+    /// smallest sum of squares of the joints' ways.
+    ///
+    /// A singular target, which the arm reaches in infinitely many ways, has one near `near`.
+    ///
+    /// # Errors
+    ///
+    /// Whether the target is no pose, is out of reach, in this orientation or in any, or within reach outside the limits only: see
+    /// [`PoseError`].
+    pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
+        let goal = orientation::checked(target)?;
+        if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
+            return Err(PoseError::NotFinite { what: "a joint position to be near to", value: bad });
+        }
+        let mut found = self.solutions(&goal, near);
+        // In a singular pose nearer than what the closed form chooses; its turns are dealt with below.
+        found.extend(search::converge(&self.chain, &goal, near, SEARCH));
+        let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let within = found.iter().filter_map(|q| turns::nearest(q, near, &self.limits));
+        within.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| self.reason(&goal, &found))
+    }
+
+    /// All joint positions within the limits that bring the flange to `target`, none twice: each solution with every joint within
+    /// (−π, π] and, where the limits leave room, a turn less and a turn more. Nothing for what is no pose.
+    ///
+    /// Of a singular target's infinitely many solutions there are some.
+    pub fn all(&self, target: &Pose) -> Vec<JointVec> {
+        let Ok(goal) = orientation::checked(target) else { return Vec::new() };
+        let found = self.solutions(&goal, &[0.0; JOINTS]);
+        found.iter().flat_map(|q| turns::variants(q, &self.limits)).collect()
+    }
+
+    /// What singular pose `q` is, or is next to: the smaller [`Singularity::smallest`], the nearer.
+    pub fn singularity(&self, q: &JointVec) -> Singularity {
+        let geometry = self.exact.as_ref().or(self.near.as_ref());
+        singular::nearest(&self.chain, geometry, &self.chain.at(q))
+    }
+
+    /// Principal values of all solutions, without regard to the limits.
+    fn solutions(&self, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
+        let mut found = Vec::new();
+        if let Some(geometry) = self.exact.as_ref().or(self.near.as_ref()) {
+            for q in geometry.solve(&self.chain.zero, goal, hint) {
+                if let Some(q) = search::converge(&self.chain, goal, &q, REFINE) {
+                    search::add(&mut found, q);
+                }
+            }
+        }
+        if self.exact.is_none() {
+            search::search(&self.chain, goal, &mut found);
+        }
+        found
+    }
+
+    /// Why no solution is within the limits; `found` are all solutions.
+    fn reason(&self, goal: &Frame, found: &[JointVec]) -> PoseError {
+        let least = found.iter().map(|q| turns::outside(q, &self.limits));
+        match least.min_by(|a, b| a.beyond.total_cmp(&b.beyond)) {
+            Some(turns::Outside { joint, value, .. }) => {
+                let (low, high) = self.limits[joint.index()];
+                PoseError::OutsideLimits { joint, value, low, high }
+            }
+            None => self.missing(goal),
+        }
+    }
+
+    /// How far out of reach a pose without a solution is.
+    fn missing(&self, goal: &Frame) -> PoseError {
+        let least = |weights: [f64; 6], from: &JointVec| {
+            search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)
+        };
+        let best = |weights: [f64; 6]| {
+            let all = (1..=24).map(|n| least(weights, &search::seed(n)));
+            all.min_by(|a, b| a.squared.total_cmp(&b.squared))
+        };
+        let distance = goal.position.norm();
+        let shift = |r: &Vector6<f64>| r.fixed_rows::<3>(0).norm() * self.chain.length;
+        let place = best([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).map_or(0.0, |reached| shift(&reached.residual));
+        if place > 1e-6 {
+            return PoseError::OutOfReach { distance, missing: place };
+        }
+        // The position first: what is left then is a matter of the orientation.
+        let turn = best([1e3, 1e3, 1e3, 1.0, 1.0, 1.0]).map_or(0.0, |r| r.residual.fixed_rows::<3>(3).norm());
+        PoseError::Orientation { distance, missing: turn }
+    }
+}
+
+/// The joint that is the farthest outside its limits at `q`, if one is.
+fn first_outside(q: &JointVec, limits: &[(f64, f64); JOINTS]) -> Option<(Joint, f64)> {
+    let outside = |j: usize| (limits[j].0 - q[j]).max(q[j] - limits[j].1);
+    let worst = (0..JOINTS).max_by(|&a, &b| outside(a).total_cmp(&outside(b)))?;
+    (outside(worst) > turns::ROUNDING).then(|| Joint::from_index(worst).map(|joint| (joint, q[worst])))?
+}

@@ -1,0 +1,278 @@
+//! Paths through joint space on which the flange keeps to straight lines and arcs.
+use jtc_dynamics::{JOINTS, JointVec, Pose};
+use jtc_wire::Joint;
+use nalgebra::{Vector3, Vector6};
+
+use super::chain::{Axes, Chain, Frame};
+use super::leg::{Leg, Place};
+use super::search::TOLERANCE;
+use super::singular::{SINGULAR, nearest, weakest};
+use super::trace::Trace;
+use super::{Kinematics, PoseError, first_outside};
+use crate::{Path, PathPoint};
+
+/// Largest turn of a joint between two samples, rad. Within it a singular pose cannot be passed unseen, and the iteration stays with
+/// its solution.
+const TURN: f64 = 0.02;
+/// Largest and smallest distance between two samples, m.
+const STEP: (f64, f64) = (0.01, 1e-7);
+/// A joint that turns by less between two breaks looks like one simple curve, rad.
+const SIMPLE: f64 = 0.25;
+/// Places of the rest of a leg that are tried to see whether it leaves the arm's reach.
+const LOOK_AHEAD: usize = 40;
+
+/// A way through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
+///
+/// Its parameter is the length of the legs, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS)); with a blend radius of 0 it has a
+/// stop at each corner. Positions are computed by inverse kinematics wherever they are asked for, so the flange is on its line up to
+/// rounding; derivatives come from the Jacobian and its rate.
+///
+/// The arm keeps the configuration (elbow, wrist, shoulder) that it starts in.
+#[derive(Clone, Debug)]
+pub struct FlangePath {
+    chain: Chain,
+    trace: Trace,
+    /// Joint positions along the path, rising in the parameter, which the iteration starts from.
+    samples: Vec<(f64, JointVec)>,
+    breaks: Vec<f64>,
+}
+
+impl FlangePath {
+    /// The path from the joint positions `start` (rad) along `legs`, its corners blended within `blend` m of each (at most half of
+    /// each leg; 0: a stop). The first waypoint is the start, so that leg 1 leads to waypoint 2; legs that move nothing are passed over.
+    ///
+    /// # Errors
+    ///
+    /// [`PoseError::Waypoint`] for a pose that is none or has no solution within the limits, [`PoseError::Leg`] for what happens along a
+    /// leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first such place.
+    pub fn new(
+        kinematics: &Kinematics,
+        start: &JointVec,
+        legs: &[Leg],
+        blend: f64,
+    ) -> Result<Self, PoseError> {
+        if let Some(&value) = start.iter().find(|q| !q.is_finite()) {
+            return Err(PoseError::NotFinite { what: "a joint position", value }.at_waypoint(1));
+        }
+        let chain = &kinematics.chain;
+        let trace = Trace::new(&chain.at(start).flange, legs, blend)?;
+        for (n, Leg::Line { to } | Leg::Arc { to, .. }) in legs.iter().enumerate() {
+            kinematics.solve(to, start).map_err(|error| error.at_waypoint(n + 2))?;
+        }
+        let samples = Follower::new(kinematics, &trace, start)?.follow()?;
+        let breaks = breaks(&trace, &samples);
+        Ok(Self { chain: chain.clone(), trace, samples, breaks })
+    }
+
+    /// The pose of the flange at `s`.
+    pub fn flange(&self, s: f64) -> Pose {
+        (&self.trace.at(s).frame).into()
+    }
+}
+
+impl Path for FlangePath {
+    fn end(&self) -> f64 {
+        self.trace.end()
+    }
+
+    fn at(&self, s: f64) -> PathPoint {
+        let place = self.trace.at(s);
+        let behind = self.samples.partition_point(|sample| sample.0 <= s).clamp(1, self.samples.len() - 1);
+        let ((before, a), (after, b)) = (self.samples[behind - 1], self.samples[behind]);
+        let share = ((s - before) / (after - before)).clamp(0.0, 1.0);
+        let guess = std::array::from_fn(|j| a[j] + share * (b[j] - a[j]));
+        let (position, axes) = newton(&self.chain, &place.frame, guess);
+        let (first, second) = derivatives(&axes, &place).unwrap_or_default();
+        PathPoint { position, first: first.into(), second: second.into() }
+    }
+
+    fn waypoint(&self, s: f64) -> Option<usize> {
+        Some(self.trace.whereabouts(s).0)
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        self.breaks.clone()
+    }
+
+    fn stops(&self) -> Vec<f64> {
+        self.trace.stops()
+    }
+
+    fn waypoints(&self) -> Vec<f64> {
+        self.trace.waypoints()
+    }
+}
+
+/// Newton's iteration from near a solution, and the arm there.
+fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
+    let mut axes = chain.at(&q);
+    let mut residual = chain.residual(goal, &axes);
+    for _ in 0..8 {
+        let Some(step) = chain.scaled_jacobian(&axes).lu().solve(&residual) else { break };
+        let tried: JointVec = std::array::from_fn(|j| q[j] + step[j]);
+        let there = chain.at(&tried);
+        let left = chain.residual(goal, &there);
+        if left.norm() < residual.norm() {
+            (q, axes, residual) = (tried, there, left);
+        } else {
+            // Down to rounding, or no number.
+            break;
+        }
+    }
+    (q, axes)
+}
+
+/// First and second derivative of the joint positions by the path's parameter.
+fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>)> {
+    let stack = |a: &Vector3<f64>, b: &Vector3<f64>| Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
+    let factors = axes.jacobian().lu();
+    let first = factors.solve(&stack(&place.velocity, &place.spin))?;
+    let rest = stack(&place.acceleration, &place.spin_rate) - axes.jacobian_rate(&first) * first;
+    Some((first, factors.solve(&rest)?))
+}
+
+/// Where the path changes its form, and so often that no joint turns far in between.
+fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
+    let mut all = trace.breaks();
+    let mut turned = [0.0; JOINTS];
+    for pair in samples.windows(2) {
+        for (j, sum) in turned.iter_mut().enumerate() {
+            *sum += (pair[1].1[j] - pair[0].1[j]).abs();
+        }
+        if turned.iter().any(|&sum| sum > SIMPLE) {
+            all.push(pair[1].0);
+            turned = [0.0; JOINTS];
+        }
+    }
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|a, b| *a - *b < 1e-6);
+    all.retain(|&s| s > 0.0 && s < trace.end() - 1e-6);
+    all
+}
+
+/// Walks along a path in small steps and stays with one solution.
+struct Follower<'a> {
+    kinematics: &'a Kinematics,
+    trace: &'a Trace,
+    s: f64,
+    q: JointVec,
+    axes: Axes,
+    /// Sign of the Jacobian's determinant, which changes in a singular pose only.
+    sign: f64,
+}
+
+impl<'a> Follower<'a> {
+    fn new(kinematics: &'a Kinematics, trace: &'a Trace, start: &JointVec) -> Result<Self, PoseError> {
+        let axes = kinematics.chain.at(start);
+        let sign = kinematics.chain.scaled_jacobian(&axes).determinant().signum();
+        let follower = Self { kinematics, trace, s: 0.0, q: *start, axes, sign };
+        follower.check(0.0, start, &follower.axes)?;
+        Ok(follower)
+    }
+
+    fn follow(mut self) -> Result<Vec<(f64, JointVec)>, PoseError> {
+        let mut samples = vec![(0.0, self.q)];
+        let corners: Vec<f64> = self.trace.breaks().into_iter().chain([self.trace.end()]).collect();
+        let mut step = STEP.0;
+        for corner in corners {
+            while self.s < corner {
+                let left = corner - self.s;
+                // No crumb at the end.
+                let wanted = if step >= left { corner } else { self.s + step.min(0.5 * left) };
+                match self.try_step(wanted)? {
+                    Some(()) => {
+                        samples.push((self.s, self.q));
+                        step = (1.5 * step).min(STEP.0);
+                    }
+                    None => step = 0.5 * (wanted - self.s),
+                }
+            }
+        }
+        Ok(samples)
+    }
+
+    /// Goes on to `s` if no joint turns too far on the way; an error if the path ends there.
+    fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
+        let chain = &self.kinematics.chain;
+        let place = self.trace.at(s);
+        let (q, axes) = newton(chain, &place.frame, self.q);
+        let (joint, turn) = largest_turn(&self.q, &q);
+        let left = chain.residual(&place.frame, &axes);
+        // Written so that NaN is no arrival.
+        let arrived = left.norm() <= TOLERANCE;
+        if arrived && turn <= TURN {
+            self.check(s, &q, &axes)?;
+            self.check_between(s, &q, &axes)?;
+            (self.s, self.q, self.axes) = (s, q, axes);
+            return Ok(Some(()));
+        }
+        let distance = s - self.s;
+        if distance > STEP.1 {
+            return Ok(None);
+        }
+        if !arrived {
+            return Err(self.singular(s, &self.axes));
+        }
+        Err(self.on_leg(s, PoseError::JointStep { joint, step: turn, distance }))
+    }
+
+    /// Limits and singular poses at a place of the path.
+    fn check(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
+        let chain = &self.kinematics.chain;
+        self.check_limits(s, q)?;
+        let crossed = chain.scaled_jacobian(axes).determinant() * self.sign <= 0.0;
+        if crossed || weakest(chain, axes).0 < SINGULAR {
+            return Err(self.singular(s, axes));
+        }
+        Ok(())
+    }
+
+    fn check_limits(&self, s: f64, q: &JointVec) -> Result<(), PoseError> {
+        let Some((joint, value)) = first_outside(q, &self.kinematics.limits) else { return Ok(()) };
+        let (low, high) = self.kinematics.limits[joint.index()];
+        Err(self.on_leg(s, PoseError::OutsideLimits { joint, value, low, high }))
+    }
+
+    /// Limits where a joint turns back between here and `s`.
+    fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
+        // Just inside, so that a corner's derivatives are those of this side.
+        let inset = 1e-3 * (s - self.s);
+        let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
+        let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));
+        for j in 0..JOINTS {
+            let (low, high) = self.kinematics.limits[j];
+            let near = [self.q[j], q[j]].iter().any(|&q| q - low < TURN || high - q < TURN);
+            if near && before[j] * after[j] < 0.0 {
+                let turn = self.s + (s - self.s) * before[j] / (before[j] - after[j]);
+                let guess = newton(&self.kinematics.chain, &self.trace.at(turn).frame, self.q).0;
+                self.check_limits(turn, &guess)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What a singular pose at `s` means: the end of the arm's reach if the leg goes on to where no solution is.
+    fn singular(&self, s: f64, axes: &Axes) -> PoseError {
+        let (_, along, length) = self.trace.whereabouts(s);
+        for k in 0..=LOOK_AHEAD {
+            let ahead = s + (length - along) * k as f64 / LOOK_AHEAD as f64;
+            let goal = self.trace.at(ahead.min(self.trace.end())).frame;
+            if self.kinematics.solutions(&goal, &self.q).is_empty() {
+                return self.on_leg(ahead, self.kinematics.missing(&goal));
+            }
+        }
+        let geometry = self.kinematics.exact.as_ref().or(self.kinematics.near.as_ref());
+        self.on_leg(s, PoseError::Singular(nearest(&self.kinematics.chain, geometry, axes)))
+    }
+
+    fn on_leg(&self, s: f64, error: PoseError) -> PoseError {
+        let (leg, distance, length) = self.trace.whereabouts(s);
+        PoseError::Leg { leg, distance, length, source: Box::new(error) }
+    }
+}
+
+/// The joint that turns the farthest, and how far, rad.
+fn largest_turn(from: &JointVec, to: &JointVec) -> (Joint, f64) {
+    let turns = Joint::ALL.map(|joint| (joint, (to[joint.index()] - from[joint.index()]).abs()));
+    turns.into_iter().fold(turns[0], |worst, turn| if turn.1 > worst.1 { turn } else { worst })
+}

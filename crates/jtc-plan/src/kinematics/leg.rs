@@ -1,0 +1,144 @@
+//! Legs of a path of the flange: straight lines and arcs.
+use jtc_dynamics::Pose;
+use nalgebra::Vector3;
+
+use super::PoseError;
+use super::chain::{Frame, exponential, logarithm};
+use super::orientation::checked;
+use super::subproblems::turned;
+
+/// A turn of the flange by 1 rad counts as this length of a leg, m, where that is more than the flange's way: legs that mostly turn it
+/// are as long as their turn.
+pub const RADIUS: f64 = 0.25;
+
+/// Legs shorter than this, m, move nothing.
+pub(crate) const SHORTEST: f64 = 1e-9;
+/// Distance of the second of three points from the line through the others, m, below which they are in line.
+const IN_LINE: f64 = 1e-6;
+/// Turns that miss half a turn by less, rad, might go either way.
+const HALF_TURN: f64 = 1e-6;
+
+/// A leg of a path of the flange, from where the leg before ends. The orientation turns evenly about one axis, the short way
+/// (spherical linear interpolation).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Leg {
+    /// Straight on to a pose.
+    Line {
+        /// Where it ends, in the base frame.
+        to: Pose,
+    },
+    /// On a circle to a pose.
+    Arc {
+        /// A point on the way, m in the base frame. It has no orientation of its own.
+        via: [f64; 3],
+        /// Where it ends, in the base frame.
+        to: Pose,
+    },
+}
+
+/// A place of the flange on its path, with derivatives by the path's parameter.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub frame: Frame,
+    /// m per unit.
+    pub velocity: Vector3<f64>,
+    /// Rotation vector in the base frame, rad per unit.
+    pub spin: Vector3<f64>,
+    /// m per squared unit.
+    pub acceleration: Vector3<f64>,
+    /// rad per squared unit.
+    pub spin_rate: Vector3<f64>,
+}
+
+/// A leg with numbers: a place for each parameter from 0 to its length.
+#[derive(Clone, Debug)]
+pub(crate) struct Drawn {
+    /// Counted from 1, as it was given.
+    pub number: usize,
+    /// m.
+    pub length: f64,
+    from: Frame,
+    pub to: Frame,
+    /// Rotation vector, rad per m.
+    spin: Vector3<f64>,
+    way: Way,
+}
+
+#[derive(Clone, Debug)]
+enum Way {
+    /// m per m.
+    Line(Vector3<f64>),
+    /// With the angle by which it goes round, rad per m.
+    Arc(Circle, f64),
+}
+
+/// An arc of a circle.
+#[derive(Clone, Debug)]
+struct Circle {
+    centre: Vector3<f64>,
+    /// From the centre to the beginning.
+    arm: Vector3<f64>,
+    /// Unit vector, about which the arc goes round.
+    normal: Vector3<f64>,
+    /// rad.
+    angle: f64,
+}
+
+impl Drawn {
+    pub fn new(number: usize, from: &Frame, leg: &Leg) -> Result<Self, PoseError> {
+        let (Leg::Line { to } | Leg::Arc { to, .. }) = leg;
+        let to = checked(to)?;
+        let turn = logarithm(&(to.rotation * from.rotation.transpose()));
+        if turn.norm() > std::f64::consts::PI - HALF_TURN {
+            return Err(PoseError::HalfTurn);
+        }
+        let chord = to.position - from.position;
+        let circle = match leg {
+            Leg::Line { .. } => None,
+            Leg::Arc { via, .. } => Some(circle(from, via, &to)?),
+        };
+        let way = circle.as_ref().map_or(chord.norm(), |circle| circle.arm.norm() * circle.angle);
+        let length = way.max(turn.norm() * RADIUS);
+        let unit = if length > SHORTEST { length } else { 1.0 };
+        let way = match circle {
+            None => Way::Line(chord / unit),
+            Some(circle) => {
+                let rate = circle.angle / unit;
+                Way::Arc(circle, rate)
+            }
+        };
+        Ok(Self { number, length, from: *from, to, spin: turn / unit, way })
+    }
+
+    /// The place `u` (m) from the beginning.
+    pub fn at(&self, u: f64) -> Place {
+        let rotation = exponential(&(self.spin * u)) * self.from.rotation;
+        let (position, velocity, acceleration) = match &self.way {
+            Way::Line(direction) => (self.from.position + direction * u, *direction, Vector3::zeros()),
+            Way::Arc(Circle { centre, arm, normal, .. }, rate) => {
+                let arm = turned(normal, rate * u, arm);
+                (centre + arm, normal.cross(&arm) * *rate, arm * -(rate * rate))
+            }
+        };
+        let frame = Frame { rotation, position };
+        Place { frame, velocity, spin: self.spin, acceleration, spin_rate: Vector3::zeros() }
+    }
+}
+
+/// The arc from one pose through a point to another.
+fn circle(from: &Frame, via: &[f64; 3], to: &Frame) -> Result<Circle, PoseError> {
+    if let Some(&value) = via.iter().find(|v| !v.is_finite()) {
+        return Err(PoseError::NotFinite { what: "the point that an arc passes", value });
+    }
+    let (u, v) = (Vector3::from(*via) - from.position, to.position - from.position);
+    let normal = u.cross(&v);
+    let distance = if v.norm() > SHORTEST { normal.norm() / v.norm() } else { 0.0 };
+    if distance < IN_LINE || u.norm() < IN_LINE || (u - v).norm() < IN_LINE {
+        return Err(PoseError::Arc { distance });
+    }
+    let towards = normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared();
+    let centre = from.position + towards / (2.0 * normal.norm_squared());
+    let (arm, end, normal) = (from.position - centre, to.position - centre, normal.normalize());
+    let angle = normal.dot(&arm.cross(&end)).atan2(arm.dot(&end));
+    Ok(Circle { centre, arm, normal, angle: angle.rem_euclid(std::f64::consts::TAU) })
+}

@@ -1,0 +1,118 @@
+//! Poses in which the flange cannot move in some direction.
+use std::fmt;
+
+use jtc_dynamics::JOINTS;
+use jtc_wire::Joint;
+
+use super::chain::{Axes, Chain};
+use super::closed_form::{Geometry, Shoulder};
+use super::subproblems::across;
+
+/// Smallest singular value of the Jacobian on a path of the flange (see [`Singularity::smallest`]):
+/// half a degree from where the wrist's axes are in line, and a few degrees from the stretched arm.
+pub const SINGULAR: f64 = 0.01;
+
+/// Which singular pose of the arm it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SingularKind {
+    /// The wrist: the axes of joints 4 and 6 are parallel, joint 5 stands at 0 or half a turn from there.
+    Wrist,
+    /// The elbow: the arm is stretched, or folded.
+    Elbow,
+    /// The shoulder: the wrist is over the axis of joint 1, or where joint 1 cannot move it sideways.
+    Shoulder,
+    /// None of these, or of an arm whose geometry has no such names.
+    Other,
+}
+
+/// The singular pose that the arm is in or next to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Singularity {
+    /// Which one.
+    pub kind: SingularKind,
+    /// The joints that can move with the flange almost at rest.
+    pub joints: Vec<Joint>,
+    /// Smallest singular value of the Jacobian, translations counted in lengths of the stretched arm: how far the flange moves
+    /// at least while the joints move by 1 rad altogether. 0 in the singular pose.
+    pub smallest: f64,
+}
+
+impl fmt::Display for Singularity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, why) = match self.kind {
+            SingularKind::Wrist => ("wrist singularity", " (the axes of joints 4 and 6 in line)"),
+            SingularKind::Elbow => ("elbow singularity", " (the arm stretched or folded)"),
+            SingularKind::Shoulder => {
+                ("shoulder singularity", " (the wrist where joint 1 cannot move it sideways)")
+            }
+            SingularKind::Other => ("singular pose", ""),
+        };
+        write!(f, "{name}{why}: {} ", if self.joints.len() > 1 { "joints" } else { "joint" })?;
+        for (k, joint) in self.joints.iter().enumerate() {
+            let before = if k == 0 {
+                ""
+            } else if k + 1 == self.joints.len() {
+                " and "
+            } else {
+                ", "
+            };
+            write!(f, "{before}{}", joint.number())?;
+        }
+        write!(
+            f,
+            " would move far for a small way of the flange; smallest singular value {:.2e}, limit {:.2e}",
+            self.smallest, SINGULAR
+        )
+    }
+}
+
+/// Share of the largest entry from which on a joint counts among those that move.
+const TAKES_PART: f64 = 0.2;
+/// Sine of the angle of the wrist below which a singular pose of an arm without a planar elbow is the wrist's.
+const NAMED: f64 = 0.1;
+
+/// The smallest singular value of the Jacobian, and the unit vector of joint motions that goes with it.
+pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, nalgebra::Vector6<f64>) {
+    let parts = chain.scaled_jacobian(axes).svd(false, true);
+    let least = parts.singular_values.imin();
+    let direction = parts.v_t.map(|v| v.row(least).transpose()).unwrap_or_default();
+    (parts.singular_values[least], direction)
+}
+
+/// What singular pose is nearest to these joint positions.
+pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -> Singularity {
+    let (smallest, direction) = weakest(chain, axes);
+    let part = TAKES_PART * direction.amax();
+    let joints = (0..JOINTS).filter(|&j| direction[j].abs() > part).filter_map(Joint::from_index).collect();
+    Singularity { kind: geometry.map_or(SingularKind::Other, |g| kind(chain, g, axes)), joints, smallest }
+}
+
+/// The factor of the Jacobian's determinant that is nearest to 0, by its name.
+fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
+    let (h, p) = (&axes.axis, &axes.point);
+    // As a share of what it is with joint 5 a quarter turn away.
+    let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
+    let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
+    let (centre, is_planar) = match geometry {
+        Geometry::ThreeParallel { centre } => (centre, true),
+        Geometry::SphericalWrist { centre, shoulder } => (centre, *shoulder == Shoulder::UpperArmParallel),
+    };
+    if !is_planar {
+        return if wrist < NAMED { SingularKind::Wrist } else { SingularKind::Other };
+    }
+    // The meeting point of the last axes is on axis 5, which carries it along.
+    let along = chain.zero.axis[4].dot(&(centre - chain.zero.point[4]));
+    let centre = axes.point[4] + h[4] * along;
+    let end = if matches!(geometry, Geometry::ThreeParallel { .. }) { p[3] } else { centre };
+    let (upper, fore) = (across(&h[1], &(p[2] - p[1])), across(&h[1], &(end - p[2])));
+    let elbow = h[1].dot(&upper.cross(&fore)).abs() / (upper.norm() * fore.norm()).max(f64::MIN_POSITIVE);
+    let shoulder = h[1].dot(&h[0].cross(&(centre - p[0]))).abs() / chain.length;
+    if wrist <= elbow.min(shoulder) {
+        SingularKind::Wrist
+    } else if elbow <= shoulder {
+        SingularKind::Elbow
+    } else {
+        SingularKind::Shoulder
+    }
+}

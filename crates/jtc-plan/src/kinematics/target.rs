@@ -1,0 +1,51 @@
+//! What a file of waypoints gives: joint positions or poses of the flange.
+use jtc_dynamics::{JointVec, Pose};
+
+use super::{Kinematics, PoseError, first_outside};
+
+/// Where a motion is to lead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Joint positions, rad.
+    Joints(JointVec),
+    /// A pose of the flange in the base frame, m.
+    Flange(Pose),
+}
+
+/// Joint positions for each target: of a pose the solution that is nearest to the target before, and to `start` (rad) for the first.
+///
+/// # Errors
+///
+/// [`PoseError::Waypoint`] with the number of the first target that has none, counted from 1, and why: see [`Kinematics::solve`].
+/// Joint positions have to be within the limits too.
+pub fn resolve(
+    kinematics: &Kinematics,
+    targets: &[Target],
+    start: &JointVec,
+) -> Result<Vec<JointVec>, PoseError> {
+    let mut before = *start;
+    let mut found = Vec::with_capacity(targets.len());
+    for (n, target) in targets.iter().enumerate() {
+        before = one(kinematics, target, &before).map_err(|error| error.at_waypoint(n + 1))?;
+        found.push(before);
+    }
+    Ok(found)
+}
+
+fn one(kinematics: &Kinematics, target: &Target, before: &JointVec) -> Result<JointVec, PoseError> {
+    match target {
+        Target::Flange(pose) => kinematics.solve(pose, before),
+        Target::Joints(q) => {
+            if let Some(&value) = q.iter().find(|q| !q.is_finite()) {
+                return Err(PoseError::NotFinite { what: "a joint position", value });
+            }
+            match first_outside(q, kinematics.limits()) {
+                Some((joint, value)) => {
+                    let (low, high) = kinematics.limits()[joint.index()];
+                    Err(PoseError::OutsideLimits { joint, value, low, high })
+                }
+                None => Ok(*q),
+            }
+        }
+    }
+}

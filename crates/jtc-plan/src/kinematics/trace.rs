@@ -1,0 +1,230 @@
+//! The way of the flange: legs one after the other, with blended corners.
+//!
+//! A blend begins at the distance r before the corner and ends at the distance r behind it. In between the parameter of the leg
+//! before runs out as that of the leg behind begins to run: with w rising smoothly from 0 to 1 and W = ∫w, the place is that of the
+//! leg before at τ − W and, on top of it, the displacement of the leg behind by W, τ from −r to r. Position and orientation have
+//! continuous second derivatives, and stay within the triangle of the corner where the legs are straight.
+use nalgebra::Vector3;
+
+use super::PoseError;
+use super::chain::Frame;
+use super::leg::{Drawn, Leg, Place, RADIUS, SHORTEST};
+
+/// Cosine of the angle between two legs below which a corner is a way back, where no blend keeps a motion going.
+const WAY_BACK: f64 = -0.98;
+
+/// The way of the flange over a parameter that is the length of its legs, m.
+#[derive(Clone, Debug)]
+pub(crate) struct Trace {
+    legs: Vec<Drawn>,
+    /// Where each leg begins; one more for the end.
+    begins: Vec<f64>,
+    /// Blend radius behind each leg, m; 0 for a stop.
+    blends: Vec<f64>,
+    /// How many legs were given: some may move nothing.
+    given: usize,
+}
+
+impl Trace {
+    pub fn new(start: &Frame, legs: &[Leg], blend: f64) -> Result<Self, PoseError> {
+        if !(blend >= 0.0 && blend.is_finite()) {
+            return Err(PoseError::Blend { radius: blend });
+        }
+        let (mut from, mut drawn, mut begins) = (*start, Vec::new(), vec![0.0]);
+        for (n, leg) in legs.iter().enumerate() {
+            let next = Drawn::new(n + 1, &from, leg).map_err(|error| error.at_waypoint(n + 2))?;
+            if next.length > SHORTEST {
+                from = next.to;
+                begins.push(begins[begins.len() - 1] + next.length);
+                drawn.push(next);
+            }
+        }
+        if drawn.is_empty() {
+            return Err(PoseError::NoMotion);
+        }
+        let corners = drawn.windows(2).map(|pair| radius(&pair[0], &pair[1], blend));
+        let blends = corners.chain([0.0]).collect();
+        Ok(Self { legs: drawn, begins, blends, given: legs.len() })
+    }
+
+    pub fn end(&self) -> f64 {
+        self.begins[self.legs.len()]
+    }
+
+    /// Index of the leg that `s` belongs to; a corner belongs to the leg behind it.
+    fn leg(&self, s: f64) -> usize {
+        let behind = self.begins.partition_point(|&begin| begin <= s);
+        behind.saturating_sub(1).min(self.legs.len() - 1)
+    }
+
+    /// Number of the leg that `s` belongs to, counted from 1, and how far along it and how long it is, m.
+    pub fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
+        let k = self.leg(s);
+        (self.legs[k].number, s - self.begins[k], self.legs[k].length)
+    }
+
+    pub fn at(&self, s: f64) -> Place {
+        let k = self.leg(s);
+        let (leg, u) = (&self.legs[k], s - self.begins[k]);
+        let left = leg.length - u;
+        if k > 0 && u < self.blends[k - 1] {
+            blended(&self.legs[k - 1], leg, self.blends[k - 1], u)
+        } else if left < self.blends[k] && k + 1 < self.legs.len() {
+            blended(leg, &self.legs[k + 1], self.blends[k], -left)
+        } else {
+            leg.at(u)
+        }
+    }
+
+    /// Where a motion has to come to rest.
+    pub fn stops(&self) -> Vec<f64> {
+        let inner = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
+        inner.filter(|(blend, _)| **blend == 0.0).map(|(_, &s)| s).collect()
+    }
+
+    /// Where the path changes its form, ends not included.
+    pub fn breaks(&self) -> Vec<f64> {
+        let corners = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
+        let mut all: Vec<f64> = corners.flat_map(|(&r, &s)| [s - r, s, s + r]).collect();
+        all.dedup();
+        all
+    }
+
+    /// Nearest to each waypoint, ends included: legs that move nothing end where they begin.
+    pub fn waypoints(&self) -> Vec<f64> {
+        let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);
+        (0..=self.given).map(|n| self.begins[passed(n)]).collect()
+    }
+}
+
+/// The blend radius at a corner: at most half of each leg, and none where the way turns back.
+fn radius(before: &Drawn, behind: &Drawn, blend: f64) -> f64 {
+    let (a, b) = (before.at(before.length), behind.at(0.0));
+    let along = a.velocity.dot(&b.velocity) + RADIUS * RADIUS * a.spin.dot(&b.spin);
+    let size = |p: &Place| (p.velocity.norm_squared() + RADIUS * RADIUS * p.spin.norm_squared()).sqrt();
+    if along < WAY_BACK * size(&a) * size(&b) {
+        return 0.0;
+    }
+    let radius = blend.min(0.5 * before.length).min(0.5 * behind.length);
+    if radius > SHORTEST { radius } else { 0.0 }
+}
+
+/// The place on a blend of radius `r` at `tau`, both m.
+fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
+    let t = (tau + r) / (2.0 * r);
+    let w = t * t * (3.0 - 2.0 * t);
+    let rate = 3.0 * t * (1.0 - t) / r;
+    let sum = 2.0 * r * t * t * t * (1.0 - 0.5 * t);
+    let (a, b) = (before.at(before.length + tau - sum), behind.at(sum));
+    let corner = &before.to;
+    // How the leg behind has turned the flange since the corner.
+    let since = b.frame.rotation * corner.rotation.transpose();
+    let spin: Vector3<f64> = since * a.spin;
+    Place {
+        frame: Frame {
+            rotation: since * a.frame.rotation,
+            position: a.frame.position + b.frame.position - corner.position,
+        },
+        velocity: a.velocity * (1.0 - w) + b.velocity * w,
+        spin: spin * (1.0 - w) + b.spin * w,
+        acceleration: a.acceleration * ((1.0 - w) * (1.0 - w))
+            + b.acceleration * (w * w)
+            + (b.velocity - a.velocity) * rate,
+        spin_rate: (b.spin - spin) * rate + b.spin.cross(&spin) * (w * (1.0 - w)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chain::logarithm;
+    use super::*;
+    use crate::kinematics::Orientation;
+    use proptest::prelude::*;
+
+    fn pose() -> impl Strategy<Value = jtc_dynamics::Pose> {
+        (prop::array::uniform3(-1.0..1.0f64), prop::array::uniform3(-0.9..0.9f64))
+            .prop_map(|(position, rpy)| Orientation::Rpy(rpy).at(position).unwrap())
+    }
+
+    fn leg() -> impl Strategy<Value = Leg> {
+        prop_oneof![
+            pose().prop_map(|to| Leg::Line { to }),
+            (prop::array::uniform3(-1.0..1.0f64), pose()).prop_map(|(via, to)| Leg::Arc { via, to }),
+        ]
+    }
+
+    /// Largest difference of the derivatives that a place has from those of its neighbours.
+    fn wrong(trace: &Trace, s: f64) -> f64 {
+        let step = 1e-5;
+        let (before, here, after) = (trace.at(s - step), trace.at(s), trace.at(s + step));
+        let slope = |a: Vector3<f64>, b: Vector3<f64>| (b - a) / (2.0 * step);
+        let turn = logarithm(&(after.frame.rotation * before.frame.rotation.transpose())) / (2.0 * step);
+        [
+            slope(before.frame.position, after.frame.position) - here.velocity,
+            turn - here.spin,
+            slope(before.velocity, after.velocity) - here.acceleration,
+            slope(before.spin, after.spin) - here.spin_rate,
+        ]
+        .iter()
+        .fold(0.0, |worst, v| v.amax().max(worst))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
+        /// Also across the ends of the blends: a second derivative that jumps there would show as half of the jump.
+        #[test]
+        fn derivatives_are_those_of_the_places_and_continuous(
+            start in pose(), legs in prop::collection::vec(leg(), 2..5), blend in 0.05..0.3f64, at in 0.0..1.0f64
+        ) {
+            let Ok(trace) = Trace::new(&(&start).into(), &legs, blend) else { return Ok(()) };
+            prop_assume!(trace.stops().is_empty() && trace.legs.iter().all(|leg| leg.length > 0.2));
+            let at_ends = trace.breaks();
+            for s in at_ends.into_iter().chain([at * trace.end()]) {
+                let s = s.clamp(1e-5, trace.end() - 1e-5);
+                // At the ends of a blend the third derivative jumps; arcs may be tight, and then differences are rough.
+                let tight = trace.at(s).acceleration.norm() + trace.at(s).velocity.norm();
+                prop_assert!(wrong(&trace, s) < 0.03 + 1e-3 * tight.powi(3), "{} at {s}: {trace:?}", wrong(&trace, s));
+            }
+        }
+
+        #[test]
+        fn a_blend_leaves_the_legs_within_its_radius_of_the_corner_only(
+            poses in prop::collection::vec(pose(), 4), blend in 0.01..0.2f64
+        ) {
+            let legs: Vec<Leg> = poses[1..].iter().map(|&to| Leg::Line { to }).collect();
+            let (sharp, round) = (
+                Trace::new(&(&poses[0]).into(), &legs, 0.0).unwrap(),
+                Trace::new(&(&poses[0]).into(), &legs, blend).unwrap(),
+            );
+            prop_assert_eq!(sharp.stops().len(), 2);
+            prop_assert_eq!(sharp.waypoints(), round.waypoints());
+            for k in 0..=300 {
+                let s = sharp.end() * f64::from(k) / 300.0;
+                let (a, b) = (sharp.at(s).frame, round.at(s).frame);
+                let corner = sharp.begins[1..3].iter().any(|begin| (begin - s).abs() < blend);
+                if !corner {
+                    prop_assert!((a.position - b.position).amax() < 1e-12);
+                    prop_assert!((a.rotation - b.rotation).amax() < 1e-12);
+                }
+                let near = |pose: &jtc_dynamics::Pose| (Vector3::from(pose.position) - b.position).norm() <= blend;
+                prop_assert!((a.position - b.position).amax() < 1e-12 || poses[1..3].iter().any(near));
+            }
+        }
+    }
+
+    #[test]
+    fn a_way_back_is_a_stop_and_a_leg_of_no_length_has_its_waypoint() {
+        let at = |x: f64| Orientation::Rpy([0.0; 3]).at([x, 0.0, 0.0]).unwrap();
+        let legs = [0.4, 0.4, 0.9, 0.1].map(|x| Leg::Line { to: at(x) });
+        let trace = Trace::new(&(&at(0.0)).into(), &legs, 0.05).unwrap();
+        assert!((trace.end() - 1.7).abs() < 1e-12);
+        assert_eq!(trace.stops().len(), 1);
+        assert!((trace.stops()[0] - 0.9).abs() < 1e-12);
+        let expected = [0.0, 0.4, 0.4, 0.9, 1.7];
+        assert!(trace.waypoints().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert_eq!(trace.whereabouts(0.5).0, 3);
+        let still = Trace::new(&(&at(0.4)).into(), &legs[..2], 0.0);
+        assert_eq!(still.unwrap_err(), PoseError::NoMotion);
+    }
+}

@@ -1,0 +1,338 @@
+//! Inverse kinematics against forward kinematics that share no code with it.
+mod robots;
+
+use std::f64::consts::{PI, TAU};
+
+use jtc_dynamics::{ArmModel, JOINTS, JointVec, Pose};
+use jtc_plan::kinematics::{Kinematics, Orientation, PoseError, SingularKind, Target, resolve};
+use proptest::prelude::*;
+use robots::difference;
+
+/// Each joint a whole turn.
+const TURN: [(f64, f64); JOINTS] = [(-PI, PI); JOINTS];
+/// Smallest singular value from which on a pose is away from singular ones.
+const AWAY: f64 = 0.01;
+
+fn positions() -> impl Strategy<Value = JointVec> {
+    prop::array::uniform6(-3.1..3.1f64)
+}
+
+fn apart(a: &JointVec, b: &JointVec) -> f64 {
+    let turn = |d: f64| (d - TAU * (d / TAU).round()).abs();
+    a.iter().zip(b).map(|(a, b)| turn(a - b)).fold(0.0, f64::max)
+}
+
+fn length(a: &JointVec, b: &JointVec) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// What holds for every arm and every pose that it reaches.
+fn check_all(name: &str, model: &ArmModel, q: &JointVec, most: usize) -> Result<(), TestCaseError> {
+    let kin = Kinematics::new(model, &TURN);
+    let pose = robots::pose(model, q);
+    let all = kin.all(&pose);
+    prop_assert!(all.len() <= most, "{name}: {} solutions", all.len());
+    for (n, found) in all.iter().enumerate() {
+        let (shift, turn) = difference(&robots::pose(model, found), &pose);
+        prop_assert!(shift <= 1e-9 && turn <= 1e-9, "{name}: {shift} m, {turn} rad at {found:?}");
+        prop_assert!(found.iter().all(|a| a.abs() <= PI), "{name}: {found:?}");
+        prop_assert!(all[..n].iter().all(|other| apart(found, other) > 1e-5), "{name}: {found:?} twice");
+    }
+    let smallest = kin.singularity(q).smallest;
+    if smallest > AWAY {
+        prop_assert!(all.iter().any(|found| apart(found, q) < 1e-7), "{name}: {q:?} is not among {all:?}");
+        let same = kin.solve(&pose, q).unwrap();
+        prop_assert!(length(&same, q) < 1e-7, "{name}: {same:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn closed_forms_are_recognised() {
+    for (name, model) in robots::named() {
+        let closed = Kinematics::new(&model, &TURN).is_closed_form();
+        assert_eq!(closed, !["Jaco 2", "crooked"].contains(&name), "{name}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
+
+    #[test]
+    fn closed_forms_reach_the_pose_in_up_to_eight_ways(q in positions()) {
+        for (name, model) in robots::named().into_iter().chain(robots::more_closed_forms()) {
+            if Kinematics::new(&model, &TURN).is_closed_form() {
+                check_all(name, &model, &q, 8)?;
+            }
+        }
+    }
+
+    /// Where the closed forms are at their limits: right angles and stretched arms.
+    #[test]
+    fn poses_at_and_near_singular_ones_are_reached(
+        quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
+            4 => Just(0.0), 1 => -1e-9..1e-9f64, 1 => -1e-6..1e-6f64, 1 => -1e-3..1e-3f64
+        ])
+    ) {
+        let q: JointVec = std::array::from_fn(|j| f64::from(quarters[j]) * 0.5 * PI + off[j]);
+        for (name, model) in robots::named() {
+            let kin = Kinematics::new(&model, &[(-4.0, 4.0); JOINTS]);
+            let pose = robots::pose(&model, &q);
+            let found = kin.solve(&pose, &q);
+            prop_assert!(found.is_ok(), "{name} at {q:?}: {found:?}");
+            let (shift, turn) = difference(&robots::pose(&model, &found.unwrap()), &pose);
+            prop_assert!(shift <= 1e-9 && turn <= 1e-9, "{name}: {shift} m, {turn} rad at {q:?}");
+        }
+    }
+
+    #[test]
+    fn each_turn_within_the_limits_counts(q in positions(), wide in prop::array::uniform6(any::<bool>())) {
+        let limits = wide.map(|wide| if wide { (-TAU, TAU) } else { (-PI, PI) });
+        for model in [robots::ur5(), robots::kr5()] {
+            let pose = robots::pose(&model, &q);
+            let (single, all) =
+                (Kinematics::new(&model, &TURN).all(&pose), Kinematics::new(&model, &limits).all(&pose));
+            let each = 2usize.pow(wide.iter().filter(|&&wide| wide).count() as u32);
+            // At a position of exactly 0 there are three.
+            prop_assert_eq!(all.len(), single.len() * each);
+            for (n, found) in all.iter().enumerate() {
+                let (shift, turn) = difference(&robots::pose(&model, found), &pose);
+                prop_assert!(shift <= 1e-9 && turn <= 1e-9);
+                prop_assert!(found.iter().zip(limits).all(|(a, (low, high))| (low..=high).contains(a)));
+                prop_assert!(all[..n].iter().all(|other| length(found, other) > 1e-5));
+            }
+        }
+    }
+
+    #[test]
+    fn of_all_solutions_the_nearest_is_taken(
+        q in positions(), near in prop::array::uniform6(-6.0..6.0f64), width in 3.2..7.0f64
+    ) {
+        let limits = [(-width, width); JOINTS];
+        for model in [robots::avena(), robots::puma560()] {
+            let kin = Kinematics::new(&model, &limits);
+            prop_assume!(kin.singularity(&q).smallest > AWAY);
+            let pose = robots::pose(&model, &q);
+            let found = kin.solve(&pose, &near).unwrap();
+            let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
+            // `all` has no turns beyond one; `near` is within one.
+            prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
+            prop_assert!(found.iter().all(|a| a.abs() <= width));
+        }
+    }
+
+    /// The default arm in its own limits, where not every solution is.
+    #[test]
+    fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
+        let limits = robots::avena_limits();
+        let q: JointVec = std::array::from_fn(|j| limits[j].0 + share[j] * (limits[j].1 - limits[j].0));
+        let kin = Kinematics::new(&robots::avena(), &limits);
+        prop_assume!(kin.singularity(&q).smallest > AWAY);
+        let all = kin.all(&robots::pose(&robots::avena(), &q));
+        prop_assert!(all.iter().any(|found| apart(found, &q) < 1e-7));
+        prop_assert!(all.iter().flatten().zip(limits.iter().cycle()).all(|(a, l)| (l.0..=l.1).contains(a)));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(12) })]
+
+    #[test]
+    fn searches_reach_the_pose_in_up_to_sixteen_ways(q in positions()) {
+        for (name, model) in [("Jaco 2", robots::jaco2()), ("crooked", robots::crooked())] {
+            check_all(name, &model, &q, 16)?;
+        }
+    }
+
+    /// As a calibration leaves an arm: a milliradian and a millimetre from the geometry with a closed form.
+    #[test]
+    fn an_arm_off_its_ideal_geometry_is_solved_too(
+        q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
+    ) {
+        for (name, mut model) in [("UR5", robots::ur5()), ("KR 5", robots::kr5())] {
+            for (joint, off) in model.joints[1..].iter_mut().zip(&off) {
+                for i in 0..3 {
+                    joint.xyz[i] += off[i];
+                    joint.rpy[i] += off[i + 3];
+                }
+            }
+            prop_assert!(!Kinematics::new(&model, &TURN).is_closed_form());
+            check_all(name, &model, &q, 16)?;
+        }
+    }
+}
+
+fn at(position: [f64; 3]) -> Pose {
+    Orientation::Rpy([0.0; 3]).at(position).unwrap()
+}
+
+/// The wrist of a PUMA 560 comes 0.15005 m beside the axis of joint 1 and as far up as both links reach.
+#[test]
+fn out_of_reach_says_how_far() {
+    let kin = Kinematics::new(&robots::puma560(), &TURN);
+    let up = 0.4318 + 0.0203f64.hypot(0.4318);
+    let error = kin.solve(&at([0.0, 0.0, 3.0]), &[0.0; 6]).unwrap_err();
+    let PoseError::OutOfReach { distance, missing } = error else { panic!("{error}") };
+    assert!((distance - 3.0).abs() < 1e-12 && (missing - (3.0 - up).hypot(0.15005)).abs() < 1e-6, "{error}");
+    let text = error.to_string();
+    assert_eq!(
+        text,
+        "out of reach: 3.000 m from the origin of the base, and the flange comes no nearer to it than 2.1412 m"
+    );
+    assert!(error.hint().contains("base frame"));
+    // In the hole around the axis of joint 1.
+    let error = kin.solve(&at([0.05, 0.0, 0.3]), &[0.0; 6]).unwrap_err();
+    let PoseError::OutOfReach { missing, .. } = error else { panic!("{error}") };
+    assert!((missing - 0.10005).abs() < 1e-6, "{error}");
+}
+
+/// Where the UR5 is stretched to its limit the flange points outwards or sideways, but not back.
+#[test]
+fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
+    let model = robots::ur5();
+    let kin = Kinematics::new(&model, &TURN);
+    let q = [0.3, -1.0, 0.1, -1.5, 0.4, 0.0];
+    let mut pose = robots::pose(&model, &q);
+    // A place that is reached, turned by half a turn about the flange's x axis.
+    pose.rotation = pose.rotation.map(|[x, y, z]| [x, -y, -z]);
+    let error = kin.solve(&pose, &q).unwrap_err();
+    let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
+    assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
+    assert!(missing > 0.01 && missing < PI, "{error}");
+    // Turned back by a little more than that, some such orientation is reached; less is not for any axis near.
+    let turned = |angle: f64| {
+        let (s, c) = angle.sin_cos();
+        let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
+        kin.solve(&Pose { rotation, ..pose }, &q).is_ok()
+    };
+    assert!(turned(PI) && !turned(0.5 * missing) && !turned(-0.5 * missing));
+}
+
+#[test]
+fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
+    let model = robots::kr5();
+    let q = [0.4, -0.8, 0.5, 0.6, 0.9, -0.4];
+    let pose = robots::pose(&model, &q);
+    let all = Kinematics::new(&model, &TURN).all(&pose);
+    for joint in 0..JOINTS {
+        let mut limits = TURN;
+        // No solution has the joint there, and the others are free.
+        let (low, high) = (0..60)
+            .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
+            .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
+            .unwrap();
+        limits[joint] = (low, high);
+        let error = Kinematics::new(&model, &limits).solve(&pose, &q).unwrap_err();
+        let PoseError::OutsideLimits { joint: named, value, low: l, high: h } = error else {
+            panic!("{error}")
+        };
+        assert_eq!((named.index(), l, h), (joint, low, high), "{error}");
+        let beyond = |a: f64| {
+            let turns = [-TAU, 0.0, TAU].map(|turn| (low - a - turn).max(a + turn - high));
+            turns.into_iter().fold(f64::INFINITY, f64::min)
+        };
+        let least = all.iter().map(|q| beyond(q[joint])).fold(f64::INFINITY, f64::min);
+        assert!((beyond(value) - least).abs() < 1e-7, "{error}");
+        assert!(error.to_string().starts_with(&format!("joint {} would be at", joint + 1)), "{error}");
+        assert!(Kinematics::new(&model, &limits).all(&pose).is_empty());
+    }
+}
+
+#[test]
+fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
+    let kin = Kinematics::new(&robots::avena(), &TURN);
+    let mut pose = kin.flange(&[0.1; 6]);
+    pose.position[1] = f64::NAN;
+    let error = kin.solve(&pose, &[0.0; 6]).unwrap_err();
+    assert!(matches!(error, PoseError::NotFinite { what: "position y", .. }), "{error}");
+    assert!(kin.all(&pose).is_empty());
+    let mut pose = kin.flange(&[0.1; 6]);
+    pose.rotation[0] = [0.0; 3];
+    assert!(matches!(kin.solve(&pose, &[0.0; 6]), Err(PoseError::NotRotation { .. })));
+    let pose = kin.flange(&[0.1; 6]);
+    let nowhere = kin.solve(&pose, &[0.0, 0.0, f64::INFINITY, 0.0, 0.0, 0.0]);
+    assert!(matches!(nowhere, Err(PoseError::NotFinite { .. })));
+    assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
+}
+
+/// Singular poses by their definition, for both geometries.
+#[test]
+fn singular_poses_have_their_names() {
+    use SingularKind::{Elbow, Shoulder, Wrist};
+    let away = [0.3, -1.2, 1.1, 0.4, 0.8, 0.2];
+    let with = |j: usize, value: f64| {
+        let mut q = away;
+        q[j] = value;
+        q
+    };
+    for (model, name, q, kind, joints) in [
+        (robots::ur5(), "UR5", with(4, 0.0), Wrist, [4, 6].as_slice()),
+        (robots::ur5(), "UR5", with(2, 0.0), Elbow, &[2, 3, 4]),
+        (robots::puma560(), "PUMA 560", with(4, 0.0), Wrist, &[4, 6]),
+        (robots::puma560(), "PUMA 560", with(2, -PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2, 3]),
+        // Folded: both links are as long, and the wrist is next to the axis of joint 2.
+        (robots::puma560(), "PUMA 560", with(2, PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2]),
+        (robots::kr5(), "KR 5", with(4, PI), Wrist, &[4, 6]),
+        (robots::kr5(), "KR 5", over_the_base(), Shoulder, &[1]),
+    ] {
+        let found = Kinematics::new(&model, &TURN).singularity(&q);
+        assert!(found.smallest < 1e-3, "{name}: {found}");
+        assert_eq!(found.kind, kind, "{name}: {found}");
+        for joint in joints {
+            assert!(found.joints.iter().any(|j| j.number() == *joint), "{name}: {found}");
+        }
+    }
+    let far = Kinematics::new(&robots::ur5(), &TURN).singularity(&away);
+    assert!(far.smallest > 0.05, "{far}");
+}
+
+/// A KR 5 with its wrist over the axis of joint 1, found by bisection.
+fn over_the_base() -> JointVec {
+    let with = |q2: f64| [0.3, q2, 0.3, 0.4, 0.8, 0.2];
+    let radius = |q2: f64| {
+        let pose = robots::pose(&robots::kr5(), &with(q2));
+        let wrist: [f64; 3] = std::array::from_fn(|i| pose.position[i] - 0.115 * pose.rotation[i][2]);
+        wrist[0] * 0.3f64.cos() + wrist[1] * 0.3f64.sin()
+    };
+    let (mut low, mut high) = (-PI + 0.5, -0.5);
+    assert!(radius(low) * radius(high) < 0.0, "{} {}", radius(low), radius(high));
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if radius(middle) * radius(low) > 0.0 { low = middle } else { high = middle }
+    }
+    with(low)
+}
+
+#[test]
+fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
+    let (model, limits) = (robots::avena(), robots::avena_limits());
+    let kin = Kinematics::new(&model, &limits);
+    let way: [JointVec; 4] = std::array::from_fn(|k| {
+        let s = k as f64;
+        [0.3 * s, 0.2 - 0.2 * s, 0.8 + 0.1 * s, 0.3, 0.5 + 0.2 * s, -0.4 * s]
+    });
+    let targets = [
+        Target::Flange(robots::pose(&model, &way[0])),
+        Target::Joints(way[1]),
+        Target::Flange(robots::pose(&model, &way[2])),
+        Target::Flange(robots::pose(&model, &way[3])),
+    ];
+    let found = resolve(&kin, &targets, &[0.0, 0.1, 0.7, 0.2, 0.4, 0.0]).unwrap();
+    for (found, wanted) in found.iter().zip(&way) {
+        assert!(length(found, wanted) < 1e-7, "{found:?} {wanted:?}");
+    }
+    let mut far = targets;
+    far[2] = Target::Flange(at([0.0, 0.0, 9.0]));
+    let error = resolve(&kin, &far, &way[0]).unwrap_err();
+    assert!(matches!(error, PoseError::Waypoint { waypoint: 3, .. }), "{error}");
+    assert!(error.to_string().starts_with("waypoint 3: out of reach: 9.000 m"), "{error}");
+    far[1] = Target::Joints([0.0, 0.0, 0.0, 3.1, 0.0, 0.0]);
+    let error = resolve(&kin, &far, &way[0]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "waypoint 2: joint 4 would be at 3.1000 rad, its limits are -2.9700 and 2.9700 rad"
+    );
+    far[0] = Target::Joints([f64::NAN; 6]);
+    let error = resolve(&kin, &far, &way[0]).unwrap_err();
+    assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
+}

@@ -1,0 +1,366 @@
+//! Lines and arcs of the flange, by forward kinematics that share no code with the paths.
+mod robots;
+
+use std::f64::consts::PI;
+
+use jtc_dynamics::{ArmModel, JOINTS, JointVec, Pose};
+use jtc_plan::Path;
+use jtc_plan::kinematics::{FlangePath, Kinematics, Leg, Orientation, PoseError, SINGULAR, SingularKind};
+use proptest::prelude::*;
+use robots::difference;
+
+type Vec3 = [f64; 3];
+const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
+
+fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn dot(a: Vec3, b: Vec3) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn norm(a: Vec3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `pose` moved by `shift` (m) and turned about its own z, y and x by `turn` (rad).
+fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
+    let by = Orientation::Rpy(turn).at([0.0; 3]).unwrap().rotation;
+    let product = |i: usize, k: usize| (0..3).map(|j| pose.rotation[i][j] * by[j][k]).sum::<f64>();
+    let rotation: [Vec3; 3] = std::array::from_fn(|i| std::array::from_fn(|k| product(i, k)));
+    Pose { rotation, position: std::array::from_fn(|i| pose.position[i] + shift[i]) }
+}
+
+/// Arms with closed forms, and one without.
+fn arms() -> [(&'static str, ArmModel); 4] {
+    [("avena", robots::avena()), ("UR5", robots::ur5()), ("KR 5", robots::kr5()), ("Jaco 2", robots::jaco2())]
+}
+
+/// A start away from singular poses for each arm.
+fn start() -> impl Strategy<Value = JointVec> {
+    (-3.0..3.0f64, -1.2..-0.4f64, 0.6..1.6f64, -1.0..1.0f64, 0.5..1.5f64, -2.0..2.0f64)
+        .prop_map(|(a, b, c, d, e, f)| [a, b, c, d, e, f])
+}
+
+fn small(size: f64) -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-size..size)
+}
+
+/// The path, or `None` where a line leads past a singular pose or out of reach.
+fn path(model: &ArmModel, q: &JointVec, legs: &[Leg], blend: f64) -> Option<FlangePath> {
+    match FlangePath::new(&Kinematics::new(model, &WIDE), q, legs, blend) {
+        Ok(path) => Some(path),
+        Err(PoseError::Leg { .. } | PoseError::Waypoint { .. }) => None,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Derivatives by differences of positions and of first derivatives: the largest deviation from those of the path.
+fn deviation(path: &FlangePath, s: f64) -> f64 {
+    let step = 1e-5;
+    let (before, here, after) = (path.at(s - step), path.at(s), path.at(s + step));
+    (0..JOINTS).fold(0.0, |worst: f64, j| {
+        let first = (after.position[j] - before.position[j]) / (2.0 * step) - here.first[j];
+        let second = (after.first[j] - before.first[j]) / (2.0 * step) - here.second[j];
+        worst.max(first.abs() / (1.0 + here.first[j].abs())).max(second.abs() / (1.0 + here.second[j].abs()))
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+
+    /// Each position on the straight line between the ends, in even steps, and each orientation turned in proportion about one axis.
+    #[test]
+    fn lines_are_straight(q in start(), shift in small(0.3), turn in small(0.6)) {
+        for (name, model) in arms() {
+            let from = robots::pose(&model, &q);
+            let to = moved(&from, shift, turn);
+            let Some(path) = path(&model, &q, &[Leg::Line { to }], 0.0) else { continue };
+            prop_assert_eq!(path.waypoints(), vec![0.0, path.end()]);
+            let (whole_shift, whole_turn) = difference(&from, &to);
+            prop_assert!((path.end() - whole_shift.max(0.25 * whole_turn)).abs() < 1e-9);
+            let mut last = q;
+            for k in 0..=200 {
+                let share = f64::from(k) / 200.0;
+                let at = path.at(share * path.end()).position;
+                let here = robots::pose(&model, &at);
+                let ideal = std::array::from_fn(|i| from.position[i] + share * (to.position[i] - from.position[i]));
+                prop_assert!(norm(sub(here.position, ideal)) < 1e-9, "{name}: {}", norm(sub(here.position, ideal)));
+                // The shortest way from one orientation to another is the only one on which the angles to both ends add up.
+                let (a, b) = (difference(&from, &here).1, difference(&here, &to).1);
+                prop_assert!((a - share * whole_turn).abs() < 1e-7 && (b - (1.0 - share) * whole_turn).abs() < 1e-7);
+                prop_assert!((0..JOINTS).all(|j| (at[j] - last[j]).abs() < 0.3), "{name}: {last:?} {at:?}");
+                last = at;
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_positions(
+        q in start(), shifts in prop::array::uniform3(small(0.15)), turn in small(0.4), share in 0.01..0.99f64
+    ) {
+        for (name, model) in arms() {
+            let poses = shifts.map(|shift| moved(&robots::pose(&model, &q), shift, turn));
+            let legs = [
+                Leg::Line { to: poses[0] },
+                Leg::Arc { via: poses[1].position, to: poses[2] },
+                Leg::Line { to: robots::pose(&model, &q) },
+            ];
+            let Some(path) = path(&model, &q, &legs, 0.03) else { continue };
+            let s = share * path.end();
+            let at_break = path.breaks().iter().any(|other| (other - s).abs() < 2e-5);
+            if !at_break {
+                prop_assert!(deviation(&path, s) < 2e-3, "{name}: {} at {s}", deviation(&path, s));
+            }
+            // A blended corner leaves no jump in any of the two.
+            if path.stops().is_empty() {
+                for corner in path.breaks() {
+                    let (before, after) = (path.at(corner - 1e-7), path.at(corner + 1e-7));
+                    for j in 0..JOINTS {
+                        prop_assert!((before.first[j] - after.first[j]).abs() < 1e-3 * (1.0 + before.second[j].abs()));
+                        let size = before.second[j].abs() + before.first.iter().map(|v| v.powi(2)).sum::<f64>();
+                        prop_assert!((before.second[j] - after.second[j]).abs() < 1e-2 * (1.0 + size), "{name} at {corner}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// On the circle that was drawn before its points were taken.
+    #[test]
+    fn arcs_are_round(
+        q in start(), radius in 0.03..0.2f64, plane in small(3.0), angles in (0.3..3.0f64, 0.3..2.5f64), turn in small(0.4)
+    ) {
+        for (name, model) in arms() {
+            let from = robots::pose(&model, &q);
+            let axes = Orientation::Rpy(plane).at([0.0; 3]).unwrap().rotation;
+            let (x, y, normal) = (axes.map(|row| row[0]), axes.map(|row| row[1]), axes.map(|row| row[2]));
+            let centre: Vec3 = std::array::from_fn(|i| from.position[i] - radius * x[i]);
+            let point = |angle: f64| -> Vec3 {
+                std::array::from_fn(|i| centre[i] + radius * (angle.cos() * x[i] + angle.sin() * y[i]))
+            };
+            let whole = angles.0 + angles.1;
+            let mut to = moved(&from, [0.0; 3], turn);
+            to.position = point(whole);
+            let Some(path) = path(&model, &q, &[Leg::Arc { via: point(angles.0), to }], 0.0) else { continue };
+            let whole_turn = difference(&from, &to).1;
+            prop_assert!((path.end() - (radius * whole).max(0.25 * whole_turn)).abs() < 1e-9, "{name}");
+            for k in 0..=100 {
+                let share = f64::from(k) / 100.0;
+                let here = robots::pose(&model, &path.at(share * path.end()).position);
+                let off = sub(here.position, centre);
+                prop_assert!((norm(off) - radius).abs() < 1e-9 && dot(off, normal).abs() < 1e-9, "{name}");
+                prop_assert!(norm(sub(here.position, point(share * whole))) < 1e-8, "{name} at {share}");
+                let (a, b) = (difference(&from, &here).1, difference(&here, &to).1);
+                prop_assert!((a - share * whole_turn).abs() < 1e-7 && (b - (1.0 - share) * whole_turn).abs() < 1e-7);
+            }
+        }
+    }
+
+    /// Off the legs within the radius of the corner only, and there inside its triangle.
+    #[test]
+    fn corners_are_cut_within_their_radius(
+        q in start(), shifts in prop::array::uniform2(small(0.2)), blend in 0.0..0.05f64
+    ) {
+        prop_assume!(shifts.iter().all(|shift| norm(*shift) > 0.02));
+        for (name, model) in arms() {
+            let from = robots::pose(&model, &q);
+            let corner = moved(&from, shifts[0], [0.0; 3]);
+            let to = moved(&corner, shifts[1], [0.0; 3]);
+            let legs = [Leg::Line { to: corner }, Leg::Line { to }];
+            let Some(path) = path(&model, &q, &legs, blend) else { continue };
+            let bend = path.waypoints()[1];
+            prop_assert!((bend - norm(shifts[0])).abs() < 1e-9);
+            let radius = blend.min(0.5 * norm(shifts[0])).min(0.5 * norm(shifts[1]));
+            for k in 0..=100 {
+                let s = path.end() * f64::from(k) / 100.0;
+                let here = robots::pose(&model, &path.at(s).position);
+                let beyond = |a: Vec3, b: Vec3| norm(cross(sub(here.position, a), sub(b, a))) / norm(sub(b, a));
+                let off = beyond(from.position, corner.position).min(beyond(corner.position, to.position));
+                if (s - bend).abs() >= radius {
+                    prop_assert!(off < 1e-9, "{name}: {off}");
+                } else {
+                    prop_assert!(norm(sub(here.position, corner.position)) <= radius + 1e-9);
+                }
+                prop_assert_eq!(path.waypoint(s), Some(if s < bend { 1 } else { 2 }));
+            }
+        }
+    }
+
+    /// With one joint's range cut short, where it leaves that range on the same path without.
+    #[test]
+    fn a_limit_on_the_way_is_found_where_it_is(
+        q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
+        share in prop_oneof![0.2..0.8f64, Just(0.9998)]
+    ) {
+        let model = robots::avena();
+        let to = moved(&robots::pose(&model, &q), shift, turn);
+        let Some(free) = path(&model, &q, &[Leg::Line { to }], 0.0) else { return Ok(()) };
+        let at = |s: f64| free.at(s).position[joint];
+        let all: Vec<f64> = (0..=1000).map(|k| at(free.end() * f64::from(k) / 1000.0)).collect();
+        let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // The motion rises above its ends by enough to be seen.
+        prop_assume!(highest - q[joint] > 0.01);
+        let mut limits = WIDE;
+        limits[joint].1 = q[joint] + share * (highest - q[joint]);
+        let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &[Leg::Line { to }], 0.0).unwrap_err();
+        match error {
+            PoseError::Leg { leg: 1, distance, length, source } => {
+                let PoseError::OutsideLimits { joint: named, value, high, .. } = *source else { panic!("{source}") };
+                prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
+                prop_assert!((length - free.end()).abs() < 1e-12);
+                prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
+                // Nowhere before.
+                let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
+                prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
+            }
+            // The pose at the end is outside in every solution.
+            PoseError::Waypoint { waypoint: 2, source } => {
+                prop_assert!(matches!(*source, PoseError::OutsideLimits { .. }), "{source}");
+            }
+            other => panic!("{other}"),
+        }
+    }
+}
+
+/// Leg, distance, and what is there.
+fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
+    match error {
+        PoseError::Leg { leg, distance, source, .. } => (leg, distance, *source),
+        other => panic!("{other}"),
+    }
+}
+
+fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
+    FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
+}
+
+/// A spherical wrist turns about axis 5 through 0: the singular pose is met on the way, at the angle where it is near.
+#[test]
+fn a_line_through_a_wrist_singularity_ends_there() {
+    let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
+    for model in [robots::puma560(), robots::kr5()] {
+        let (from, to) = (with(0.4), robots::pose(&model, &with(-0.6)));
+        let error = line(&model, &from, &to);
+        let text = error.to_string();
+        assert!(
+            text.starts_with("leg 1 (to waypoint 2), 0.") && text.contains("wrist singularity"),
+            "{text}"
+        );
+        assert!(text.contains("joints 4 and 6 would move far"), "{text}");
+        assert!(error.hint().contains("joint space"), "{}", error.hint());
+        let (leg, distance, source) = on_leg(error);
+        let PoseError::Singular(singular) = source else { panic!("{source}") };
+        assert_eq!((leg, singular.kind), (1, SingularKind::Wrist));
+        assert!(singular.smallest < SINGULAR);
+        // Lengths count 0.25 m a radian; the wrist is in line after 0.4 of 1 rad, within less than 2 degrees.
+        let turned = distance / 0.25;
+        let chord = difference(&robots::pose(&model, &from), &to).0;
+        if chord < 1e-9 {
+            assert!((turned - 0.4).abs() < 0.04, "{text}");
+        }
+    }
+}
+
+#[test]
+fn three_parallel_axes_have_the_same_wrist() {
+    let model = robots::ur5();
+    let with = |q5: f64| [0.3, -1.2, 1.1, 0.4, q5, 0.2];
+    let (_, _, source) = on_leg(line(&model, &with(0.4), &robots::pose(&model, &with(-0.4))));
+    let PoseError::Singular(singular) = source else { panic!("{source}") };
+    assert_eq!(singular.kind, SingularKind::Wrist);
+    let joints: Vec<u8> = singular.joints.iter().map(|joint| joint.number()).collect();
+    assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
+}
+
+/// To an arm that is stretched but for half a degree.
+#[test]
+fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
+    for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
+    {
+        let q = |q3: f64| [0.3, -0.6, q3, 0.4, 0.8, 0.2];
+        let to = robots::pose(&model, &q(stretched));
+        let (_, distance, source) = on_leg(line(&model, &q(stretched + 0.6), &to));
+        let PoseError::Singular(singular) = source else { panic!("{source}") };
+        assert_eq!(singular.kind, SingularKind::Elbow, "{singular}");
+        assert!(singular.joints.iter().any(|joint| joint.number() == 3), "{singular}");
+        assert!(distance > 0.05);
+    }
+}
+
+/// The wrist of a KR 5 passes straight over the axis of joint 1, half of the way along.
+#[test]
+fn a_line_over_the_base_ends_at_the_shoulder() {
+    let model = robots::kr5();
+    let q = [0.4, -1.5, 0.0, 0.3, 0.9, 0.2];
+    let from = robots::pose(&model, &q);
+    let wrist: Vec3 = std::array::from_fn(|i| from.position[i] - 0.115 * from.rotation[i][2]);
+    let to = moved(&from, [-2.0 * wrist[0], -2.0 * wrist[1], 0.0], [0.0; 3]);
+    let half = wrist[0].hypot(wrist[1]);
+    let (_, distance, source) = on_leg(line(&model, &q, &to));
+    let PoseError::Singular(singular) = source else { panic!("{source}") };
+    assert_eq!(singular.kind, SingularKind::Shoulder, "{singular}");
+    assert!(singular.joints.iter().any(|joint| joint.number() == 1), "{singular}");
+    assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
+}
+
+/// Both ends in reach, but not what is between: the column around the axis of joint 1 that a PUMA 560 cannot enter.
+#[test]
+fn a_line_through_where_the_arm_cannot_reach_says_where() {
+    let model = robots::puma560();
+    let q = [0.4, 0.6, -0.6, 0.3, 0.9, 0.2];
+    let from = robots::pose(&model, &q);
+    let to = moved(&from, [-1.9 * from.position[0], -1.9 * from.position[1], 0.0], [0.0; 3]);
+    let begin = from.position[0].hypot(from.position[1]);
+    let (leg, distance, source) = on_leg(line(&model, &q, &to));
+    let PoseError::OutOfReach { missing, .. } = source else { panic!("{source}") };
+    assert!(leg == 1 && missing > 0.0, "{missing}");
+    // The column has the radius of the shoulder's offset.
+    let inside = begin - distance;
+    assert!((-0.15005..0.15005).contains(&inside), "{inside}");
+    assert!((missing - (0.15005 - inside.abs())).abs() < 1e-6, "{missing} {inside}");
+}
+
+#[test]
+fn what_is_no_path_is_refused_with_the_waypoint() {
+    let model = robots::avena();
+    let kin = Kinematics::new(&model, &WIDE);
+    let q = [0.3, -0.2, 1.2, 0.4, 0.9, 0.2];
+    let here = robots::pose(&model, &q);
+    let near = moved(&here, [0.1, 0.0, 0.0], [0.0; 3]);
+    let make = |legs: &[Leg], blend: f64| FlangePath::new(&kin, &q, legs, blend).map(|_| ()).unwrap_err();
+    let lines = [Leg::Line { to: near }, Leg::Line { to: moved(&here, [0.0, 9.0, 0.0], [0.0; 3]) }];
+    let error = make(&lines, 0.0);
+    assert!(error.to_string().starts_with("waypoint 3: out of reach: "), "{error}");
+    assert_eq!(make(&[], 0.0), PoseError::NoMotion);
+    assert_eq!(make(&[Leg::Line { to: here }], 0.0), PoseError::NoMotion);
+    for radius in [-0.1, f64::INFINITY] {
+        assert_eq!(make(&lines, radius), PoseError::Blend { radius });
+    }
+    let half_turn = Pose { rotation: here.rotation.map(|[x, y, z]| [x, -y, -z]), ..near };
+    let refused = |leg: Leg| match make(&[Leg::Line { to: near }, leg], 0.0) {
+        PoseError::Waypoint { waypoint: 3, source } => *source,
+        other => panic!("{other}"),
+    };
+    assert_eq!(refused(Leg::Line { to: half_turn }), PoseError::HalfTurn);
+    let between = moved(&here, [0.2, 0.0, 0.0], [0.0; 3]);
+    let far = moved(&here, [0.4, 0.0, 0.0], [0.0; 3]);
+    let arc = |via: &Pose, to: &Pose| refused(Leg::Arc { via: via.position, to: *to });
+    assert!(matches!(arc(&between, &far), PoseError::Arc { distance } if distance < 1e-12));
+    assert_eq!(arc(&between, &near), PoseError::Arc { distance: 0.0 });
+    let mut bent = between;
+    bent.position[1] = f64::NAN;
+    assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
+    let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
+    assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
+    // Where the arm stands already outside.
+    let mut limits = WIDE;
+    limits[3] = (0.5, 1.0);
+    let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();
+    assert!(error.to_string().contains("joint 4 would be at 0.4000 rad"), "{error}");
+}

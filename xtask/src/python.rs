@@ -62,6 +62,7 @@ const CHECKS: [Check; 17] = [
     Check { script: "plan/check_plan.py", program: Some("examples/plans"), demo_files: &[] },
     Check { script: "arms/check_import.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "arms/check_driving.py", program: Some("jtc"), demo_files: &[] },
+    Check { script: "plan/check_kinematics.py", program: Some("examples/poses"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
     Check { script: "can/check_multicast.py", program: None, demo_files: &[] },
     Check { script: "can/check_socketcand.py", program: None, demo_files: &[] },
@@ -91,6 +92,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     tally.step("programs for the references", || {
         for (package, example) in [
             ("jtc-dynamics", "reference"),
+            ("jtc-plan", "poses"),
             ("jtc-sim", "free_fall"),
             ("jtc-plan", "plans"),
             ("can-link", "echo"),

@@ -162,9 +162,13 @@ impl Kinematics {
     }
 }
 
-/// The joint that is the farthest outside its limits at `q`, if one is.
-fn first_outside(q: &JointVec, limits: &[(f64, f64); JOINTS]) -> Option<(Joint, f64)> {
-    let outside = |j: usize| (limits[j].0 - q[j]).max(q[j] - limits[j].1);
-    let worst = (0..JOINTS).max_by(|&a, &b| outside(a).total_cmp(&outside(b)))?;
-    (outside(worst) > turns::ROUNDING).then(|| Joint::from_index(worst).map(|joint| (joint, q[worst])))?
+/// What joint positions outside the limits are: the joint that is the farthest outside.
+fn outside(q: &JointVec, limits: &[(f64, f64); JOINTS]) -> Option<PoseError> {
+    let beyond = |joint: &Joint| {
+        let (low, high) = limits[joint.index()];
+        (low - q[joint.index()]).max(q[joint.index()] - high)
+    };
+    let joint = Joint::ALL.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)))?;
+    let (value, (low, high)) = (q[joint.index()], limits[joint.index()]);
+    (beyond(&joint) > turns::ROUNDING).then_some(PoseError::OutsideLimits { joint, value, low, high })
 }

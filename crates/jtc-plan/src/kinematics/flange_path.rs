@@ -8,7 +8,7 @@ use super::leg::{Leg, Place};
 use super::search::TOLERANCE;
 use super::singular::{SINGULAR, nearest, weakest};
 use super::trace::Trace;
-use super::{Kinematics, PoseError, first_outside};
+use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
 /// Largest turn of a joint between two samples, rad. Within it a singular pose cannot be passed unseen, and the iteration stays with
@@ -54,6 +54,9 @@ impl FlangePath {
         if let Some(&value) = start.iter().find(|q| !q.is_finite()) {
             return Err(PoseError::NotFinite { what: "a joint position", value }.at_waypoint(1));
         }
+        if let Some(error) = outside(start, &kinematics.limits) {
+            return Err(error.at_waypoint(1));
+        }
         let chain = &kinematics.chain;
         let trace = Trace::new(&chain.at(start).flange, legs, blend)?;
         for (n, Leg::Line { to } | Leg::Arc { to, .. }) in legs.iter().enumerate() {
@@ -87,7 +90,7 @@ impl Path for FlangePath {
     }
 
     fn waypoint(&self, s: f64) -> Option<usize> {
-        Some(self.trace.whereabouts(s).0)
+        Some(self.trace.waypoints().partition_point(|&at| at <= s).max(1))
     }
 
     fn breaks(&self) -> Vec<f64> {
@@ -228,9 +231,7 @@ impl<'a> Follower<'a> {
     }
 
     fn check_limits(&self, s: f64, q: &JointVec) -> Result<(), PoseError> {
-        let Some((joint, value)) = first_outside(q, &self.kinematics.limits) else { return Ok(()) };
-        let (low, high) = self.kinematics.limits[joint.index()];
-        Err(self.on_leg(s, PoseError::OutsideLimits { joint, value, low, high }))
+        outside(q, &self.kinematics.limits).map_or(Ok(()), |error| Err(self.on_leg(s, error)))
     }
 
     /// Limits where a joint turns back between here and `s`.

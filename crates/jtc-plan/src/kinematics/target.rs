@@ -1,7 +1,7 @@
 //! What a file of waypoints gives: joint positions or poses of the flange.
 use jtc_dynamics::{JointVec, Pose};
 
-use super::{Kinematics, PoseError, first_outside};
+use super::{Kinematics, PoseError, outside};
 
 /// Where a motion is to lead.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,13 +39,7 @@ fn one(kinematics: &Kinematics, target: &Target, before: &JointVec) -> Result<Jo
             if let Some(&value) = q.iter().find(|q| !q.is_finite()) {
                 return Err(PoseError::NotFinite { what: "a joint position", value });
             }
-            match first_outside(q, kinematics.limits()) {
-                Some((joint, value)) => {
-                    let (low, high) = kinematics.limits()[joint.index()];
-                    Err(PoseError::OutsideLimits { joint, value, low, high })
-                }
-                None => Ok(*q),
-            }
+            outside(q, kinematics.limits()).map_or(Ok(*q), Err)
         }
     }
 }

@@ -3,9 +3,10 @@ mod robots;
 
 use std::f64::consts::PI;
 
+use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Pose};
-use jtc_plan::Path;
 use jtc_plan::kinematics::{FlangePath, Kinematics, Leg, Orientation, PoseError, SINGULAR, SingularKind};
+use jtc_plan::{ArmDynamics, Limits, Path, along};
 use proptest::prelude::*;
 use robots::difference;
 
@@ -398,4 +399,49 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();
     assert!(error.to_string().contains("joint 4 would be at 0.4000 rad"), "{error}");
+}
+
+/// A motion along a path has the flange on its line at any moment, not only at the places that the planner looks at.
+#[test]
+fn motions_along_lines_and_arcs_stay_on_them() {
+    let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());
+    let limits = Limits::of(&config);
+    let kin = Kinematics::new(&model, &limits.position);
+    let arm = ArmDynamics::new(&config, &model, Some(&parameters.friction));
+    let q = [0.3, -0.2, 1.2, 0.4, 0.9, 0.2];
+    let from = robots::pose(&model, &q);
+    let corner = moved(&from, [-0.3, 0.1, -0.1], [0.2, 0.1, -0.3]);
+    // Half of a circle about the middle of a line upright.
+    let mut to = moved(&corner, [0.0, 0.0, -0.2], [0.0; 3]);
+    to.rotation = from.rotation;
+    let centre = moved(&corner, [0.0, 0.0, -0.1], [0.0; 3]).position;
+    let via = [centre[0] - 0.1, centre[1], centre[2]];
+    let legs = [Leg::Line { to: corner }, Leg::Arc { via, to }];
+    for blend in [0.0, 0.04] {
+        let path = FlangePath::new(&kin, &q, &legs, blend).unwrap();
+        assert_eq!(path.stops().len(), usize::from(blend == 0.0));
+        for dynamics in [None, Some(&arm)] {
+            let motion = along(&path, &limits, dynamics).unwrap();
+            let mut on_legs = [0, 0];
+            for k in 0..=2000 {
+                let state = motion.at(motion.duration() * f64::from(k) / 2000.0);
+                let here = robots::pose(&model, &state.position).position;
+                let chord = sub(corner.position, from.position);
+                let off_line = norm(cross(sub(here, from.position), chord)) / norm(chord);
+                let off = sub(here, centre);
+                let off_arc = off[1].hypot(off[0].hypot(off[2]) - 0.1);
+                let at_corner = norm(sub(here, corner.position)) < blend + 1e-5;
+                assert!(off_line.min(off_arc) < 1e-5 || at_corner, "{off_line} {off_arc} at {k}");
+                on_legs[usize::from(off_line > off_arc)] += 1;
+                for j in 0..JOINTS {
+                    assert!(state.velocity[j].abs() <= limits.velocity[j] * (1.0 + 1e-9));
+                    assert!(state.acceleration[j].abs() <= limits.acceleration[j] * (1.0 + 1e-9));
+                }
+            }
+            assert!(on_legs.iter().all(|&n| n > 400), "{on_legs:?}");
+            let (shift, turn) =
+                difference(&robots::pose(&model, &motion.at(motion.duration()).position), &to);
+            assert!(shift < 1e-9 && turn < 1e-9);
+        }
+    }
 }

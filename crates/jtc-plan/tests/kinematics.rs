@@ -4,7 +4,10 @@ mod robots;
 use std::f64::consts::{PI, TAU};
 
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Pose};
-use jtc_plan::kinematics::{Kinematics, Orientation, PoseError, SingularKind, Target, resolve};
+use jtc_plan::Path;
+use jtc_plan::kinematics::{
+    FlangePath, Kinematics, Leg, Orientation, PoseError, SingularKind, Target, resolve,
+};
 use proptest::prelude::*;
 use robots::difference;
 
@@ -253,6 +256,46 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     let nowhere = kin.solve(&pose, &[0.0, 0.0, f64::INFINITY, 0.0, 0.0, 0.0]);
     assert!(matches!(nowhere, Err(PoseError::NotFinite { .. })));
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
+}
+
+/// Numbers of all kinds, most of them of no use.
+fn any_number() -> impl Strategy<Value = f64> {
+    let special =
+        vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];
+    prop_oneof![4 => -2.0..2.0f64, 1 => prop::sample::select(special), 1 => any::<f64>()]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
+
+    /// What is no pose, no start or no limit is an error or has no solution; it never panics, and always ends.
+    #[test]
+    fn no_number_does_any_harm(
+        position in prop::array::uniform3(any_number()), quaternion in prop::array::uniform4(any_number()),
+        rotation in prop::array::uniform9(any_number()), near in prop::array::uniform6(any_number()),
+        limit in prop::array::uniform2(any_number()), joint in 0..JOINTS, blend in any_number(), is_unit in any::<bool>()
+    ) {
+        let mut limits = TURN;
+        limits[joint] = (limit[0], limit[1]);
+        let length = quaternion.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let orientation = Orientation::Quaternion(quaternion.map(|v| if is_unit { v / length } else { v }));
+        let rows = std::array::from_fn(|i| std::array::from_fn(|k| rotation[3 * i + k]));
+        let pose = orientation.at(position).unwrap_or(Pose { rotation: rows, position });
+        for model in [robots::ur5(), robots::kr5()] {
+            let kin = Kinematics::new(&model, &limits);
+            let within = |q: &JointVec| q.iter().zip(&limits).all(|(q, l)| l.0 <= *q && *q <= l.1);
+            prop_assert!(kin.solve(&pose, &near).is_ok_and(|q| within(&q)) || kin.solve(&pose, &near).is_err());
+            prop_assert!(kin.all(&pose).iter().all(within));
+            let singular = kin.singularity(&near);
+            prop_assert!(singular.smallest >= 0.0 || singular.smallest.is_nan());
+            let legs = [Leg::Line { to: pose }, Leg::Arc { via: position, to: kin.flange(&[0.5; 6]) }];
+            for start in [near, [0.5; JOINTS]] {
+                if let Ok(path) = FlangePath::new(&kin, &start, &legs, blend) {
+                    prop_assert!(path.at(blend).position.iter().all(|q| q.is_finite()));
+                }
+            }
+        }
+    }
 }
 
 /// Singular poses by their definition, for both geometries.

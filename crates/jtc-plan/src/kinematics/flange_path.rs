@@ -223,8 +223,9 @@ impl<'a> Follower<'a> {
     fn check(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
         let chain = &self.kinematics.chain;
         self.check_limits(s, q)?;
-        let crossed = chain.scaled_jacobian(axes).determinant() * self.sign <= 0.0;
-        if crossed || weakest(chain, axes).0 < SINGULAR {
+        let same_side = chain.scaled_jacobian(axes).determinant() * self.sign > 0.0;
+        let away = weakest(chain, axes).0 >= SINGULAR;
+        if !(same_side && away) {
             return Err(self.singular(s, axes));
         }
         Ok(())

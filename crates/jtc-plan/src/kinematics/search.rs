@@ -116,6 +116,10 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
             && add(solutions, q)
         {
             last = n;
+            // What has just come within the tolerance goes on to rounding.
+            if let (Some(newest), Some(refined)) = (solutions.last_mut(), converge(chain, goal, &q, 40)) {
+                *newest = refined;
+            }
         }
     }
 }

@@ -3,6 +3,7 @@ use std::fmt;
 
 use jtc_dynamics::JOINTS;
 use jtc_wire::Joint;
+use nalgebra::Vector6;
 
 use super::chain::{Axes, Chain};
 use super::closed_form::{Geometry, Shoulder};
@@ -34,7 +35,7 @@ pub struct Singularity {
     /// The joints that can move with the flange almost at rest.
     pub joints: Vec<Joint>,
     /// Smallest singular value of the Jacobian, translations counted in lengths of the stretched arm: how far the flange moves
-    /// at least while the joints move by 1 rad altogether. 0 in the singular pose.
+    /// at least while the joints move by 1 rad altogether. 0 in the singular pose, NaN for joint positions that are no numbers.
     pub smallest: f64,
 }
 
@@ -72,9 +73,15 @@ const TAKES_PART: f64 = 0.2;
 /// Sine of the angle of the wrist below which a singular pose of an arm without a planar elbow is the wrist's.
 const NAMED: f64 = 0.1;
 
-/// The smallest singular value of the Jacobian, and the unit vector of joint motions that goes with it.
-pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, nalgebra::Vector6<f64>) {
-    let parts = chain.scaled_jacobian(axes).svd(false, true);
+/// The smallest singular value of the Jacobian, and the unit vector of joint motions that goes with it; NaN and 0 where the joint
+/// positions are no numbers.
+pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
+    let jacobian = chain.scaled_jacobian(axes);
+    // The iteration for singular values would not end.
+    if !jacobian.iter().all(|entry| entry.is_finite()) {
+        return (f64::NAN, Vector6::zeros());
+    }
+    let parts = jacobian.svd(false, true);
     let least = parts.singular_values.imin();
     let direction = parts.v_t.map(|v| v.row(least).transpose()).unwrap_or_default();
     (parts.singular_values[least], direction)

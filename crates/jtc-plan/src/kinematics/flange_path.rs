@@ -5,7 +5,7 @@ use nalgebra::{Vector3, Vector6};
 
 use super::chain::{Axes, Chain, Frame};
 use super::leg::{Leg, Place};
-use super::search::TOLERANCE;
+use super::search::{TOLERANCE, is_reachable};
 use super::singular::{SINGULAR, nearest, weakest};
 use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
@@ -259,7 +259,7 @@ impl<'a> Follower<'a> {
         for k in 0..=LOOK_AHEAD {
             let ahead = s + (length - along) * k as f64 / LOOK_AHEAD as f64;
             let goal = self.trace.at(ahead.min(self.trace.end())).frame;
-            if self.kinematics.solutions(&goal, &self.q).is_empty() {
+            if !is_reachable(&self.kinematics.chain, &goal, &self.q) {
                 return self.on_leg(ahead, self.kinematics.missing(&goal));
             }
         }

@@ -124,6 +124,12 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
     }
 }
 
+/// Whether there is a solution at all, near `near` or anywhere.
+pub(crate) fn is_reachable(chain: &Chain, goal: &Frame, near: &JointVec) -> bool {
+    let reached = |q: &JointVec| converge(chain, goal, q, 40).is_some();
+    reached(near) || (1..=SEEDS.0).any(|n| reached(&seed(n)))
+}
+
 /// The n-th starting value: Halton's sequence, which fills the space of all joint positions evenly.
 pub(crate) fn seed(n: usize) -> JointVec {
     const BASES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];

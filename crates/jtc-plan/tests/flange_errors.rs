@@ -135,5 +135,5 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();
-    assert!(error.to_string().contains("joint 4 would be at 0.4000 rad"), "{error}");
+    assert!(error.to_string().starts_with("waypoint 1: joint 4 would be at 0.4000 rad"), "{error}");
 }

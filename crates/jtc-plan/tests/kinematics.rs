@@ -56,6 +56,9 @@ fn closed_forms_are_recognised() {
         let closed = Kinematics::new(&model, &TURN).is_closed_form();
         assert_eq!(closed, !["Jaco 2", "crooked"].contains(&name), "{name}");
     }
+    for (name, model) in robots::more_closed_forms() {
+        assert!(Kinematics::new(&model, &TURN).is_closed_form(), "{name}");
+    }
 }
 
 proptest! {

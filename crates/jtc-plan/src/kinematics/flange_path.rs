@@ -44,7 +44,7 @@ impl FlangePath {
     /// # Errors
     ///
     /// [`PoseError::Waypoint`] for a pose that is none or has no solution within the limits, [`PoseError::Leg`] for what happens along a
-    /// leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first such place.
+    /// leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first such place; waypoints come first.
     pub fn new(
         kinematics: &Kinematics,
         start: &JointVec,

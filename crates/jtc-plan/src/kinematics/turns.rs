@@ -70,6 +70,21 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn what_rounding_leaves_beyond_a_limit_is_the_limit() {
+        let (limits, near) = ([(-1.0, 2.0); JOINTS], [0.0; JOINTS]);
+        for (angle, limit) in [(-1.0 - 5e-11, -1.0), (2.0 + 5e-11, 2.0)] {
+            let q = [angle; JOINTS];
+            assert_eq!(nearest(&q, &near, &limits), Some([limit; JOINTS]));
+            assert_eq!(variants(&q, &limits), vec![[limit; JOINTS]]);
+        }
+        for angle in [-1.0 - 2e-10, 2.0 + 2e-10] {
+            let q = [angle; JOINTS];
+            assert_eq!(nearest(&q, &near, &limits), None);
+            assert!(variants(&q, &limits).is_empty());
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 

@@ -137,8 +137,9 @@ pub enum Command {
     Payload(PayloadCommand),
     /// Plan a motion through waypoints, as fast as the limits allow; nothing is sent
     #[command(
-        after_help = "A waypoint file is CSV with the columns q1..q6 (rad) or q1_deg..q6_deg, or `pose` (a name from the arm file), and `t` (s)\n\
-                            where times are given; or JSON with the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
+        after_help = "A waypoint file is CSV with the columns q1..q6 (rad) or q1_deg..q6_deg, `pose` (a name from the arm file), or\n\
+                            x,y,z (m) with qx,qy,qz,qw or roll,pitch,yaw of the flange, and `t` (s) where times are given; or JSON with\n\
+                            the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
                             the corners. Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and\n\
                             jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
                             jtc plan waypoints.csv -o cycle.csv\n  jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \

@@ -143,6 +143,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     let same = with("same.csv", &format!("{head}0,0,0,0,0,0\n"));
     let word = with("word.csv", &format!("{head}0,0,zero,0,0,0\n"));
     let pose = with("pose.csv", "pose\nabove-table\nabove-tabel\n");
+    let far = with("far.csv", "x,y,z,roll_deg,pitch_deg,yaw_deg\n0.3,0,0.3,0,90,0\n9,0,0,0,90,0\n");
     let missing = dir.path("missing.csv");
     for (words, code, message) in [
         (vec![missing.as_str()], 2, "missing.csv: No such file"),
@@ -155,6 +156,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         (vec![&one], 2, "1 waypoints are no motion"),
         (vec![&same], 4, "all 2 waypoints are at the same place"),
         (vec![&outside], 4, "outside.csv, line 3: waypoint 2, joint 2: 1.6 rad is outside -1.57..1.57 rad"),
+        (vec![&far], 4, "far.csv, line"),
         (vec![&good, "--blend", "-0.1"], 2, "blend of -0.1 rad"),
         (vec![&good, "--speed", "0"], 2, "speed 0 % is not within 1..100 %"),
         (vec![&good, "--speed", "101"], 2, "speed 101 % is not within 1..100 %"),

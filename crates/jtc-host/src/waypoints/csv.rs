@@ -2,11 +2,13 @@
 
 use jtc_core::JOINTS;
 
+use super::flange::{self, ANGLES, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, number, rows, short};
 
 /// What the columns are, in words.
-const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file)";
+const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), and of the flange x, y, z (m) with \
+                     qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +17,8 @@ enum Column {
     Pose,
     /// From 0.
     Joint(usize),
+    /// From 0, in the order of the names.
+    Flange(usize),
 }
 
 /// Where the columns are, and the radians in a unit of each.
@@ -24,6 +28,7 @@ struct Header {
     time: Option<usize>,
     pose: Option<usize>,
     joints: [Option<(usize, f64)>; JOINTS],
+    flange: [Option<(usize, f64)>; NAMES.len()],
 }
 
 pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
@@ -53,11 +58,18 @@ fn column(name: &str) -> Option<(Column, f64)> {
         "pose" | "name" => return Some((Column::Pose, 1.0)),
         _ => {}
     }
+    let metres = name.strip_suffix("_m").unwrap_or(&name);
+    if let Some(i) = NAMES[..ANGLES.start].iter().position(|known| *known == metres) {
+        return Some((Column::Flange(i), 1.0));
+    }
     let (name, unit) = match (name.strip_suffix("_rad"), name.strip_suffix("_deg")) {
         (Some(head), _) => (head, 1.0),
         (_, Some(head)) => (head, 1f64.to_radians()),
         _ => (name.as_str(), 1.0),
     };
+    if let Some(i) = NAMES[ANGLES].iter().position(|known| *known == name) {
+        return Some((Column::Flange(ANGLES.start + i), unit));
+    }
     let joint = name.strip_prefix('q')?.parse::<usize>().ok()?;
     (1..=JOINTS).contains(&joint).then_some((Column::Joint(joint - 1), unit))
 }
@@ -82,6 +94,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
             Column::Time => header.time.replace(i).is_some(),
             Column::Pose => header.pose.replace(i).is_some(),
             Column::Joint(j) => header.joints[j].replace((i, unit)).is_some(),
+            Column::Flange(k) => header.flange[k].replace((i, unit)).is_some(),
         };
         if before {
             return Err(wrong("this column is there twice".into()));
@@ -90,7 +103,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
     let missing = header.joints.iter().position(Option::is_none);
     let any = header.joints.iter().any(Option::is_some);
     match missing {
-        Some(j) if any || header.pose.is_none() => {
+        Some(j) if any || (header.pose.is_none() && header.flange.iter().all(Option::is_none)) => {
             Err(FileError::at(Place::line(line), format!("column q{} is missing; {KNOWN}", j + 1)))
         }
         _ => Ok(header),
@@ -109,18 +122,28 @@ impl Header {
             _ => None,
         };
         let name = self.pose.map(|i| (i, cells[i].trim_matches('"'))).filter(|(_, name)| !name.is_empty());
-        let first = self.joints.iter().flatten().map(|(i, _)| *i).find(|i| !cells[*i].is_empty());
-        let (target, place) = match (name, first) {
-            (Some((at, name)), None) => (Target::Pose(name.to_owned()), Place::cell(line, at + 1)),
-            (Some((_, name)), Some(at)) => {
-                let problem =
-                    format!("both the pose \"{}\" and positions: a waypoint is one of them", short(name));
-                return Err(FileError::at(Place::cell(line, at + 1).named(&self.names[at]), problem));
+        let filled = |i: &usize| !cells[*i].is_empty();
+        let joint = self.joints.iter().flatten().map(|(i, _)| *i).find(filled);
+        let of_flange = self.flange.iter().flatten().map(|(i, _)| *i).find(filled);
+        let both = |what: &str, at: usize| {
+            let problem =
+                format!("both {what}: a waypoint is a pose, joint positions or a pose of the flange");
+            Err(FileError::at(Place::cell(line, at + 1).named(&self.names[at]), problem))
+        };
+        let (target, place) = match (name, joint, of_flange) {
+            (Some((_, name)), Some(at), _) => {
+                return both(&format!("the pose \"{}\" and positions", short(name)), at);
             }
-            (None, None) if self.pose.is_some() => {
+            (Some((_, name)), _, Some(at)) => {
+                return both(&format!("the pose \"{}\" and one of the flange", short(name)), at);
+            }
+            (None, Some(_), Some(at)) => return both("joint positions and a pose of the flange", at),
+            (Some((at, name)), None, None) => (Target::Pose(name.to_owned()), Place::cell(line, at + 1)),
+            (None, None, Some(_)) => (self.flange(line, cells)?, Place::line(line)),
+            (None, None, None) if self.pose.is_some() || self.flange.iter().any(Option::is_some) => {
                 return Err(FileError::at(Place::line(line), "neither a pose nor positions"));
             }
-            (None, _) => {
+            (None, ..) => {
                 let mut position = [0.0; JOINTS];
                 for (to, (i, unit)) in position.iter_mut().zip(self.joints.iter().flatten()) {
                     *to = unit * value(*i)?;
@@ -129,5 +152,19 @@ impl Header {
             }
         };
         Ok(FileWaypoint { target, time, place })
+    }
+
+    /// A pose of the flange; cells that are empty are not given.
+    fn flange(&self, line: usize, cells: &[&str]) -> Result<Target, FileError> {
+        let mut given = [None; NAMES.len()];
+        for (to, column) in given.iter_mut().zip(&self.flange) {
+            if let Some((i, unit)) = column
+                && !cells[*i].is_empty()
+            {
+                *to = Some(unit * number(cells[*i], || Place::cell(line, i + 1).named(&self.names[*i]))?);
+            }
+        }
+        let wrong = |problem: String| FileError::at(Place::line(line), problem);
+        flange::target(&given).map_err(wrong)?.ok_or_else(|| wrong("neither a pose nor positions".into()))
     }
 }

@@ -3,6 +3,7 @@
 use jtc_core::JOINTS;
 use serde::Deserialize;
 
+use super::flange::{self, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place};
 
@@ -29,6 +30,19 @@ struct Entry {
     q4_deg: Option<f64>,
     q5_deg: Option<f64>,
     q6_deg: Option<f64>,
+    x: Option<f64>,
+    y: Option<f64>,
+    z: Option<f64>,
+    qx: Option<f64>,
+    qy: Option<f64>,
+    qz: Option<f64>,
+    qw: Option<f64>,
+    roll: Option<f64>,
+    pitch: Option<f64>,
+    yaw: Option<f64>,
+    roll_deg: Option<f64>,
+    pitch_deg: Option<f64>,
+    yaw_deg: Option<f64>,
 }
 
 pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
@@ -47,7 +61,9 @@ pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
     if entries.is_empty() {
         return Err(FileError::form("no waypoints"));
     }
-    let units_named = entries.iter().any(|e| e.degrees().iter().any(Option::is_some));
+    let in_degrees =
+        |e: &Entry| [e.roll_deg, e.pitch_deg, e.yaw_deg].iter().chain(&e.degrees()).any(Option::is_some);
+    let units_named = entries.iter().any(in_degrees);
     let waypoints = entries.into_iter().enumerate().map(|(i, entry)| entry.waypoint(i + 1));
     Ok(WaypointFile {
         waypoints: waypoints.collect::<Result<_, _>>()?,
@@ -63,6 +79,14 @@ impl Entry {
 
     fn degrees(&self) -> [Option<f64>; JOINTS] {
         [self.q1_deg, self.q2_deg, self.q3_deg, self.q4_deg, self.q5_deg, self.q6_deg]
+    }
+
+    /// The numbers of a pose of the flange, angles in rad.
+    fn flange(&self) -> [Option<f64>; NAMES.len()] {
+        let angle = |radians: Option<f64>, degrees: Option<f64>| radians.or(degrees.map(f64::to_radians));
+        let (roll, pitch) = (angle(self.roll, self.roll_deg), angle(self.pitch, self.pitch_deg));
+        let yaw = angle(self.yaw, self.yaw_deg);
+        [self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw, roll, pitch, yaw]
     }
 
     fn waypoint(self, number: usize) -> Result<FileWaypoint, FileError> {
@@ -82,12 +106,19 @@ impl Entry {
             };
             given += 1;
         }
-        let target = match (self.pose, given, missing) {
-            (Some(name), 0, _) => Target::Pose(name),
-            (Some(_), ..) => return wrong("both a pose and positions: a waypoint is one of them".into()),
-            (None, 0, _) => return wrong("neither a pose nor q1..q6".into()),
-            (None, _, Some(joint)) => return wrong(format!("q{joint} is missing")),
-            (None, _, None) => Target::Joints(position),
+        let of_flange = match flange::target(&self.flange()) {
+            Ok(target) => target,
+            Err(problem) => return wrong(problem),
+        };
+        let target = match (self.pose, of_flange, given, missing) {
+            (Some(name), None, 0, _) => Target::Pose(name),
+            (None, Some(target), 0, _) => target,
+            (Some(_), ..) | (_, Some(_), ..) => {
+                return wrong("a waypoint is one of a pose, joint positions and a pose of the flange".into());
+            }
+            (None, None, 0, _) => return wrong("neither a pose nor q1..q6, nor one of the flange".into()),
+            (None, None, _, Some(joint)) => return wrong(format!("q{joint} is missing")),
+            (None, None, _, None) => Target::Joints(position),
         };
         Ok(FileWaypoint { target, time: self.t, place })
     }

@@ -1,7 +1,8 @@
 //! Waypoint files: the places that a motion is to lead through, with or without times, for [`plan`](crate::plan).
 //!
-//! A waypoint is a joint position (rad, base to wrist) or the name of one of the arm's [poses](crate::Arm::poses). Times are s from the
-//! first waypoint. The forms are CSV with a header and JSON with the same keys; both may be mixed of numbers and names:
+//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose of the flange
+//! in the base frame (m, with a quaternion or roll, pitch and yaw), of which the joint positions nearest to the waypoint before are
+//! taken. Times are s from the first waypoint. The forms are CSV with a header and JSON with the same keys:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -13,6 +14,7 @@
 //! ```
 
 mod csv;
+mod flange;
 mod json;
 #[cfg(test)]
 mod tests;
@@ -20,8 +22,9 @@ mod thinned;
 
 use std::path::{Path, PathBuf};
 
-use host_kit::{Diagnose, Diagnosis};
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
+use jtc_plan::kinematics::{self, Kinematics, Orientation};
 
 pub use thinned::thinned;
 
@@ -38,6 +41,8 @@ pub enum Target {
     Joints([f64; JOINTS]),
     /// A pose of the arm, by its name.
     Pose(String),
+    /// A pose of the flange in the base frame: m, and its orientation.
+    Flange([f64; 3], Orientation),
 }
 
 /// One waypoint of a file.
@@ -78,6 +83,16 @@ pub enum WaypointError {
         /// What is wrong with the name.
         source: Box<PoseError>,
     },
+    /// The flange cannot be brought there.
+    #[error("{}{place}: {source}", path.display())]
+    Flange {
+        /// The file.
+        path: PathBuf,
+        /// Line, or number of the waypoint.
+        place: Place,
+        /// Why not.
+        source: Box<kinematics::PoseError>,
+    },
 }
 
 impl Diagnose for WaypointError {
@@ -85,6 +100,7 @@ impl Diagnose for WaypointError {
         match self {
             Self::File(e) => e.diagnosis(),
             Self::Pose { source, .. } => source.diagnosis(),
+            Self::Flange { source, .. } => Diagnosis::new(ErrorKind::Refused, "flange-pose", source.hint()),
         }
     }
 }
@@ -130,32 +146,57 @@ impl WaypointFile {
             return Err(FileError::form(problem).in_file(&self.path));
         }
         for waypoint in &mut self.waypoints {
-            if let Target::Joints(q) = &mut waypoint.target {
-                *q = q.map(f64::to_radians);
+            match &mut waypoint.target {
+                Target::Joints(q) => *q = q.map(f64::to_radians),
+                Target::Flange(_, Orientation::Rpy(angles)) => *angles = angles.map(f64::to_radians),
+                Target::Flange(..) | Target::Pose(_) => {}
             }
         }
         Ok(self)
     }
 
-    /// The waypoints as places of an arm, for [`Planner::through`](crate::plan::Planner::through).
+    /// The waypoints as places of an arm, for [`Planner::through`](crate::plan::Planner::through). Of a pose of the flange the joint positions
+    /// nearest to the waypoint before are taken, or nearest to the zero pose for the first one.
     ///
     /// # Errors
     ///
-    /// [`WaypointError::Pose`] for a name that is none of this arm's poses, with the one that looks most like it.
+    /// [`WaypointError::Pose`] for a name that is none of this arm's poses, with the one that looks most like it;
+    /// [`WaypointError::Flange`] for a pose of the flange that the arm does not reach.
     pub fn positions(&self, arm: &Arm) -> Result<Vec<jtc_plan::Waypoint>, WaypointError> {
         let start = self.waypoints.first().and_then(|w| w.time).unwrap_or(0.0);
-        let position = |w: &FileWaypoint| match &w.target {
-            Target::Joints(q) => Ok(*q),
-            Target::Pose(name) => arm.pose(name).map_err(|source| WaypointError::Pose {
-                path: self.path.clone(),
-                place: w.place.clone(),
-                source: Box::new(source),
-            }),
-        };
-        let waypoint = |w: &FileWaypoint| {
-            Ok(jtc_plan::Waypoint { position: position(w)?, time: w.time.map(|t| t - start) })
-        };
-        self.waypoints.iter().map(waypoint).collect()
+        let config = arm.config();
+        let by_flange = self.waypoints.iter().any(|w| matches!(w.target, Target::Flange(..)));
+        let limits = std::array::from_fn(|j| config.position_range(j));
+        let kinematics = by_flange.then(|| Kinematics::new(&arm.model, &limits));
+        let mut before: [f64; JOINTS] = limits.map(|(low, high)| 0f64.clamp(low, high));
+        let mut found = Vec::with_capacity(self.waypoints.len());
+        for waypoint in &self.waypoints {
+            before = self.position(waypoint, arm, kinematics.as_ref(), &before)?;
+            found.push(jtc_plan::Waypoint { position: before, time: waypoint.time.map(|t| t - start) });
+        }
+        Ok(found)
+    }
+
+    fn position(
+        &self,
+        waypoint: &FileWaypoint,
+        arm: &Arm,
+        kinematics: Option<&Kinematics>,
+        before: &[f64; JOINTS],
+    ) -> Result<[f64; JOINTS], WaypointError> {
+        let (path, place) = (self.path.clone(), waypoint.place.clone());
+        match (&waypoint.target, kinematics) {
+            (Target::Joints(q), _) => Ok(*q),
+            (Target::Pose(name), _) => {
+                arm.pose(name).map_err(|source| WaypointError::Pose { path, place, source: Box::new(source) })
+            }
+            (Target::Flange(position, orientation), Some(kinematics)) => orientation
+                .at(*position)
+                .and_then(|pose| kinematics.solve(&pose, before))
+                .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
+            // There is one where a waypoint asks for it.
+            (Target::Flange(..), None) => Ok(*before),
+        }
     }
 
     /// Where waypoint `number` (from 1) stands in the file, with the file.

@@ -36,6 +36,51 @@ fn the_forms_say_the_same() {
     }
 }
 
+/// The pose of the flange where the arm is, given back as a quaternion or as angles, leads there again.
+#[test]
+fn poses_of_the_flange_are_found_near_the_waypoint_before() {
+    let arm = arm();
+    let q = [0.3, 0.2, -0.6, 0.2, 0.5, -0.3];
+    let limits = std::array::from_fn(|j| arm.config().position_range(j));
+    let pose = Kinematics::new(&arm.model, &limits).flange(&q);
+    let [x, y, z] = pose.position;
+    let [qx, qy, qz, qw] = kinematics::quaternion_of(&pose);
+    let angles = kinematics::rpy_of(&pose);
+    let [roll, pitch, yaw] = angles;
+    let degrees = angles.map(f64::to_degrees);
+    let near = "0.29,0.21,-0.6,0.21,0.5,-0.3";
+    for text in [
+        format!(
+            "q1,q2,q3,q4,q5,q6,x,y,z,qx,qy,qz,qw\n{near},,,,,,,\n,,,,,,{x},{y},{z},{qx},{qy},{qz},{qw}\n"
+        ),
+        format!(
+            "q1,q2,q3,q4,q5,q6,x,y,z,roll,pitch,yaw\n{near},,,,,,\n,,,,,,{x},{y},{z},{roll},{pitch},{yaw}\n"
+        ),
+        format!(
+            "q1,q2,q3,q4,q5,q6,x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg\n{near},,,,,,\n,,,,,,{x},{y},{z},{},{},{}\n",
+            degrees[0], degrees[1], degrees[2]
+        ),
+        format!(
+            r#"[{{"q1":0.29,"q2":0.21,"q3":-0.6,"q4":0.21,"q5":0.5,"q6":-0.3}},
+               {{"x":{x},"y":{y},"z":{z},"roll_deg":{},"pitch_deg":{},"yaw_deg":{}}}]"#,
+            degrees[0], degrees[1], degrees[2]
+        ),
+    ] {
+        let found = read(&text)[1].position;
+        for j in 0..6 {
+            assert!((found[j] - q[j]).abs() < 1e-6, "{text}: {found:?}");
+        }
+    }
+    // Too far away, in no orientation, and half given.
+    let far =
+        WaypointFile::parse("x,y,z,roll,pitch,yaw\n9,0,0,0,0,0\n").unwrap().positions(&arm).unwrap_err();
+    assert!(far.to_string().starts_with(", line 2: out of reach"), "{far}");
+    assert_eq!(far.diagnosis().kind, host_kit::ErrorKind::Refused);
+    let long =
+        WaypointFile::parse("x,y,z,qx,qy,qz,qw\n0.3,0,0.3,0,0,1,1\n").unwrap().positions(&arm).unwrap_err();
+    assert!(long.to_string().contains("the quaternion has the length 1.414"), "{long}");
+}
+
 /// Times count from the first waypoint, and may be left out.
 #[test]
 fn times_are_from_the_first_waypoint() {
@@ -71,6 +116,10 @@ fn a_broken_file_is_refused_with_its_place() {
         ("t,pose\nsoon,home\n", ", line 2, column 1, t: \"soon\" is not a number"),
         ("pose,q1,q2,q3,q4,q5,q6\nhome,0,0,0,0,0,0\n", "both the pose \"home\" and positions"),
         ("pose,q1,q2,q3,q4,q5,q6\n,,,,,,\n", ", line 2: neither a pose nor positions"),
+        ("x,y,z,roll,pitch\n0.3,0,0.3,0,0\n", ", line 2: yaw is missing: a pose of the flange is"),
+        ("x,y,z,roll,pitch,yaw,qw\n0.3,0,0.3,0,0,0,1\n", "both a quaternion and roll, pitch, yaw"),
+        ("pose,x,y,z,roll,pitch,yaw\nhome,1,0,0,0,0,0\n", "both the pose \"home\" and one of the flange"),
+        ("[{\"pose\": \"home\", \"x\": 0}]", ", waypoint 1: y is missing"),
         ("[{\"q1\": 0}]", ", waypoint 1: q2 is missing"),
         ("[{\"q1\": 0, \"q1_deg\": 0}]", ", waypoint 1: both q1 and q1_deg"),
         ("[\n {\"pose\": 3}]", ", line 2, column 11: JSON: invalid type"),

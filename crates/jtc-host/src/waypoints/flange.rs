@@ -1,0 +1,44 @@
+//! Poses of the flange as files give them: ten numbers, of which three are a position and three or four an orientation.
+
+use jtc_plan::kinematics::Orientation;
+
+use super::Target;
+
+/// Names of the numbers: a position (m), a quaternion, and roll, pitch and yaw (rad).
+pub(super) const NAMES: [&str; 10] = ["x", "y", "z", "qx", "qy", "qz", "qw", "roll", "pitch", "yaw"];
+/// Those that are angles.
+pub(super) const ANGLES: std::ops::Range<usize> = 7..10;
+
+/// The pose that these numbers are; `None` where none of them is given.
+///
+/// # Errors
+///
+/// What is missing, or twice there.
+pub(super) fn target(given: &[Option<f64>; NAMES.len()]) -> Result<Option<Target>, String> {
+    let [x, y, z, qx, qy, qz, qw, roll, pitch, yaw] = *given;
+    if given.iter().all(Option::is_none) {
+        return Ok(None);
+    }
+    let missing = |part: &[usize]| {
+        let name = part.iter().find(|i| given[**i].is_none()).map_or("", |i| NAMES[*i]);
+        format!(
+            "{name} is missing: a pose of the flange is x, y, z with qx, qy, qz, qw or with roll, pitch, yaw"
+        )
+    };
+    let any = |part: &[usize]| part.iter().any(|i| given[*i].is_some());
+    let (Some(x), Some(y), Some(z)) = (x, y, z) else { return Err(missing(&[0, 1, 2])) };
+    let orientation = match (any(&[3, 4, 5, 6]), any(&[7, 8, 9])) {
+        (true, true) => {
+            return Err("both a quaternion and roll, pitch, yaw: an orientation is one of them".into());
+        }
+        (true, false) => match (qx, qy, qz, qw) {
+            (Some(qx), Some(qy), Some(qz), Some(qw)) => Orientation::Quaternion([qx, qy, qz, qw]),
+            _ => return Err(missing(&[3, 4, 5, 6])),
+        },
+        (false, _) => match (roll, pitch, yaw) {
+            (Some(roll), Some(pitch), Some(yaw)) => Orientation::Rpy([roll, pitch, yaw]),
+            _ => return Err(missing(&[7, 8, 9])),
+        },
+    };
+    Ok(Some(Target::Flange([x, y, z], orientation)))
+}

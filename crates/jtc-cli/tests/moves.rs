@@ -201,14 +201,98 @@ fn ur5() -> String {
     text + "</robot>"
 }
 
+/// J-33: a move is stopped on its path as a run is, and the arm stands.
+#[test]
+fn j33_a_move_is_stopped_on_its_path() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let child = moving_while(&sim, &["move", "--to", "1.5,0,0,0,0,0", "--speed", "30"], 0.6);
+    cli_kit::trial::signal(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(5));
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value["outcome"], "stopped");
+    let status = sim.json(&["status"], 0);
+    assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()));
+    let here = place(&sim);
+    assert!((0.02..1.4).contains(&here[0]), "{here:?}");
+    // On its path the other joints stand.
+    assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
+}
+
+/// J-55: an arm file that is not the controller's arm moves nothing; without one the controller's own limits count.
+#[test]
+fn j55_a_move_for_another_arm_is_refused() {
+    let sim = ready();
+    let slower = include_str!("../../../arms/avena.toml").replacen(
+        "velocity_max_rad_s = 1.5",
+        "velocity_max_rad_s = 1.2",
+        1,
+    );
+    let arm = sim.file("slower.toml", &slower);
+    let words = ["move", "--to", "0.5,0,0,0,0,0", "--arm", &arm];
+    let value = sim.json(&words, 4);
+    assert_eq!(value["differences"].as_array().unwrap().len(), 1, "{value}");
+    at(&sim, [0.0; 6]);
+    sim.json(&[&words[..], &["--accept-device-limits"]].concat(), 0);
+    at(&sim, [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+}
+
+/// A hand leads the arm; what it did becomes waypoints that are planned, or is run again as it was measured.
+#[test]
+fn a_motion_by_hand_is_waypoints_or_run_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = dir.path().join("sim.mcap").to_str().unwrap().to_owned();
+    let mut sim = Sim::start_in(dir, &["--no-throttle", "--record", &recording]).held();
+    let lead = sim.file("lead.csv", &lead());
+    sim.write_line(&format!("hand {lead}"));
+    let (taught, out) = (sim.path("taught.csv"), sim.path("out.csv"));
+    let words = ["teach", "record", &taught, "--waypoints", "--tolerance", "0.02", "--duration", "5"];
+    let value = sim.json(&words, 0);
+    let count = value["waypoints"].as_u64().unwrap();
+    assert!((3..12).contains(&count), "{value}");
+    let planned = jtc(&["--json", "plan", &taught, "-o", &out, "--blend", "0.02"]).ends(0).json();
+    assert_eq!(planned["waypoints"].as_u64(), Some(count));
+    sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
+    // As it was led: there and back, 0.3 rad.
+    let replay = ["traj", "replay", &recording, "--measured", "--approach"];
+    let output = (0..20).find_map(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        let output = sim.jtc(&[&["--json"], &replay[..]].concat());
+        (output.code == 0).then_some(output)
+    });
+    let output = output.expect("it is run again");
+    assert!(output.err.contains("the last teaching in the recording, as it was measured"), "{}", output.err);
+    assert!(output.json()["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap() > 0.25);
+    for wrong in ["0", "-1", "nan", "2"] {
+        let refused = sim
+            .jtc(&["teach", "record", &sim.path("no.csv"), "--waypoints", &format!("--tolerance={wrong}")])
+            .ends(2);
+        assert!(refused.err.contains("nothing was sent"), "{}", refused.err);
+    }
+}
+
+/// Joint 1, which gravity does not turn, there and back in 3 s.
+fn lead() -> String {
+    let row = |i: i32| {
+        let q = 0.15 - 0.15 * (std::f64::consts::TAU * f64::from(i) / 300.0).cos();
+        format!("{:.2},{q},0,0,0,0,0\n", f64::from(i) * 0.01)
+    };
+    "t,q1,q2,q3,q4,q5,q6\n".to_owned() + &(0..=300).map(row).collect::<String>()
+}
+
 /// Starts a recorded run in real time and waits until the arm has moved for a second.
 fn moving(sim: &Sim, file: &str, record: &str) -> std::process::Child {
     moving_with(sim, &[file, "--record", record])
 }
 
 fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
+    moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
+}
+
+/// Starts a command that moves the arm, and waits until it has moved for so many seconds.
+fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
     let mut child = sim
-        .command(&[&["--json", "traj", "run"], words].concat())
+        .command(&[&["--json"], words].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -219,7 +303,7 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
         line.clear();
         assert!(err.read_line(&mut line).unwrap() > 0, "it ended early");
         let event: Value = serde_json::from_str(&line).unwrap_or_default();
-        if event["path_s"].as_f64().is_some_and(|s| s > 1.0) {
+        if event["path_s"].as_f64().is_some_and(|s| s > seconds) {
             break;
         }
     }

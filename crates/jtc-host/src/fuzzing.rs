@@ -7,6 +7,7 @@ use crate::file::FileError;
 use crate::log::FlightLog;
 use crate::port::read_capture;
 use crate::trajectory::{Loaded, Trajectory};
+use crate::waypoints::WaypointFile;
 
 fn text(data: &[u8]) -> Option<&str> {
     std::str::from_utf8(data).ok()
@@ -31,11 +32,22 @@ fn sound(read: Result<Loaded, FileError>) {
     let _: Result<_, _> = Trajectory::raw(t);
 }
 
+/// Waypoints are read or refused, and lead somewhere or are refused.
+fn waypoints(text: &str) {
+    let Ok(file) = WaypointFile::parse(text) else { return };
+    // Inverse kinematics of thousands of them would take long, and find nothing more.
+    if file.waypoints.len() < 50 {
+        let _ = file.positions(&Arm::avena());
+    }
+}
+
 /// CSV with a header.
 pub fn trajectory_csv(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("t,q1,q2,q3,q4,q5,q6\n{text}"), None));
     sound(Loaded::parse(text, None));
+    waypoints(&format!("t,pose,q1_deg,q2,q3,q4,q5,q6,x,y,z,roll,pitch,yaw\n{text}"));
+    waypoints(text);
 }
 
 /// The header-less 19 columns; `data` also as numbers of such a file, whole or with decimals.
@@ -62,6 +74,8 @@ pub fn trajectory_table(data: &[u8]) {
 pub fn trajectory_json(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("{{{text}"), None));
+    waypoints(&format!("[{text}"));
+    waypoints(&format!("{{{text}"));
 }
 
 /// YAML.

@@ -33,6 +33,13 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
                     format!("a tolerance of {tolerance} rad is outside 0.000001..1; nothing was sent");
                 return Err(Failure::usage(message).hint("0.01 rad is half a degree"));
             }
+            if *waypoints && file.exists() && !file.is_file() {
+                let message = format!(
+                    "{} is no file, and waypoints are known at the end only; nothing was sent",
+                    file.display()
+                );
+                return Err(Failure::usage(message).hint("name a file, or leave --waypoints out"));
+            }
             let output = OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?;
             record(output, link, *duration, waypoints.then_some(*tolerance), out)
         }

@@ -56,13 +56,13 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 17] = [
+const CHECKS: [Check; 18] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "plan/check_plan.py", program: Some("examples/plans"), demo_files: &[] },
+    Check { script: "plan/check_kinematics.py", program: Some("examples/poses"), demo_files: &[] },
     Check { script: "arms/check_import.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "arms/check_driving.py", program: Some("jtc"), demo_files: &[] },
-    Check { script: "plan/check_kinematics.py", program: Some("examples/poses"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
     Check { script: "can/check_multicast.py", program: None, demo_files: &[] },
     Check { script: "can/check_socketcand.py", program: None, demo_files: &[] },
@@ -92,9 +92,9 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     tally.step("programs for the references", || {
         for (package, example) in [
             ("jtc-dynamics", "reference"),
-            ("jtc-plan", "poses"),
             ("jtc-sim", "free_fall"),
             ("jtc-plan", "plans"),
+            ("jtc-plan", "poses"),
             ("can-link", "echo"),
             ("can-link", "socketcand_server"),
             ("can-link", "slcan_adapter"),

@@ -18,8 +18,12 @@ use crate::{ArmDynamics, Limits, PlanError, jerk, reach, verify};
 /// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and [`PlanError::Path`] where the
 /// path leads outside or has no direction, [`PlanError::Torque`] where the torque does not suffice at any speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
-    along_at(path, limits, arm, &|_| 1.0)
+    along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
+
+/// What was chosen for each section of a path, so that it can be planned again alike: a law that depends on it without jumps.
+#[derive(Debug, Default)]
+pub(crate) struct Choices(Vec<Option<jerk::Shares>>);
 
 /// The same, where the waypoint (from 1) that was passed last decides at which share of the speed.
 pub(crate) fn along_at(
@@ -27,12 +31,17 @@ pub(crate) fn along_at(
     limits: &Limits,
     arm: Option<&ArmDynamics>,
     share: &dyn Fn(usize) -> f64,
+    choices: &mut Choices,
 ) -> Result<Motion, PlanError> {
     limits.check()?;
     let limits_of_motion = verify::with_table(limits, arm);
     let mut motion: Option<Motion> = None;
-    for section in sections(path)? {
-        let planned = of_section(&section, &limits_of_motion, arm, share)?;
+    for (i, section) in sections(path)?.iter().enumerate() {
+        if choices.0.len() <= i {
+            choices.0.push(None);
+        }
+        let planned = of_section(section, &limits_of_motion, arm, share, &mut choices.0[i])?;
+        let planned = verify::within_kinematics(planned, &limits_of_motion)?;
         match &mut motion {
             None => motion = Some(planned),
             Some(motion) => motion.append(&planned),
@@ -82,6 +91,7 @@ fn of_section(
     limits: &Limits,
     arm: Option<&ArmDynamics>,
     share: &dyn Fn(usize) -> f64,
+    chosen: &mut Option<jerk::Shares>,
 ) -> Result<Motion, PlanError> {
     let leg = section.path.waypoint(section.from).unwrap_or(1);
     let cells = cells(section, arm, limits, !limits.has_jerk())?;
@@ -89,12 +99,13 @@ fn of_section(
         .iter()
         .map(|cell| share(section.path.waypoint(section.from + 0.5 * (cell.from + cell.to)).unwrap_or(leg)))
         .collect();
-    let caps = caps(section, &cells, &shares, limits, arm)?;
+    let caps = caps(section, &cells, limits, arm)?;
     let mut plan = Plan { section, cells: &cells, caps, reached: Vec::new(), shares, limits, arm: None };
     plan.reached.clone_from(&plan.caps);
     let failed = |reason| PlanError::NoTimeLaw { leg, reason };
-    let Some(arm) = arm else { return Ok(plan.make(None, REPAIRS).map_err(failed)?.motion) };
-    let mut made = plan.make(None, 0).map_err(failed)?;
+    let mut made = plan.make(*chosen, if arm.is_none() { REPAIRS } else { 0 }).map_err(failed)?;
+    *chosen = made.shares;
+    let Some(arm) = arm else { return Ok(made.motion) };
     // Friction counts up to the highest speed in a cell, which is known better each time.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
@@ -117,19 +128,18 @@ fn of_section(
 fn caps(
     section: &Section,
     cells: &[Cell],
-    shares: &[f64],
     limits: &Limits,
     arm: Option<&ArmDynamics>,
 ) -> Result<Vec<f64>, PlanError> {
-    let cap = |(cell, share): (&Cell, &f64)| {
-        let cap = cell.speed_cap(limits) * share * share;
+    let cap = |cell: &Cell| {
+        let cap = cell.speed_cap(limits);
         let Some(arm) = arm else { return Ok(cap) };
         cell.friction_cap(cap, limits, arm).map_err(|(joint, torque, limit): (Joint, f64, f64)| {
             let waypoint = section.path.waypoint(section.from + cell.from).unwrap_or(1);
             PlanError::Torque { waypoint, joint, torque, limit, holding: false }
         })
     };
-    cells.iter().zip(shares).map(cap).collect()
+    cells.iter().map(cap).collect()
 }
 
 /// What a law of time is made from.
@@ -186,7 +196,8 @@ impl Plan<'_> {
     }
 
     fn without_jerk(&self, repairs: usize) -> Result<Made, String> {
-        let mut caps = self.reached.clone();
+        let slow = self.caps.iter().zip(&self.shares).map(|(cap, share)| cap * share * share);
+        let mut caps: Vec<f64> = slow.zip(&self.reached).map(|(cap, reached)| cap.min(*reached)).collect();
         let mut shares: Vec<f64> = self.shares.iter().map(|s| s * s).collect();
         let mut repaired = 0;
         loop {

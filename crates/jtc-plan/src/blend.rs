@@ -78,6 +78,17 @@ impl BlendedPath {
         distance(a, b) <= SAME
     }
 
+    /// Whether the path does not move between the waypoints with these indices.
+    pub(crate) fn is_one_place(&self, from: usize, to: usize) -> bool {
+        self.given[from] == self.given[to]
+    }
+
+    /// Whether the path rests at the waypoint with this index.
+    pub(crate) fn stops_at(&self, waypoint: usize) -> bool {
+        let corner = self.given[waypoint];
+        corner == 0 || corner + 1 == self.corners.len() || self.corners[corner].stop
+    }
+
     /// Index of the leg that `s` is on, the next one at a corner.
     fn leg(&self, s: f64) -> usize {
         let after = self.corners.partition_point(|c| c.parameter <= s);
@@ -139,9 +150,7 @@ impl Corner {
             parts.fold(0.0, f64::max)
         };
         let (turn, sum) = (size(-1.0), size(1.0));
-        if turn > STRAIGHT {
-            self.stop |= sum < BACK || half <= 0.0;
-        }
+        self.stop |= half <= 0.0 || sum < BACK;
         if !self.stop && turn > STRAIGHT {
             self.half = half;
         }

@@ -89,7 +89,7 @@ pub enum PlanError {
         limit: LimitKind,
         /// Time given from that waypoint to this one, s.
         given: f64,
-        /// Shortest possible, s.
+        /// Shortest possible, s; a twentieth more than given where only the legs beside it leave nothing over.
         shortest: f64,
     },
     /// The torque does not suffice however slow the motion is.

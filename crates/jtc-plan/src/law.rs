@@ -28,6 +28,8 @@ pub(crate) struct Law {
     pub phases: Vec<Phase>,
     /// Parameter at the end.
     pub end: f64,
+    /// It begins and ends at rest.
+    pub rests: bool,
 }
 
 impl Law {
@@ -46,7 +48,7 @@ impl Law {
             phases.push(Phase { start, length, s, speed: v, acceleration: (w - v) / length, jerk: 0.0 });
             start += length;
         }
-        Self { phases, end: vertices.last().map_or(0.0, |v| v.0) }
+        Self { phases, end: vertices.last().map_or(0.0, |v| v.0), rests: true }
     }
 
     /// s.
@@ -56,11 +58,13 @@ impl Law {
 
     /// Parameter and its first two derivatives at `t`.
     pub fn at(&self, t: f64) -> (f64, f64, f64) {
+        let moving = |speed: f64| if self.rests { 0.0 } else { speed };
         if t <= 0.0 {
-            return (0.0, 0.0, self.phases.first().map_or(0.0, |p| p.acceleration));
+            return self.phases.first().map_or((0.0, 0.0, 0.0), |p| (0.0, moving(p.speed), p.acceleration));
         }
         if t >= self.duration() {
-            return (self.end, 0.0, self.phases.last().map_or(0.0, |p| p.at(p.length).2));
+            let (_, speed, acceleration) = self.phases.last().map_or((0.0, 0.0, 0.0), |p| p.at(p.length));
+            return (self.end, moving(speed), acceleration);
         }
         let phase = &self.phases[self.phases.partition_point(|p| p.start <= t).saturating_sub(1)];
         let (s, v, a) = phase.at(t - phase.start);
@@ -133,6 +137,6 @@ impl Law {
         for phase in &mut phases {
             phase.s *= factor;
         }
-        Self { phases, end: self.end }
+        Self { phases, end: self.end, rests: true }
     }
 }

@@ -21,6 +21,7 @@ mod through;
 mod torque;
 mod trapezoid;
 mod verify;
+mod warp;
 
 pub use along::along;
 pub use binding::{Binding, LimitKind};

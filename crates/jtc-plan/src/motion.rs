@@ -151,6 +151,29 @@ impl Motion {
         }
     }
 
+    /// Rests for `length` seconds at the place where it passes the waypoint with this index at rest; later waypoints are passed later.
+    pub(crate) fn rest_at(&mut self, waypoint: usize, length: f64) {
+        let Some(&time) = self.waypoint_times.get(waypoint) else { return };
+        let at = self.pieces.partition_point(|p| p.start + 0.5 * p.length < time);
+        let place = self.pieces.get(at).map_or(self.end, |p| State::rest(p.at(0.0).position));
+        for piece in &mut self.pieces[at..] {
+            piece.start += length;
+        }
+        self.pieces.insert(at, Piece::between(time, length, &place, &place));
+        for time in &mut self.waypoint_times[waypoint + 1..] {
+            *time += length;
+        }
+        for b in &mut self.binding {
+            let later = |t: &mut f64| {
+                if *t > time + 1e-9 {
+                    *t += length
+                }
+            };
+            later(&mut b.to);
+            later(&mut b.from);
+        }
+    }
+
     /// Appends another motion that begins where this one ends. The first waypoint of `next` is the last one of this.
     pub(crate) fn append(&mut self, next: &Self) {
         let start = self.duration();

@@ -37,16 +37,21 @@ pub(crate) fn finished(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let within = with_table(limits, arm);
-    let stretch = motion.pieces.iter().map(|p| kinematic_stretch(p, &within)).fold(1.0, f64::max);
-    if !stretch.is_finite() {
-        return Err(PlanError::NoTimeLaw { leg: 1, reason: "the motion is not finite".into() });
-    }
-    let mut motion = if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion };
+    let mut motion = within_kinematics(motion, &within)?;
     if let Some(arm) = arm {
         motion = within_torque(motion, &within, arm)?;
     }
     motion.binding = binding(&motion, &within, arm);
     Ok(motion)
+}
+
+/// Slows a motion down until velocity, acceleration and jerk hold.
+pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motion, PlanError> {
+    let stretch = motion.pieces.iter().map(|p| kinematic_stretch(p, limits)).fold(1.0, f64::max);
+    if !stretch.is_finite() {
+        return Err(PlanError::NoTimeLaw { leg: 1, reason: "the motion is not finite".into() });
+    }
+    Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
 /// By what a piece's time has to be multiplied so that velocity, acceleration and jerk hold everywhere in it.

@@ -128,6 +128,24 @@ fn the_forms_of_waypoints_are_the_same_motion() {
     assert!(durations.iter().all(|d| (d - durations[0]).abs() < 1e-9), "{durations:?}");
 }
 
+/// Times of the file are kept to the millisecond; where some are left out, the motion is as fast there as it can be.
+#[test]
+fn given_times_are_kept() {
+    let dir = Dir::new();
+    let text = "t,q1,q2,q3,q4,q5,q6\n1,0,0,0,0,0,0\n3.5,0.4,0.1,-0.2,0,0.3,0\n,0.2,0.3,-0.5,0,0.3,0\n8,0,0,0,0,0,0\n";
+    let (file, out) = (dir.file("timed.csv", text), dir.path("out.csv"));
+    for blend in ["0", "0.05"] {
+        let value = json(&[&file, "-o", &out, "--force", "--blend", blend], 0);
+        let times: Vec<f64> =
+            value["waypoint_times_s"].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect();
+        assert!((times[1] - 2.5).abs() < 1e-3 && (times[3] - 7.0).abs() < 1e-3, "{blend}: {times:?}");
+        assert!(times[2] > 2.5 && times[2] < 7.0, "{times:?}");
+        assert!((value["duration_s"].as_f64().unwrap() - 7.0).abs() < 0.0101, "{value}");
+        let row = rows(&out).into_iter().find(|row| (row[0] - 2.5).abs() < 5e-3).expect("a row");
+        assert!((row[1] - 0.4).abs() < 0.06, "{row:?}");
+    }
+}
+
 #[test]
 fn what_cannot_be_planned_is_refused_with_its_line() {
     let dir = Dir::new();
@@ -144,6 +162,8 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     let word = with("word.csv", &format!("{head}0,0,zero,0,0,0\n"));
     let pose = with("pose.csv", "pose\nabove-table\nabove-tabel\n");
     let far = with("far.csv", "x,y,z,roll_deg,pitch_deg,yaw_deg\n0.3,0,0.3,0,90,0\n9,0,0,0,90,0\n");
+    let early = with("early.csv", "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0.1,0.5,0,0,0,0,0\n");
+    let back = with("back.csv", "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n2,0.5,0,0,0,0,0\n1,0,0,0,0,0,0\n");
     let missing = dir.path("missing.csv");
     for (words, code, message) in [
         (vec![missing.as_str()], 2, "missing.csv: No such file"),
@@ -157,6 +177,12 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         (vec![&same], 4, "all 2 waypoints are at the same place"),
         (vec![&outside], 4, "outside.csv, line 3: waypoint 2, joint 2: 1.6 rad is outside -1.57..1.57 rad"),
         (vec![&far], 4, "far.csv, line"),
+        (
+            vec![&early],
+            4,
+            "early.csv, line 3: waypoint 2: 0.100 s after waypoint 1 is too early, joint 1 needs",
+        ),
+        (vec![&back], 2, "back.csv, line 4: waypoint 3: time 1 s is not after 2 s"),
         (vec![&good, "--blend", "-0.1"], 2, "blend of -0.1 rad"),
         (vec![&good, "--speed", "0"], 2, "speed 0 % is not within 1..100 %"),
         (vec![&good, "--speed", "101"], 2, "speed 101 % is not within 1..100 %"),

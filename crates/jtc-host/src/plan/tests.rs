@@ -101,3 +101,20 @@ fn any_length_fits_or_is_refused() {
     let error = Planner::new(&config).through(&waypoints(&places)).unwrap_err();
     assert!(matches!(error, PlanError::TooLong { .. }), "{error}");
 }
+
+/// Given times are kept, or refused with the shortest one.
+#[test]
+fn given_times_are_kept_or_refused() {
+    let config = Config::avena();
+    let planner = Planner::new(&config);
+    let timed = |t: f64| {
+        let second = Waypoint { position: [0.5, 0.0, 0.0, 0.0, 0.0, 0.0], time: Some(t) };
+        planner.through(&[Waypoint { position: [0.0; 6], time: Some(0.0) }, second])
+    };
+    let planned = timed(3.003).unwrap();
+    assert!((planned.waypoint_times[1] - 3.003).abs() < 1e-6);
+    assert!((planned.trajectory.duration_s() - 3.003).abs() < 0.0101, "{}", planned.trajectory.duration_s());
+    let error = timed(0.1).unwrap_err();
+    assert!(error.to_string().contains("waypoint 2") && error.to_string().contains("joint 1"), "{error}");
+    assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
+}

@@ -36,7 +36,22 @@ fn measured(line: &str) -> String {
         Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
         _ => (String::new(), line),
     };
-    typed + &blurred(rest)
+    typed + &blurred(&without_signs(rest))
+}
+
+/// Without the signs of numbers: one behind a hyphen counts as a part of a name.
+fn without_signs(text: &str) -> String {
+    let mut before = ' ';
+    let mut out = String::new();
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        let sign = c == '-' && " ,[".contains(before) && rest.peek().is_some_and(char::is_ascii_digit);
+        if !sign {
+            out.push(c);
+        }
+        before = c;
+    }
+    out
 }
 
 #[test]

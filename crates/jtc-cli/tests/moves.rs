@@ -358,7 +358,8 @@ fn a_run_that_was_broken_off_goes_on_where_the_arm_stands() {
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =
         "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
-    let sim = Sim::with_faults(&FAST, faults).held();
+    // In real time, so that the recording knows each 40 ms of the path.
+    let sim = Sim::with_faults(&["--no-throttle"], faults).held();
     let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
     sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
     let refused = sim.jtc(&["traj", "continue", &record]).ends(1);

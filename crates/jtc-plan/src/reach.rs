@@ -10,6 +10,9 @@ use crate::{ArmDynamics, JOINTS, Limits};
 /// Rows of a place: acceleration and torque of each joint, both ways.
 const ROWS: usize = 4 * JOINTS;
 
+/// Of squared speeds, when the highest is 1.
+const TOLERANCE: f64 = 1e-12;
+
 /// One place's limits, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
     by_speed: [f64; ROWS],
@@ -34,14 +37,17 @@ pub(crate) fn fastest(
         left.min(right).clamp(1e-18, 1e18)
     };
     let caps_of_places: Vec<f64> = (0..count).map(cap).collect();
+    // In a unit of time in which the highest speed is 1: copp's tolerances are absolute.
+    let unit = caps_of_places.iter().copied().fold(0.0, f64::max);
+    let in_units: Vec<f64> = caps_of_places.iter().map(|cap| cap / unit).collect();
     let mut constraints = Constraints::with_capacity(JOINTS, count);
     let failed = |e: copp::diag::ConstraintError| e.to_string();
     constraints.with_s(places.as_slice()).map_err(failed)?;
-    constraints.with_constraint_1order(caps_of_places.as_slice(), 0).map_err(failed)?;
+    constraints.with_constraint_1order(in_units.as_slice(), 0).map_err(failed)?;
     // A place belongs to the cell after it, and where that looks otherwise, also to the cell before it.
     let share = |i: usize| shares[i.saturating_sub(1)].min(shares[i.min(count - 2)]);
     let end = |i: usize| cells.get(i).map_or(&cells[count - 2].ends[1], |cell| &cell.ends[0]);
-    let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm);
+    let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm).in_units(unit);
     let after: Vec<Rows> = (0..count).map(|i| rows(end(i), i)).collect();
     append(&mut constraints, &after, 0)?;
     for i in 1..count - 1 {
@@ -53,12 +59,17 @@ pub(crate) fn fastest(
     let problem = Topp2ProblemBuilder::with_constraint(&constraints, (0, count - 1), (0.0, 0.0))
         .build()
         .map_err(|e| e.to_string())?;
-    let options = ReachSet2OptionsBuilder::new().build().map_err(|e| e.to_string())?;
+    let options = ReachSet2OptionsBuilder::new()
+        .a_cmp_abs_tol(TOLERANCE)
+        .a_cmp_rel_tol(TOLERANCE)
+        .lp_feas_tol(TOLERANCE)
+        .build()
+        .map_err(|e| e.to_string())?;
     let squares = topp2_ra(&problem, &options).map_err(|e| e.to_string())?;
     if squares[1..count - 1].iter().any(|a| !(*a > 0.0 && a.is_finite())) {
         return Err("the speed along the path is 0 where it does not stop".into());
     }
-    Ok(places.into_iter().zip(squares).collect())
+    Ok(places.into_iter().zip(squares.into_iter().map(|square| square * unit)).collect())
 }
 
 /// Whether a path goes on otherwise than it came.
@@ -79,6 +90,22 @@ fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<
 }
 
 impl Rows {
+    /// With squared speeds and accelerations of the parameter in this unit, and rows of about 1.
+    fn in_units(mut self, unit: f64) -> Self {
+        for row in 0..ROWS {
+            let size =
+                self.by_speed[row].abs().max(self.by_acceleration[row].abs()).max(self.limit[row] / unit);
+            if size.is_finite() && size > 0.0 {
+                self.by_speed[row] /= size;
+                self.by_acceleration[row] /= size;
+                self.limit[row] /= size * unit;
+            } else {
+                self.limit[row] /= unit;
+            }
+        }
+        self
+    }
+
     fn new(end: &End, share: f64, cap: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> Self {
         let mut rows =
             Self { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };

@@ -42,6 +42,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     for (package, example) in EXAMPLES {
         run(&mut cargo(&["build", "--profile", "dist", "--package", package, "--example", example]))?;
     }
+    run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-plan", "--example", "plans"]))?;
+    python::environment("requirements.txt")?;
     let mut figures = Figures::new();
     let load = Load::now();
     for round in 1..=rounds {
@@ -49,6 +51,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let mut samples = anchors(&work, &kernels, 2, &mut skipped)?;
         samples.append(&mut own_figures(&frames)?);
         samples.insert("cantools_frames_s".into(), cantools(&frames)?);
+        samples.append(&mut planned()?);
         keep_best(&mut figures, samples);
     }
     let others = load.others();
@@ -132,6 +135,14 @@ fn cantools(frames: &Path) -> Result<f64> {
     script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(frames);
     script.env("PYTHONDONTWRITEBYTECODE", "1");
     shell::read(&mut script)?.trim().parse().context("read_frames.py printed no number")
+}
+
+/// Planned motions, and those of toppra and Ruckig.
+fn planned() -> Result<Figures> {
+    let mut script = command(python::environment("requirements.txt")?);
+    script.arg(root().join("references/plan/bench_plan.py")).arg(shell::target().join("dist/examples/plans"));
+    script.env("PYTHONDONTWRITEBYTECODE", "1");
+    object(&shell::read(&mut script)?)
 }
 
 /// The numbers of a JSON object.

@@ -150,6 +150,23 @@ const ROWS: &[Row] = &[
     row("UCoM: frames read / cantools", "ucom_decode_frames_s", &["cantools_frames_s"], Target::None, "1/s"),
     row("UCoM: memory of a board's node", "ucom_node_bytes", &[], Target::AtMost(4096.0), "B"),
     row(
+        "100 waypoints of 6 joints planned, torque and jerk limited",
+        "plan.ms_100",
+        &[],
+        Target::AtMost(50.0),
+        "ms",
+    ),
+    row(
+        "400 waypoints / four times 100",
+        "plan.ms_400",
+        &["plan.four_times_ms_100"],
+        Target::Share(1.3),
+        "ms",
+    ),
+    row("motions along paths / toppra", "plan.path_s", &["plan.toppra_s"], Target::Share(1.02), "s"),
+    row("planning them / toppra", "plan.path_ms", &["plan.toppra_ms"], Target::None, "ms"),
+    row("motions from point to point / Ruckig", "plan.moves_s", &["plan.ruckig_s"], Target::Share(1.01), "s"),
+    row(
         "tracking, worst joint / PID on straight lines",
         "tracking_worst_rms_mrad",
         &["tracking_plain_worst_rms_mrad"],

@@ -35,6 +35,12 @@ pub(crate) fn along_at(
 ) -> Result<Motion, PlanError> {
     limits.check()?;
     let limits_of_motion = verify::with_table(limits, arm);
+    if let Some(arm) = arm {
+        let rests = std::iter::once(0.0).chain(path.stops()).chain([path.end()]);
+        for s in rests.filter(|s| s.is_finite()) {
+            verify::can_be_held(&path.at(s).position, path.waypoint(s).unwrap_or(1), limits, arm)?;
+        }
+    }
     let mut motion: Option<Motion> = None;
     for (i, section) in sections(path)?.iter().enumerate() {
         if choices.0.len() <= i {
@@ -76,7 +82,9 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
         // Waypoints that are given twice are passed twice.
-        let at = |place: f64| waypoints.iter().filter(move |s| **s == place).count();
+        let at = |place: f64| {
+            waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
+        };
         let first = if from == 0.0 { at(from).max(1) - 1 } else { 0 };
         of_section.splice(0..0, std::iter::repeat_n(from, first));
         of_section.extend(std::iter::repeat_n(to, at(to)));

@@ -16,6 +16,8 @@ const TORQUE_SHARE: f64 = 0.9995;
 const SAMPLES_MAX: f64 = 200_000.0;
 /// The slowest that a motion is made for its torque, as a factor of its time.
 const SLOWEST: f64 = 64.0;
+/// Samples at which it is looked what binds, at most.
+const BINDING_SAMPLES_MAX: f64 = 50_000.0;
 /// From this share of it on a limit binds.
 const BINDS: f64 = 0.985;
 
@@ -196,15 +198,25 @@ fn waypoint_at(motion: &Motion, time: f64) -> usize {
 fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Result<(), PlanError> {
     for (i, &time) in motion.waypoint_times.iter().enumerate() {
         let state = motion.at(time);
-        if state.velocity.iter().any(|v| v.abs() > 1e-6) {
-            continue;
+        if state.velocity.iter().all(|v| v.abs() <= 1e-6) {
+            can_be_held(&state.position, i + 1, limits, arm)?;
         }
-        let torques = arm.holding(&state.position);
-        for joint in Joint::ALL {
-            let (torque, limit) = (torques[joint.index()].abs(), HOLD_SHARE * limits.torque[joint.index()]);
-            if torque > limit || torque.is_nan() {
-                return Err(PlanError::Torque { waypoint: i + 1, joint, torque, limit, holding: true });
-            }
+    }
+    Ok(())
+}
+
+/// Whether the arm can be held at a place, which `waypoint` (from 1) names in the error.
+pub(crate) fn can_be_held(
+    position: &JointVec,
+    waypoint: usize,
+    limits: &Limits,
+    arm: &ArmDynamics,
+) -> Result<(), PlanError> {
+    let torques = arm.holding(position);
+    for joint in Joint::ALL {
+        let (torque, limit) = (torques[joint.index()].abs(), HOLD_SHARE * limits.torque[joint.index()]);
+        if torque > limit || torque.is_nan() {
+            return Err(PlanError::Torque { waypoint, joint, torque, limit, holding: true });
         }
     }
     Ok(())
@@ -259,7 +271,7 @@ fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
 /// Which limit is closest to being exceeded, where it is close.
 fn binding(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Vec<Binding> {
     let duration = motion.duration();
-    let step = (duration / 4000.0).max(0.002);
+    let step = (duration / BINDING_SAMPLES_MAX).max(0.002);
     let count = (duration / step).ceil() as usize;
     let mut found: Vec<Binding> = Vec::new();
     let mut open = false;

@@ -1,7 +1,7 @@
 //! Straight legs between waypoints, with rounded corners.
 use jtc_wire::Joint;
 
-use crate::path::{Path, PathPoint};
+use crate::path::{Path, PathPoint, Waypointed};
 use crate::{JOINTS, JointVec, PlanError};
 
 /// Waypoints closer than this, rad, are one.
@@ -76,17 +76,6 @@ impl BlendedPath {
     /// Whether two waypoints are so near to each other that there is no leg between them.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
-    }
-
-    /// Whether the path does not move between the waypoints with these indices.
-    pub(crate) fn is_one_place(&self, from: usize, to: usize) -> bool {
-        self.given[from] == self.given[to]
-    }
-
-    /// Whether the path rests at the waypoint with this index.
-    pub(crate) fn stops_at(&self, waypoint: usize) -> bool {
-        let corner = self.given[waypoint];
-        corner == 0 || corner + 1 == self.corners.len() || self.corners[corner].stop
     }
 
     /// Index of the leg that `s` is on, the next one at a corner.
@@ -208,6 +197,17 @@ impl Path for BlendedPath {
 
     fn waypoints(&self) -> Vec<f64> {
         self.given.iter().map(|&g| self.corners[g].parameter).collect()
+    }
+}
+
+impl Waypointed for BlendedPath {
+    fn is_one_place(&self, from: usize, to: usize) -> bool {
+        self.given[from] == self.given[to]
+    }
+
+    fn stops_at(&self, waypoint: usize) -> bool {
+        let corner = self.given[waypoint];
+        corner == 0 || corner + 1 == self.corners.len() || self.corners[corner].stop
     }
 }
 

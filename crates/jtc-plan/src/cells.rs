@@ -90,7 +90,7 @@ pub(crate) fn cells(
             let s = from + (to - from) * i as f64 / count as f64;
             let point = section.at(if i == count { to } else { s }, side);
             checked(section, &point, s, limits)?;
-            Ok(End { point, loads: arm.map(|arm| Loads::at(&point, arm)) })
+            Ok::<End, PlanError>(End { point, loads: arm.map(|arm| Loads::at(&point, arm)) })
         };
         let mut before = end(0)?;
         for i in 0..count {

@@ -2,6 +2,7 @@
 use jtc_wire::Joint;
 
 use crate::LimitKind;
+use crate::kinematics::PoseError;
 
 /// Why there is no motion. Waypoints and legs are counted from 1; leg 1 leads from waypoint 1 to waypoint 2.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -117,6 +118,9 @@ pub enum PlanError {
         /// The path's own.
         parameter: f64,
     },
+    /// The flange cannot be brought there, or not along a line or an arc.
+    #[error(transparent)]
+    Flange(#[from] PoseError),
     /// No law of time was found, which is a fault of the planner or numbers beyond what it can compute with.
     #[error("leg {leg}: no time law within the limits: {reason}")]
     NoTimeLaw {
@@ -153,6 +157,7 @@ impl PlanError {
                 "lead the path around poses that take much torque, or carry a lighter payload"
             }
             Self::Path { .. } => "remove waypoints that coincide, and correct those that are no numbers",
+            Self::Flange(error) => error.hint(),
             Self::NoTimeLaw { .. } => {
                 "ask for a lower speed or a larger blend; if it stays, report it with the waypoints"
             }

@@ -5,6 +5,7 @@ mod error;
 mod flange_path;
 mod leg;
 mod orientation;
+mod route;
 mod search;
 mod singular;
 mod subproblems;
@@ -25,6 +26,7 @@ pub use error::PoseError;
 pub use flange_path::FlangePath;
 pub use leg::{Leg, RADIUS};
 pub use orientation::{Orientation, quaternion_of, rpy_of};
+pub use route::{LegKind, Route, RoutePoint};
 pub use singular::{SINGULAR, SingularKind, Singularity};
 pub use target::{Target, resolve};
 

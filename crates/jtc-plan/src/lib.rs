@@ -32,5 +32,5 @@ pub use limits::{JERK_TIME, Limits};
 pub use motion::{Motion, State};
 pub use p2p::point_to_point;
 pub use path::{Path, PathPoint};
-pub use through::{Waypoint, through};
+pub use through::{Waypoint, on_route, through};
 pub use torque::{ArmDynamics, HOLD_SHARE};

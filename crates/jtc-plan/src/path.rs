@@ -44,3 +44,12 @@ pub trait Path {
         vec![0.0, self.end()]
     }
 }
+
+/// A path of which the waypoints can be looked up, for motions with given times.
+pub(crate) trait Waypointed: Path {
+    /// Whether the path does not move between the waypoints with these indices.
+    fn is_one_place(&self, from: usize, to: usize) -> bool;
+
+    /// Whether the path rests at the waypoint with this index.
+    fn stops_at(&self, waypoint: usize) -> bool;
+}

@@ -3,6 +3,8 @@ use jtc_wire::Joint;
 
 use crate::along::{Choices, along_at};
 use crate::binding::{Binding, LimitKind};
+use crate::kinematics::Route;
+use crate::path::Waypointed;
 use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, p2p, verify, warp};
 
 /// How near a motion passes a waypoint to the time that was given for it, s: half a tick of the controller.
@@ -72,6 +74,30 @@ pub fn through(
     if given.len() < 2 { along(&path, limits, arm) } else { on_time(&path, &given, limits, arm) }
 }
 
+/// From the first waypoint of a route to its last, as fast as the limits allow. `times` are those of its waypoints, as those of [`Waypoint`];
+/// they are kept as in [`through`].
+///
+/// # Errors
+///
+/// As [`through`].
+pub fn on_route(
+    route: &Route,
+    times: &[Option<f64>],
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Motion, PlanError> {
+    limits.check()?;
+    let time = |i: usize| times.get(i).copied().flatten();
+    let waypoints = route.positions().iter().enumerate();
+    let waypoints: Vec<Waypoint> =
+        waypoints.map(|(i, &position)| Waypoint { position, time: time(i) }).collect();
+    for (i, waypoint) in waypoints.iter().enumerate() {
+        limits.holds(&waypoint.position, i + 1)?;
+    }
+    let given = given_times(&waypoints)?;
+    if given.len() < 2 { along(route, limits, arm) } else { on_time(route, &given, limits, arm) }
+}
+
 /// A rest at waypoints that are all the same, until the last time that was given.
 fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     let mut rest = p2p::standing(&positions[0], &positions[positions.len() - 1], positions.len());
@@ -122,7 +148,7 @@ impl Stretch {
 
 /// Corrects the speed between every two given times until all are kept.
 fn on_time(
-    path: &BlendedPath,
+    path: &impl Waypointed,
     given: &[(usize, f64)],
     limits: &Limits,
     arm: Option<&ArmDynamics>,
@@ -148,7 +174,7 @@ fn on_time(
 /// The same for those between whose waypoints the arm moves: the speed of each is lowered until it takes nearly as long as it is to, and the
 /// rest is done by running it at another rate.
 fn moving_on_time(
-    path: &BlendedPath,
+    path: &impl Waypointed,
     stretches: &mut [Stretch],
     limits: &Limits,
     arm: Option<&ArmDynamics>,

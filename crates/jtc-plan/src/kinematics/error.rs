@@ -84,6 +84,24 @@ pub enum PoseError {
     /// Two orientations that are half a turn apart.
     #[error("the orientation is half a turn from that of the waypoint before: which way to turn is open")]
     HalfTurn,
+    /// A point on an arc, and no arc behind it.
+    #[error("a point on the way of an arc (`via`), and the waypoint behind it is not the end of an arc")]
+    NoArc,
+    /// An arc without the point that it passes.
+    #[error("the end of an arc, and the waypoint before it is not a point on the arc's way (`via`)")]
+    NoVia,
+    /// Joint positions at the end of a line that the arm does not have there.
+    #[error(
+        "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
+    )]
+    Configuration {
+        /// The joint that is farthest away.
+        joint: Joint,
+        /// Its position at the end of the line, rad.
+        value: f64,
+        /// That of the waypoint, rad.
+        wanted: f64,
+    },
     /// A blend radius that is no length.
     #[error("a blend radius of {radius} m")]
     Blend {
@@ -150,6 +168,12 @@ impl PoseError {
             }
             Self::Arc { .. } => {
                 "an arc needs three different points that are not in line; a full circle is two arcs"
+            }
+            Self::NoArc | Self::NoVia => {
+                "an arc is two waypoints: a point on its way (`via`), and behind it its end (`arc`)"
+            }
+            Self::Configuration { .. } => {
+                "begin the line with the arm in the configuration of its end, give the end as a pose of the flange, or go there with a motion in joint space"
             }
             Self::HalfTurn => "give a waypoint in between",
             Self::Blend { .. } => "a blend radius is a length in m, 0 for a stop at each waypoint",

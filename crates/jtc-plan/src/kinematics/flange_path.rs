@@ -67,6 +67,11 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
+    /// Where leg `number` (from 1), an arc, passes its point on the way; a corner that is rounded may cut it off.
+    pub(crate) fn via(&self, number: usize) -> Option<f64> {
+        self.trace.via(number)
+    }
+
     /// The pose of the flange at `s`.
     pub fn flange(&self, s: f64) -> Pose {
         (&self.trace.at(s).frame).into()

@@ -82,6 +82,8 @@ struct Circle {
     normal: Vector3<f64>,
     /// rad.
     angle: f64,
+    /// Up to the point on the way, rad.
+    via: f64,
 }
 
 impl Drawn {
@@ -108,6 +110,14 @@ impl Drawn {
             }
         };
         Ok(Self { number, length, from: *from, to, spin: turn / unit, way })
+    }
+
+    /// How far from the beginning an arc passes its point on the way, m.
+    pub fn via(&self) -> Option<f64> {
+        match &self.way {
+            Way::Line(_) => None,
+            Way::Arc(circle, rate) => Some((circle.via / rate).min(self.length)),
+        }
     }
 
     /// The place `u` (m) from the beginning.
@@ -138,7 +148,11 @@ fn circle(from: &Frame, via: &[f64; 3], to: &Frame) -> Result<Circle, PoseError>
     }
     let towards = normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared();
     let centre = from.position + towards / (2.0 * normal.norm_squared());
-    let (arm, end, normal) = (from.position - centre, to.position - centre, normal.normalize());
-    let angle = normal.dot(&arm.cross(&end)).atan2(arm.dot(&end));
-    Ok(Circle { centre, arm, normal, angle: angle.rem_euclid(std::f64::consts::TAU) })
+    let (arm, normal) = (from.position - centre, normal.normalize());
+    let angle = |place: Vector3<f64>| {
+        let to = place - centre;
+        normal.dot(&arm.cross(&to)).atan2(arm.dot(&to)).rem_euclid(std::f64::consts::TAU)
+    };
+    let (via, angle) = (angle(Vector3::from(*via)), angle(to.position));
+    Ok(Circle { centre, arm, normal, angle, via })
 }

@@ -32,7 +32,12 @@ pub fn resolve(
     Ok(found)
 }
 
-fn one(kinematics: &Kinematics, target: &Target, before: &JointVec) -> Result<JointVec, PoseError> {
+/// Joint positions for one target; of a pose those nearest to `before`.
+pub(crate) fn one(
+    kinematics: &Kinematics,
+    target: &Target,
+    before: &JointVec,
+) -> Result<JointVec, PoseError> {
     match target {
         Target::Flange(pose) => kinematics.solve(pose, before),
         Target::Joints(q) => {

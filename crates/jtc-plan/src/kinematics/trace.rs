@@ -90,6 +90,12 @@ impl Trace {
         all
     }
 
+    /// Where leg `number`, an arc, passes its point on the way.
+    pub fn via(&self, number: usize) -> Option<f64> {
+        let k = self.legs.iter().position(|leg| leg.number == number)?;
+        Some(self.begins[k] + self.legs[k].via()?)
+    }
+
     /// Nearest to each waypoint, ends included: legs that move nothing end where they begin.
     pub fn waypoints(&self) -> Vec<f64> {
         let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);

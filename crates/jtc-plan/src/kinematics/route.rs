@@ -1,0 +1,390 @@
+//! Routes: sections that are straight in joint space, and sections on which the flange keeps to lines and arcs.
+use jtc_dynamics::JointVec;
+use jtc_wire::Joint;
+
+use super::target::one;
+use super::{FlangePath, Kinematics, Leg, PoseError, Target};
+use crate::path::Waypointed;
+use crate::{BlendedPath, Path, PathPoint, PlanError};
+
+/// How far from the joint positions of a waypoint the arm may be where a line that leads there ends, rad.
+const SAME: f64 = 1e-5;
+
+/// How the arm gets to a waypoint from the one before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LegKind {
+    /// Straight in joint space.
+    #[default]
+    Joint,
+    /// With the flange on a straight line.
+    Line,
+    /// It is a point that the arc to the next waypoint passes; its orientation does not count.
+    Via,
+    /// With the flange on an arc, through the waypoint before, which is [`LegKind::Via`].
+    Arc,
+}
+
+/// A waypoint of a route.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoutePoint {
+    /// Where it is.
+    pub target: Target,
+    /// How the arm gets there. That of the first waypoint does not count.
+    pub leg: LegKind,
+}
+
+/// A way through waypoints, straight in joint space or with the flange on lines and arcs. Between the two kinds it has a stop.
+///
+/// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has where the first of them begins. A pose of
+/// the flange at the end of a line is reached in it; joint positions there have to be of it. Otherwise of a pose of the flange
+/// the solution nearest to the waypoint before is taken.
+///
+/// Its parameter is that of the sections one after the other: rad in joint space, m along lines and arcs.
+#[derive(Clone, Debug)]
+pub struct Route {
+    sections: Vec<Section>,
+    positions: Vec<JointVec>,
+    waypoints: Vec<f64>,
+    end: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Section {
+    way: Way,
+    begin: f64,
+    /// Places where the way changes its form, ends included: by the route's parameter and by its own. A sum of parameters is rounded,
+    /// and a place must not get to the other side of one of these by that.
+    marks: Vec<(f64, f64)>,
+}
+
+#[derive(Clone, Debug)]
+enum Way {
+    Joint(BlendedPath),
+    Flange(Box<FlangePath>),
+}
+
+impl Way {
+    fn path(&self) -> &dyn Path {
+        match self {
+            Self::Joint(path) => path,
+            Self::Flange(path) => path.as_ref(),
+        }
+    }
+}
+
+impl Section {
+    fn new(way: Way, begin: f64) -> Self {
+        let path = way.path();
+        let mut places = path.breaks();
+        places.extend(path.stops());
+        places.extend([0.0, path.end()]);
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        let marks = places.into_iter().map(|own| (begin + own, own)).collect();
+        Self { way, begin, marks }
+    }
+
+    /// Its own parameter for one of the route's.
+    fn own(&self, s: f64) -> f64 {
+        let behind = self.marks.partition_point(|mark| mark.0 <= s);
+        match (behind.checked_sub(1).map(|i| self.marks[i]), self.marks.get(behind)) {
+            (Some((at, own)), _) if at == s => own,
+            (Some((_, low)), Some((_, high))) => {
+                (s - self.begin).clamp(low.next_up(), high.next_down().max(low.next_up()))
+            }
+            (Some((_, end)), None) => end,
+            (None, _) => 0.0,
+        }
+    }
+}
+
+impl Route {
+    /// Through `points`; of a pose of the flange at the first of them the joint positions nearest to `near` (rad) are taken. Corners between
+    /// two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]), those between lines and arcs within `blend_m` m
+    /// (see [`FlangePath`]); 0: stops.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the waypoint, or leg and distance on it, that cannot be:
+    /// see [`PoseError`]; [`PoseError::NoMotion`] if all waypoints are at one place.
+    pub fn new(
+        kinematics: &Kinematics,
+        points: &[RoutePoint],
+        near: &JointVec,
+        (blend, blend_m): (f64, f64),
+    ) -> Result<Self, PlanError> {
+        let [first, _, ..] = points else { return Err(PlanError::TooFew { count: points.len() }) };
+        if !(blend >= 0.0 && blend.is_finite()) {
+            return Err(PlanError::Blend { value: blend });
+        }
+        if !(blend_m >= 0.0 && blend_m.is_finite()) {
+            return Err(PoseError::Blend { radius: blend_m }.into());
+        }
+        let start = one(kinematics, &first.target, near).map_err(|e| e.at_waypoint(1))?;
+        let mut route = Self { sections: Vec::new(), positions: vec![start], waypoints: vec![0.0], end: 0.0 };
+        let mut done = 1;
+        while let Some(next) = points.get(done) {
+            let is_joint = |point: &RoutePoint| point.leg == LegKind::Joint;
+            let rest = &points[done..];
+            let count = rest.iter().take_while(|point| is_joint(point) == is_joint(next)).count();
+            if is_joint(next) {
+                route.in_joint_space(kinematics, &rest[..count], blend)?;
+            } else {
+                route.along_lines(kinematics, &rest[..count], blend_m)?;
+            }
+            done += count;
+        }
+        if route.sections.is_empty() { Err(PoseError::NoMotion.into()) } else { Ok(route) }
+    }
+
+    /// Joint positions at the waypoints, rad; at a corner that is rounded those of the corner.
+    pub fn positions(&self) -> &[JointVec] {
+        &self.positions
+    }
+
+    /// Whether `s` is on a line or an arc of the flange.
+    pub fn is_on_line(&self, s: f64) -> bool {
+        matches!(self.section(s).way, Way::Flange(_))
+    }
+
+    fn section(&self, s: f64) -> &Section {
+        let behind = self.sections.partition_point(|section| section.begin <= s);
+        &self.sections[behind.saturating_sub(1)]
+    }
+
+    fn last(&self) -> JointVec {
+        self.positions.last().copied().unwrap_or_default()
+    }
+
+    /// Appends a section whose waypoints behind its first are at `waypoints` of its own parameter.
+    fn push(&mut self, way: Way, waypoints: &[f64]) {
+        let section = Section::new(way, self.end);
+        self.waypoints.extend(waypoints.iter().map(|own| self.end + own));
+        self.end += section.way.path().end();
+        self.sections.push(section);
+    }
+
+    /// Appends waypoints to which nothing moves.
+    fn stay(&mut self, count: usize) {
+        self.waypoints.extend(std::iter::repeat_n(self.end, count));
+    }
+
+    fn in_joint_space(
+        &mut self,
+        kinematics: &Kinematics,
+        points: &[RoutePoint],
+        blend: f64,
+    ) -> Result<(), PlanError> {
+        let mut ends = vec![self.last()];
+        for point in points {
+            let number = self.positions.len() + 1;
+            let found = one(kinematics, &point.target, &self.last()).map_err(|e| e.at_waypoint(number))?;
+            self.positions.push(found);
+            ends.push(found);
+        }
+        if ends.iter().all(|end| BlendedPath::are_one(&ends[0], end)) {
+            self.stay(points.len());
+            return Ok(());
+        }
+        let path = BlendedPath::new(&ends, blend)?;
+        let waypoints = path.waypoints();
+        self.push(Way::Joint(path), &waypoints[1..]);
+        Ok(())
+    }
+
+    fn along_lines(
+        &mut self,
+        kinematics: &Kinematics,
+        points: &[RoutePoint],
+        blend: f64,
+    ) -> Result<(), PlanError> {
+        let first = self.positions.len() + 1;
+        let legs = legs(kinematics, points, first)?;
+        let start = self.last();
+        let path = |blend: f64| FlangePath::new(kinematics, &start, &legs.legs, blend);
+        // Where the waypoints are is known without blends.
+        let sharp = match path(0.0) {
+            Err(PoseError::NoMotion) => None,
+            other => Some(other.map_err(|e| legs.numbered(e))?),
+        };
+        let ends = sharp.as_ref().map(Path::waypoints);
+        let mut waypoints = Vec::with_capacity(points.len());
+        for (k, point) in points.iter().enumerate() {
+            let leg = legs.of_point(k);
+            let at = match (&sharp, &ends) {
+                (Some(sharp), _) if point.leg == LegKind::Via => sharp.via(leg).unwrap_or(0.0),
+                (_, Some(ends)) => ends[leg],
+                _ => 0.0,
+            };
+            waypoints.push(at);
+            let reached = sharp.as_ref().map_or(start, |sharp| sharp.at(at).position);
+            let position = match point.target {
+                Target::Joints(wanted) if point.leg != LegKind::Via => {
+                    same(&reached, &wanted).map_err(|e| e.at_waypoint(first + k))?;
+                    wanted
+                }
+                // A solution is exact to rounding only.
+                _ => std::array::from_fn(|j| {
+                    let (low, high) = kinematics.limits()[j];
+                    reached[j].clamp(low, high)
+                }),
+            };
+            self.positions.push(position);
+        }
+        match sharp {
+            None => self.stay(points.len()),
+            Some(sharp) => {
+                let path = if blend > 0.0 { path(blend).map_err(|e| legs.numbered(e))? } else { sharp };
+                self.push(Way::Flange(Box::new(path)), &waypoints);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Legs of the flange, and the numbers (from 1) of the waypoints that they lead to.
+struct Legs {
+    legs: Vec<Leg>,
+    ends: Vec<usize>,
+    /// Of the waypoint that the first leg leads to, or passes.
+    first: usize,
+}
+
+impl Legs {
+    /// Number of the leg, from 1, that the point with this index is on.
+    fn of_point(&self, index: usize) -> usize {
+        self.ends.partition_point(|end| *end < self.first + index) + 1
+    }
+
+    /// An error of these legs, with the numbers of the route.
+    fn numbered(&self, error: PoseError) -> PoseError {
+        let end = |leg: usize| leg.checked_sub(1).and_then(|i| self.ends.get(i)).copied();
+        match error {
+            PoseError::Waypoint { waypoint, source } => {
+                let before = self.first.saturating_sub(1);
+                PoseError::Waypoint { waypoint: end(waypoint.saturating_sub(1)).unwrap_or(before), source }
+            }
+            PoseError::Leg { leg, distance, length, source } => {
+                let leg = end(leg).map_or(leg, |end| end.saturating_sub(1));
+                PoseError::Leg { leg, distance, length, source }
+            }
+            other => other,
+        }
+    }
+}
+
+/// The legs to points of which the first has the number `first`.
+fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<Legs, PoseError> {
+    let (mut legs, mut ends, mut via) = (Vec::new(), Vec::new(), None);
+    for (k, point) in points.iter().enumerate() {
+        let number = first + k;
+        let to = match point.target {
+            Target::Joints(q) => {
+                one(kinematics, &point.target, &q).map_err(|e| e.at_waypoint(number))?;
+                kinematics.flange(&q)
+            }
+            Target::Flange(pose) => pose,
+        };
+        let leg = match (point.leg, via.take()) {
+            (LegKind::Via, None) => {
+                via = Some(to.position);
+                continue;
+            }
+            (LegKind::Arc, Some(via)) => Leg::Arc { via, to },
+            (LegKind::Arc, None) => return Err(PoseError::NoVia.at_waypoint(number)),
+            (_, Some(_)) => return Err(PoseError::NoArc.at_waypoint(number - 1)),
+            (LegKind::Line | LegKind::Joint, None) => Leg::Line { to },
+        };
+        legs.push(leg);
+        ends.push(number);
+    }
+    if via.is_some() {
+        return Err(PoseError::NoArc.at_waypoint(first + points.len() - 1));
+    }
+    Ok(Legs { legs, ends, first })
+}
+
+/// Whether the arm is at the joint positions wanted, and not in another configuration.
+fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
+    let away = |joint: &Joint| (reached[joint.index()] - wanted[joint.index()]).abs();
+    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
+    match furthest {
+        Some(joint) if away(&joint) > SAME => Err(PoseError::Configuration {
+            joint,
+            value: reached[joint.index()],
+            wanted: wanted[joint.index()],
+        }),
+        _ => Ok(()),
+    }
+}
+
+impl Path for Route {
+    fn end(&self) -> f64 {
+        self.end
+    }
+
+    fn at(&self, s: f64) -> PathPoint {
+        let section = self.section(s);
+        section.way.path().at(section.own(s))
+    }
+
+    fn waypoint(&self, s: f64) -> Option<usize> {
+        Some(self.waypoints.partition_point(|&at| at <= s).max(1))
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        let marks = self.sections.iter().flat_map(|section| &section.marks).map(|mark| mark.0);
+        let mut all: Vec<f64> = marks.filter(|s| *s > 0.0 && *s < self.end).collect();
+        all.dedup();
+        all
+    }
+
+    fn stops(&self) -> Vec<f64> {
+        let mut all = Vec::new();
+        for section in &self.sections {
+            all.push(section.begin);
+            all.extend(section.way.path().stops().iter().map(|own| section.begin + own));
+        }
+        all.retain(|s| *s > 0.0);
+        all
+    }
+
+    fn waypoints(&self) -> Vec<f64> {
+        self.waypoints.clone()
+    }
+}
+
+impl Waypointed for Route {
+    fn is_one_place(&self, from: usize, to: usize) -> bool {
+        self.waypoints[from] == self.waypoints[to]
+    }
+
+    fn stops_at(&self, waypoint: usize) -> bool {
+        let s = self.waypoints[waypoint];
+        s == 0.0 || s == self.end || self.stops().contains(&s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jtc_dynamics::JOINTS;
+
+    /// Whatever is asked for on one side of a place where the form changes is on that side of the part, too.
+    #[test]
+    fn rounding_does_not_lead_across_a_mark() {
+        let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];
+        for begin in [0.0, 0.1, 1.3, 2.0 / 3.0, 77.7] {
+            let section = Section::new(Way::Joint(BlendedPath::new(&ends, 0.0).unwrap()), begin);
+            for (at, own) in section.marks.clone() {
+                assert_eq!(section.own(at), own);
+                if own > 0.0 {
+                    assert!(section.own(at.next_down()) < own);
+                }
+                if own < section.way.path().end() {
+                    assert!(section.own(at.next_up()) > own);
+                }
+            }
+        }
+    }
+}

@@ -140,19 +140,21 @@ pub enum Command {
         after_help = "A waypoint file is CSV with the columns q1..q6 (rad) or q1_deg..q6_deg, `pose` (a name from the arm file), or\n\
                             x,y,z (m) with qx,qy,qz,qw or roll,pitch,yaw of the flange, and `t` (s) where times are given; or JSON with\n\
                             the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
-                            the corners. Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and\n\
-                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
+                            the corners. Legs are straight in joint space; with --line, or where the column `leg` asks for it, the flange\n\
+                            keeps to straight lines and arcs, and --blend-m rounds their corners.\n\
+                            Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
                             jtc plan waypoints.csv -o cycle.csv\n  jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
+                            jtc plan poses-of-flange.csv -o lines.csv --line --blend-m 0.02\n  \
                             jtc plan cycle.json --arm my-arm.toml -o cycle.csv --payload 2,0,0,0.08"
     )]
     Plan(PlanArgs),
-    /// Move to joint positions or to a pose of the arm file, from where the arm is
+    /// Move to joint positions, a pose of the arm file or one of the flange, from where the arm is
     #[command(
-        after_help = "Straight in joint space, within the limits of velocity, acceleration, jerk and torque, checked before anything is\n\
-                            sent; nobody looks for obstacles. It runs and ends as `jtc traj run` does: on a terminal space pauses and resumes,\n\
-                            s stops, + and - change the speed; Ctrl-C stops on the path.\n\nExamples:\n  \
+        after_help = "Straight in joint space, or with --line so that the flange keeps to a straight line, within the limits of velocity,\n\
+                            acceleration, jerk and torque, checked before anything is sent; nobody looks for obstacles. It runs and ends as\n\
+                            `jtc traj run` does: on a terminal space pauses and resumes, s stops, + and - change the speed; Ctrl-C stops on the path.\n\nExamples:\n  \
                             jtc move --to home --arm my-arm.toml\n  jtc move --to 0,0.5,-1,0,0.5,0\n  \
-                            jtc move --to 0,30,-60,0,30,0 --deg --speed 20"
+                            jtc move --to 0,30,-60,0,30,0 --deg --speed 20\n  jtc move --to-flange 0.6,0.3,0.4,0,0,0 --line --speed 20"
     )]
     Move(MoveArgs),
     /// Named positions in the arm file

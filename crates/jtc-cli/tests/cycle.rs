@@ -20,7 +20,9 @@ const PAGE: &str = "from-two-poses-to-a-cycle.md";
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
-    Printed { code: seen.code, text: seen.text.lines().map(measured).collect() }
+    // The head of a table is as wide as its figures, which are left out.
+    let lines = seen.text.lines().filter(|line| !line.contains("peak rad/s"));
+    Printed { code: seen.code, text: lines.map(measured).collect() }
 }
 
 /// The same where no figure differs from run to run.
@@ -60,6 +62,7 @@ fn the_page_shows_what_its_commands_print() {
     done(&desk, "jtc recover --defaults");
     poses(&desk);
     plan(&desk);
+    lines(&desk);
     runs(&desk);
     broken_off();
     taught();
@@ -98,6 +101,28 @@ fn plan(desk: &Desk) {
         // The poses of the first one were measured.
         let printed = if command.contains("poses.csv") { done(desk, command) } else { exact(desk, command) };
         page.case(title, command, &printed);
+    }
+    page.finish();
+}
+
+fn lines(desk: &Desk) {
+    let mut page = Page::new(PAGE, "lines");
+    for (title, command) in [
+        (
+            "Two poses of the flange",
+            "printf 'x,y,z,roll,pitch,yaw\\n0.6,-0.3,0.4,0,0,0\\n0.6,0.3,0.4,0,0,0\\n' > poses-of-flange.csv; jtc plan poses-of-flange.csv -o across.csv",
+        ),
+        ("On the line", "jtc plan poses-of-flange.csv -o line.csv --line"),
+    ] {
+        page.case(title, command, &exact(desk, command));
+    }
+    let moves = [
+        ("To its beginning", "jtc move --to-flange 0.6,-0.3,0.4,0,0,0"),
+        ("The same without a file", "jtc move --to-flange 0.6,0.3,0.4,0,0,0 --line"),
+        ("Back to where the other motions begin", "jtc move --to home --arm my-arm.toml"),
+    ];
+    for (title, command) in moves {
+        page.case(title, command, &done(desk, command));
     }
     page.finish();
 }

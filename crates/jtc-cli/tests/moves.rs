@@ -33,6 +33,64 @@ fn at(sim: &Sim, q: [f64; 6]) {
     }
 }
 
+/// To a pose of the flange in joint space, and from there on a straight line; what cannot be is refused before anything moves.
+#[test]
+fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
+    let sim = ready();
+    let record = sim.path("line.csv");
+    sim.json(&["move", "--to-flange", "0.6,-0.2,0.4,0,0,0", "--speed", "100"], 0);
+    let words = [
+        "move",
+        "--to-flange",
+        "0.6,0.2,0.4,0,0,10",
+        "--deg",
+        "--line",
+        "--speed",
+        "100",
+        "--record",
+        &record,
+    ];
+    sim.json(&words, 0);
+    let kinematics = {
+        use jtc_host::{Arm, plan::kinematics::Kinematics};
+        Kinematics::new(&Arm::avena().model, &[(0.0, 0.0); 6])
+    };
+    let flange = |q: &[f64]| kinematics.flange(&std::array::from_fn(|j| q[j]));
+    let there = flange(&place(&sim));
+    assert!((there.position[1] - 0.2).abs() < 3e-3, "{there:?}");
+    assert!((there.rotation[1][0] - 10f64.to_radians().sin()).abs() < 5e-3, "{there:?}");
+    // What was commanded on the way.
+    let text = std::fs::read_to_string(&record).unwrap();
+    let mut lines = text.lines().skip_while(|line| !line.contains("set_position_rad"));
+    let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let columns: Vec<usize> = (0..head.len()).filter(|i| head[*i].contains("set_position_rad")).collect();
+    assert_eq!(columns.len(), 6, "{head:?}");
+    let mut passed = 0;
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        let q: Vec<f64> = columns.iter().filter_map(|i| cells[*i].parse().ok()).collect();
+        let [x, y, z] = if q.len() == 6 { flange(&q).position } else { continue };
+        // The place where the arm stood before is known as it was measured.
+        assert!((x - 0.6).abs() < 3e-3 && (z - 0.4).abs() < 3e-3, "{x} {y} {z}");
+        passed += usize::from(y.abs() < 0.1);
+    }
+    assert!(passed > 5, "{passed} places on the way");
+    let before = place(&sim);
+    for (words, code, message) in [
+        (vec!["--to-flange", "2,0,0.4,0,0,0"], 4, "no move to 2,0,0.4,0,0,0: out of reach"),
+        (vec!["--to-flange", "2,0,0.4,0,0,0", "--line"], 4, "out of reach"),
+        (vec!["--to", "0,0,0,0,0,0", "--line"], 4, "nothing was sent"),
+        (vec!["--to-flange", "1,2,3"], 2, "3 numbers, not 6"),
+        (vec!["--line"], 2, "--to"),
+    ] {
+        let output = sim.jtc(&[&["move"], &words[..]].concat()).ends(code);
+        assert!(output.err.contains(message), "{words:?}: {}", output.err);
+    }
+    for (a, b) in place(&sim).iter().zip(before) {
+        assert!((a - b).abs() < 1e-3);
+    }
+}
+
 #[test]
 fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     let sim = ready();

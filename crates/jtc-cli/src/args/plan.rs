@@ -19,6 +19,12 @@ pub struct PlanArgs {
     /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each
     #[arg(long, env = "JTC_BLEND", value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
+    /// The flange keeps to a straight line on each leg of which the file does not say how the arm moves
+    #[arg(long, env = "JTC_LINE", value_parser = FalseyValueParser::new())]
+    pub line: bool,
+    /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there
+    #[arg(long, env = "JTC_BLEND_M", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub blend_m: f64,
     /// Speed in percent of what the limits allow, 1 to 100
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
@@ -54,9 +60,29 @@ pub struct PlanArgs {
 #[derive(Args, Debug)]
 pub struct MoveArgs {
     /// Joint positions, rad, or the name of a pose of the arm file
-    #[arg(long, env = "JTC_TO", value_name = "Q1,…,Q6|NAME", value_parser = target, allow_hyphen_values = true)]
-    pub to: Target,
-    /// The positions are degrees
+    #[arg(
+        long,
+        env = "JTC_TO",
+        value_name = "Q1,…,Q6|NAME",
+        value_parser = target,
+        allow_hyphen_values = true,
+        required_unless_present = "to_flange"
+    )]
+    pub to: Option<Target>,
+    /// A pose of the flange in the base frame instead: m, and roll, pitch and yaw in rad
+    #[arg(
+        long,
+        env = "JTC_TO_FLANGE",
+        value_name = "X,Y,Z,ROLL,PITCH,YAW",
+        value_parser = flange_pose,
+        allow_hyphen_values = true,
+        conflicts_with = "to"
+    )]
+    pub to_flange: Option<[f64; 6]>,
+    /// The flange keeps to a straight line
+    #[arg(long, env = "JTC_LINE", value_parser = FalseyValueParser::new())]
+    pub line: bool,
+    /// The positions, or roll, pitch and yaw, are degrees
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
     pub deg: bool,
     /// Speed in percent of what the limits allow, 1 to 100
@@ -88,16 +114,26 @@ fn target(text: &str) -> Result<Target, String> {
     if !text.contains(',') && text.parse::<f64>().is_err() && !text.is_empty() {
         return Ok(Target::Pose(text.to_owned()));
     }
+    let joints = numbers(text)?.try_into().map_err(|all: Vec<f64>| {
+        let count = all.len();
+        format!("{count} numbers, not 6: one for each joint, with commas between them and without blanks")
+    })?;
+    Ok(Target::Joints(joints))
+}
+
+/// Six numbers with commas between them.
+fn flange_pose(text: &str) -> Result<[f64; 6], String> {
+    numbers(text)?.try_into().map_err(|all: Vec<f64>| {
+        format!("{} numbers, not 6: x, y, z in m, roll, pitch and yaw, with commas between them", all.len())
+    })
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| {
         let number = word.trim().parse::<f64>().ok().filter(|number| number.is_finite());
         number.ok_or_else(|| format!("'{}' is no number", word.trim()))
     };
-    let all = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
-    let count = all.len();
-    let joints = all.try_into().map_err(|_| {
-        format!("{count} numbers, not 6: one for each joint, with commas between them and without blanks")
-    })?;
-    Ok(Target::Joints(joints))
+    text.split(',').map(number).collect()
 }
 
 /// `jtc pose …`

@@ -2,6 +2,7 @@
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
+use jtc_host::plan::kinematics::{self, Orientation};
 use jtc_host::plan::{COLD, PlanError, Planner};
 
 use super::job::{Job, typed};
@@ -13,9 +14,10 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if !(1.0..=100.0).contains(&args.speed) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent: args.speed, most: 100.0 }));
     }
-    let name = match &args.to {
-        Target::Pose(name) => name.clone(),
-        Target::Joints(q) => q.map(|v| format!("{v}")).join(","),
+    let (name, option) = match (&args.to, &args.to_flange) {
+        (Some(Target::Pose(name)), _) => (name.clone(), "--to"),
+        (Some(Target::Joints(q)), _) => (q.map(|v| format!("{v}")).join(","), "--to"),
+        (None, pose) => (pose.unwrap_or_default().map(|v| format!("{v}")).join(","), "--to-flange"),
     };
     let course = Course {
         link: args.link.clone(),
@@ -30,7 +32,9 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         points_per_segment: None,
         repeat: 1,
     };
-    let words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
+    let line = if args.line { " --line" } else { "" };
+    let words = line.to_owned()
+        + &args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
     let arm = args
         .arm
         .as_deref()
@@ -38,17 +42,14 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         .transpose()
         .map_err(Failure::nothing_sent)?
         .unwrap_or_else(Arm::avena);
-    let target = match &args.to {
-        Target::Joints(q) if args.deg => q.map(f64::to_radians),
-        Target::Joints(q) => *q,
-        Target::Pose(name) => arm.pose(name).map_err(Failure::nothing_sent)?,
-    };
+    let target = target(args, &arm)?;
     let mut make = |job: &mut Job, status: &jtc_wire::Status| {
         let friction = job.arm.friction();
         let temperature = coldest(status);
         let planner = Planner { speed_pct: args.speed, temperature, ..job.planner(friction.as_ref()) };
         // The start is where the arm stands, the end what was asked for.
-        let planned = planner.to(&status.positions(), &target).map_err(|e| refused(&e, &name))?;
+        let planned = planner.to_target(&job.arm.model, &status.positions(), &target, args.line);
+        let planned = planned.map_err(|e| refused(&e, &name))?;
         for note in &planned.notes {
             out.note(format!("note: {note}"));
         }
@@ -56,8 +57,24 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         job.take(planned.trajectory);
         Ok(())
     };
-    let load = |out: &Output| Ok(Job::made(arm, format!("move --to {name}{words}"), out));
+    let load = |out: &Output| Ok(Job::made(arm, format!("move {option} {name}{words}"), out));
     perform(&course, load, Some(&mut make), out)
+}
+
+/// Where the move leads.
+fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
+    let joints = match (&args.to, args.to_flange) {
+        (Some(Target::Joints(q)), _) if args.deg => q.map(f64::to_radians),
+        (Some(Target::Joints(q)), _) => *q,
+        (Some(Target::Pose(name)), _) => arm.pose(name).map_err(Failure::nothing_sent)?,
+        (None, pose) => {
+            let [x, y, z, angles @ ..] = pose.unwrap_or_default();
+            let angles = if args.deg { angles.map(f64::to_radians) } else { angles };
+            let pose = Orientation::Rpy(angles).at([x, y, z]).map_err(|e| Failure::usage(e.to_string()))?;
+            return Ok(kinematics::Target::Flange(pose));
+        }
+    };
+    Ok(kinematics::Target::Joints(joints))
 }
 
 /// The lowest bearing temperature that is measured, °C, and no less than that of a cold hall where some are not.
@@ -74,5 +91,9 @@ fn refused(error: &PlanError, name: &str) -> Failure {
         &format!("{name}, "),
         1,
     );
+    let message = message
+        .replacen("waypoint 1: ", "where the arm stands: ", 1)
+        .replacen("waypoint 2: ", "", 1)
+        .replacen("leg 1 (to waypoint 2), ", "", 1);
     Failure::nothing_sent(Failure { message: format!("no move to {name}: {message}"), ..failure })
 }

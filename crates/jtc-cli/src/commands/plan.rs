@@ -6,9 +6,10 @@ use cli_kit::{Failure, Output, OutputFile, figure, table};
 use jtc_core::{Config, JOINTS};
 use jtc_dynamics::Dynamics;
 use jtc_host::arm::Arm;
-use jtc_host::plan::{Bound, PlanError, Planned, Planner};
+use jtc_host::plan::kinematics::Route;
+use jtc_host::plan::{Bound, PlanError, Planned, Planner, Waypoint, furthest_aside};
 use jtc_host::report::{Facts, ReportInput, html};
-use jtc_host::waypoints::WaypointFile;
+use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_host::{JointSample, Point, Sample};
 use jtc_wire::{ControllerState, Joint, TrajectoryState};
 use serde_json::json;
@@ -19,6 +20,11 @@ use crate::args::PlanArgs;
 
 /// Rows of the page that list what binds.
 const ROWS_MAX: usize = 200;
+
+/// How far the flange may leave a straight line without a word, m.
+const ASIDE_M: f64 = 5e-4;
+/// A blend for corners that are not there.
+const NO_LINES: &str = "--blend-m rounds the corners between lines and arcs, and this motion has none: give --line, or a column `leg`";
 
 /// Plans, checks and writes.
 pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
@@ -31,7 +37,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     }
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    let waypoints = file.positions(&arm)?;
+    // Before anything is opened: a line that cannot be leaves no file.
+    let way = Way::of(&file, &arm, args)?;
     let mut inputs: Vec<&Path> = vec![&args.file];
     inputs.extend(args.arm.as_deref());
     let trajectory = OutputFile::open(&args.out, args.force.force, &inputs)?;
@@ -49,7 +56,11 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         jerk: !args.no_jerk_limit,
         ..Planner::new(&config)
     };
-    let planned = planner.through(&waypoints).map_err(|e| located(e, &file))?;
+    let mut planned = way.planned(&planner).map_err(|e| located(e, &file))?;
+    planned.notes.extend(off_the_line(&planned, &file, &arm, args));
+    if args.blend_m > 0.0 && matches!(way, Way::Joints(_)) {
+        planned.notes.push(NO_LINES.to_owned());
+    }
     for note in &planned.notes {
         out.note(format!("note: {note}"));
     }
@@ -60,8 +71,62 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if let Some(page) = page {
         page.write(report(&planned, &arm, &config, args))?;
     }
-    print(&planned, waypoints.len(), args, out);
+    print(&planned, file.waypoints.len(), args, out);
     Ok(())
+}
+
+/// What a plan leads through.
+enum Way {
+    Joints(Vec<Waypoint>),
+    /// Of these the one that is passed the fastest, with the times of the waypoints.
+    Lines(Vec<Route>, Vec<Option<f64>>),
+}
+
+impl Way {
+    fn of(file: &WaypointFile, arm: &Arm, args: &PlanArgs) -> Result<Self, Failure> {
+        if !file.has_lines(args.line) {
+            return Ok(Self::Joints(file.positions(arm)?));
+        }
+        let route = |blend_m: f64| match file.route(arm, args.line, (args.blend, blend_m)) {
+            Err(WaypointError::Route(e)) => Err(located(e, file)),
+            other => Ok(other?),
+        };
+        let (rounded, times) = route(args.blend_m)?;
+        // A stop is within every blend, and beside a sharp corner it may be faster than a small one.
+        let sharp = if args.blend_m > 0.0 { Some(route(0.0)?.0) } else { None };
+        Ok(Self::Lines([rounded].into_iter().chain(sharp).collect(), times))
+    }
+
+    fn planned(&self, planner: &Planner) -> Result<Planned, PlanError> {
+        let (routes, times) = match self {
+            Self::Joints(waypoints) => return planner.through(waypoints),
+            Self::Lines(routes, times) => (routes, times),
+        };
+        let seconds = |planned: &Planned| planned.trajectory.duration_s();
+        let mut fastest = None::<Result<Planned, PlanError>>;
+        for route in routes {
+            let planned = planner.on_route(route, times);
+            fastest = match (fastest, planned) {
+                (Some(Ok(before)), Ok(planned)) if seconds(&planned) < seconds(&before) => Some(Ok(planned)),
+                (Some(Err(_)) | None, planned) => Some(planned),
+                (before, _) => before,
+            };
+        }
+        fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
+    }
+}
+
+/// That the flange leaves the straight line between two of its poses.
+fn off_the_line(planned: &Planned, file: &WaypointFile, arm: &Arm, args: &PlanArgs) -> Option<String> {
+    // With the option a leg in joint space is one that was asked for.
+    let legs = if args.line { Vec::new() } else { file.legs_between_flange_poses() };
+    let aside = furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)?;
+    let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
+    Some(format!(
+        "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are straight in joint space; `--line`, \
+         or `line` in a column `leg`, keeps it on the line",
+        to - 1
+    ))
 }
 
 /// With the lines of the file that waypoints stand in.
@@ -160,7 +225,7 @@ fn report(planned: &Planned, arm: &Arm, config: &Config, args: &PlanArgs) -> Str
             "Points".to_owned(),
             format!("{} every {} ms", planned.trajectory.points.len(), planned.trajectory.step_ms),
         ),
-        ("Blend".to_owned(), format!("{} rad", args.blend)),
+        ("Blend".to_owned(), format!("{} rad, lines {} m", args.blend, args.blend_m)),
         ("Speed".to_owned(), format!("{} % of what the limits allow", args.speed)),
     ];
     let notes = planned.notes.iter().map(|note| ("Note".to_owned(), note.clone()));

@@ -2,6 +2,7 @@
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::POINTS_MAX;
+use jtc_plan::kinematics;
 
 use crate::check::Verdict;
 
@@ -44,6 +45,9 @@ impl Diagnose for PlanError {
             Self::Plan(
                 e @ (Of::TooFew { .. } | Of::NotFinite { .. } | Of::Blend { .. } | Of::Time { .. }),
             ) => Diagnosis::new(ErrorKind::Usage, "waypoints", e.hint()),
+            Self::Plan(Of::Flange(e @ kinematics::PoseError::Blend { .. })) => {
+                Diagnosis::new(ErrorKind::Usage, "waypoints", e.hint())
+            }
             Self::Plan(e) => Diagnosis::new(ErrorKind::Refused, "plan", e.hint()),
             Self::Refused(verdict) => {
                 let what = "choose other waypoints or poses: less stretched out, or nearer to each other; or carry a lighter payload";

@@ -17,6 +17,7 @@
 //! ```
 
 mod error;
+mod lines;
 mod rest_of;
 mod sampled;
 mod speed;
@@ -25,11 +26,13 @@ mod tests;
 
 use jtc_core::{Config, Friction, JOINTS};
 use jtc_dynamics::ArmModel;
-use jtc_plan::{ArmDynamics, Limits, Motion, Waypoint};
+use jtc_plan::{ArmDynamics, Limits, Motion};
+pub use jtc_plan::{Waypoint, kinematics};
 use jtc_wire::Joint;
 use serde::Serialize;
 
 pub use error::PlanError;
+pub use lines::{Aside, furthest_aside};
 pub use rest_of::{Standstill, rest_of, where_it_stands};
 pub use speed::at_speed;
 pub(crate) use speed::set_point;

@@ -1,13 +1,14 @@
-//! Waypoints as a table with a header: `t`, `pose`, `q1`..`q6` or `q1_deg`..`q6_deg`.
+//! Waypoints as a table with a header: `t`, `pose`, `leg`, `q1`..`q6` or `q1_deg`..`q6_deg`.
 
 use jtc_core::JOINTS;
+use jtc_plan::kinematics::LegKind;
 
 use super::flange::{self, ANGLES, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, number, rows, short};
 
 /// What the columns are, in words.
-const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), and of the flange x, y, z (m) with \
+const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
 /// What a column holds.
@@ -15,6 +16,7 @@ const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name 
 enum Column {
     Time,
     Pose,
+    Leg,
     /// From 0.
     Joint(usize),
     /// From 0, in the order of the names.
@@ -27,6 +29,7 @@ struct Header {
     names: Vec<String>,
     time: Option<usize>,
     pose: Option<usize>,
+    leg: Option<usize>,
     joints: [Option<(usize, f64)>; JOINTS],
     flange: [Option<(usize, f64)>; NAMES.len()],
 }
@@ -56,6 +59,7 @@ fn column(name: &str) -> Option<(Column, f64)> {
     match name.as_str() {
         "t" | "t_s" | "time" | "time_s" => return Some((Column::Time, 1.0)),
         "pose" | "name" => return Some((Column::Pose, 1.0)),
+        "leg" => return Some((Column::Leg, 1.0)),
         _ => {}
     }
     let metres = name.strip_suffix("_m").unwrap_or(&name);
@@ -93,6 +97,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
         let before = match column {
             Column::Time => header.time.replace(i).is_some(),
             Column::Pose => header.pose.replace(i).is_some(),
+            Column::Leg => header.leg.replace(i).is_some(),
             Column::Joint(j) => header.joints[j].replace((i, unit)).is_some(),
             Column::Flange(k) => header.flange[k].replace((i, unit)).is_some(),
         };
@@ -121,6 +126,11 @@ impl Header {
             Some(i) if !cells[i].is_empty() => Some(value(i)?),
             _ => None,
         };
+        let leg = match self.leg {
+            Some(i) => super::leg_kind(cells[i].trim_matches('"'))
+                .map_err(|problem| FileError::at(Place::cell(line, i + 1).named(&self.names[i]), problem))?,
+            None => None,
+        };
         let name = self.pose.map(|i| (i, cells[i].trim_matches('"'))).filter(|(_, name)| !name.is_empty());
         let filled = |i: &usize| !cells[*i].is_empty();
         let joint = self.joints.iter().flatten().map(|(i, _)| *i).find(filled);
@@ -139,7 +149,9 @@ impl Header {
             }
             (None, Some(_), Some(at)) => return both("joint positions and a pose of the flange", at),
             (Some((at, name)), None, None) => (Target::Pose(name.to_owned()), Place::cell(line, at + 1)),
-            (None, None, Some(_)) => (self.flange(line, cells)?, Place::line(line)),
+            (None, None, Some(_)) => {
+                (self.flange(line, cells, leg == Some(LegKind::Via))?, Place::line(line))
+            }
             (None, None, None) if self.pose.is_some() || self.flange.iter().any(Option::is_some) => {
                 return Err(FileError::at(Place::line(line), "neither a pose nor positions"));
             }
@@ -151,11 +163,11 @@ impl Header {
                 (Target::Joints(position), Place::line(line))
             }
         };
-        Ok(FileWaypoint { target, time, place })
+        Ok(FileWaypoint { target, time, leg, place })
     }
 
-    /// A pose of the flange; cells that are empty are not given.
-    fn flange(&self, line: usize, cells: &[&str]) -> Result<Target, FileError> {
+    /// A pose of the flange, or the `point` alone; cells that are empty are not given.
+    fn flange(&self, line: usize, cells: &[&str], point: bool) -> Result<Target, FileError> {
         let mut given = [None; NAMES.len()];
         for (to, column) in given.iter_mut().zip(&self.flange) {
             if let Some((i, unit)) = column
@@ -165,6 +177,8 @@ impl Header {
             }
         }
         let wrong = |problem: String| FileError::at(Place::line(line), problem);
-        flange::target(&given).map_err(wrong)?.ok_or_else(|| wrong("neither a pose nor positions".into()))
+        flange::target(&given, point)
+            .map_err(wrong)?
+            .ok_or_else(|| wrong("neither a pose nor positions".into()))
     }
 }

@@ -9,12 +9,12 @@ pub(super) const NAMES: [&str; 10] = ["x", "y", "z", "qx", "qy", "qz", "qw", "ro
 /// Those that are angles.
 pub(super) const ANGLES: std::ops::Range<usize> = 7..10;
 
-/// The pose that these numbers are; `None` where none of them is given.
+/// The pose that these numbers are; `None` where none of them is given. Of a `point` the orientation does not count, and may be missing.
 ///
 /// # Errors
 ///
 /// What is missing, or twice there.
-pub(super) fn target(given: &[Option<f64>; NAMES.len()]) -> Result<Option<Target>, String> {
+pub(super) fn target(given: &[Option<f64>; NAMES.len()], point: bool) -> Result<Option<Target>, String> {
     let [x, y, z, qx, qy, qz, qw, roll, pitch, yaw] = *given;
     if given.iter().all(Option::is_none) {
         return Ok(None);
@@ -35,6 +35,7 @@ pub(super) fn target(given: &[Option<f64>; NAMES.len()]) -> Result<Option<Target
             (Some(qx), Some(qy), Some(qz), Some(qw)) => Orientation::Quaternion([qx, qy, qz, qw]),
             _ => return Err(missing(&[3, 4, 5, 6])),
         },
+        (false, false) if point => Orientation::Rpy([0.0; 3]),
         (false, _) => match (roll, pitch, yaw) {
             (Some(roll), Some(pitch), Some(yaw)) => Orientation::Rpy([roll, pitch, yaw]),
             _ => return Err(missing(&[7, 8, 9])),

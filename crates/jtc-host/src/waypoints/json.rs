@@ -1,6 +1,7 @@
 //! Waypoints as JSON: a list of objects with the keys of the table's header, alone or as `waypoints` of an object.
 
 use jtc_core::JOINTS;
+use jtc_plan::kinematics::LegKind;
 use serde::Deserialize;
 
 use super::flange::{self, NAMES};
@@ -18,6 +19,7 @@ struct Whole {
 struct Entry {
     t: Option<f64>,
     pose: Option<String>,
+    leg: Option<String>,
     q1: Option<f64>,
     q2: Option<f64>,
     q3: Option<f64>,
@@ -92,6 +94,10 @@ impl Entry {
     fn waypoint(self, number: usize) -> Result<FileWaypoint, FileError> {
         let place = Place::name(format!("waypoint {number}"));
         let wrong = |problem: String| Err(FileError::at(place.clone(), problem));
+        let leg = match super::leg_kind(self.leg.as_deref().unwrap_or_default()) {
+            Ok(leg) => leg,
+            Err(problem) => return wrong(problem),
+        };
         let mut position = [0.0; JOINTS];
         let (mut given, mut missing) = (0, None);
         for (j, pair) in self.radians().into_iter().zip(self.degrees()).enumerate() {
@@ -106,7 +112,7 @@ impl Entry {
             };
             given += 1;
         }
-        let of_flange = match flange::target(&self.flange()) {
+        let of_flange = match flange::target(&self.flange(), leg == Some(LegKind::Via)) {
             Ok(target) => target,
             Err(problem) => return wrong(problem),
         };
@@ -120,6 +126,6 @@ impl Entry {
             (None, None, _, Some(joint)) => return wrong(format!("q{joint} is missing")),
             (None, None, _, None) => Target::Joints(position),
         };
-        Ok(FileWaypoint { target, time: self.t, place })
+        Ok(FileWaypoint { target, time: self.t, leg, place })
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose of the flange
 //! in the base frame (m, with a quaternion or roll, pitch and yaw), of which the joint positions nearest to the waypoint before are
-//! taken. Times are s from the first waypoint. The forms are CSV with a header and JSON with the same keys:
+//! taken. `leg` is how the arm gets there: straight in joint space, or with the flange on a [line or an arc](LegKind). Times are s from the first waypoint. The forms are CSV with a header and JSON with the same keys:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -24,12 +24,13 @@ use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
-use jtc_plan::kinematics::{self, Kinematics, Orientation};
+use jtc_plan::kinematics::{self, Kinematics, LegKind, Orientation, Route, RoutePoint};
 
 pub use thinned::thinned;
 
 use crate::arm::{Arm, PoseError};
-use crate::file::{FileError, Place, read_text};
+use crate::file::{FileError, Place, read_text, short};
+use crate::plan::PlanError;
 
 /// Most waypoints of a file.
 pub const WAYPOINTS_MAX: usize = 10_000;
@@ -52,6 +53,8 @@ pub struct FileWaypoint {
     pub target: Target,
     /// When to be there, s from the first waypoint; `None`: as soon as the limits allow.
     pub time: Option<f64>,
+    /// How the arm gets there from the waypoint before, where the file says it.
+    pub leg: Option<LegKind>,
     /// Where it stands in the file.
     pub place: Place,
 }
@@ -93,6 +96,9 @@ pub enum WaypointError {
         /// Why not.
         source: Box<kinematics::PoseError>,
     },
+    /// There is no such way through them; the number of the waypoint is in it.
+    #[error(transparent)]
+    Route(#[from] PlanError),
 }
 
 impl Diagnose for WaypointError {
@@ -100,6 +106,7 @@ impl Diagnose for WaypointError {
         match self {
             Self::File(e) => e.diagnosis(),
             Self::Pose { source, .. } => source.diagnosis(),
+            Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => Diagnosis::new(ErrorKind::Refused, "flange-pose", source.hint()),
         }
     }
@@ -132,7 +139,44 @@ impl WaypointFile {
             );
             return Err(FileError::form(problem));
         }
+        file.check_arcs()?;
         Ok(file)
+    }
+
+    /// A point on the way of an arc has the arc's end behind it, and that has such a point before it.
+    fn check_arcs(&self) -> Result<(), FileError> {
+        let kind = |i: usize| self.waypoints.get(i).and_then(|w| w.leg);
+        for (i, waypoint) in self.waypoints.iter().enumerate() {
+            let before = i.checked_sub(1).and_then(kind);
+            let problem = match waypoint.leg {
+                Some(leg @ (LegKind::Via | LegKind::Arc)) if i == 0 => {
+                    let word = leg_word(leg);
+                    format!("`{word}` for the first waypoint: a motion begins there, and no arc leads to it")
+                }
+                Some(LegKind::Via) if kind(i + 1) != Some(LegKind::Arc) => {
+                    "`via`, a point on the way of an arc, and the waypoint behind it is not `arc`, the end of one".into()
+                }
+                Some(LegKind::Arc) if before != Some(LegKind::Via) => {
+                    "`arc`, and the waypoint before it is not `via`, the point that the arc passes".into()
+                }
+                _ => continue,
+            };
+            return Err(FileError::at(waypoint.place.clone(), problem));
+        }
+        Ok(())
+    }
+
+    /// Whether the flange is to keep to a line or an arc somewhere; `line`: legs of which the file does not say how are lines.
+    pub fn has_lines(&self, line: bool) -> bool {
+        let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
+        self.waypoints.iter().skip(1).any(is_line)
+    }
+
+    /// Indices of the waypoints to which a leg in joint space leads from one pose of the flange to another.
+    pub fn legs_between_flange_poses(&self) -> Vec<usize> {
+        let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
+        let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
+        (1..self.waypoints.len()).filter(|&i| is_joint(i) && by_flange(i - 1) && by_flange(i)).collect()
     }
 
     /// The same numbers as degrees.
@@ -177,6 +221,56 @@ impl WaypointFile {
         Ok(found)
     }
 
+    /// The waypoints as a route, for [`Planner::on_route`](crate::plan::Planner::on_route), and their times; `line`: legs of which the file
+    /// does not say how are lines. `blends` are those of [`Route::new`].
+    ///
+    /// # Errors
+    ///
+    /// As [`positions`](Self::positions); [`WaypointError::Route`] for a line or an arc that cannot be.
+    pub fn route(
+        &self,
+        arm: &Arm,
+        line: bool,
+        blends: (f64, f64),
+    ) -> Result<(Route, Vec<Option<f64>>), WaypointError> {
+        let start = self.waypoints.first().and_then(|w| w.time).unwrap_or(0.0);
+        let config = arm.config();
+        let limits = std::array::from_fn(|j| config.position_range(j));
+        let kinematics = Kinematics::new(&arm.model, &limits);
+        let default = if line { LegKind::Line } else { LegKind::Joint };
+        let points = self
+            .waypoints
+            .iter()
+            .map(|w| Ok(RoutePoint { target: self.target(w, arm)?, leg: w.leg.unwrap_or(default) }));
+        let points = points.collect::<Result<Vec<_>, WaypointError>>()?;
+        let near = limits.map(|(low, high)| 0f64.clamp(low, high));
+        let route =
+            Route::new(&kinematics, &points, &near, blends).map_err(|e| WaypointError::Route(e.into()))?;
+        Ok((route, self.waypoints.iter().map(|w| w.time.map(|t| t - start)).collect()))
+    }
+
+    /// Where the waypoint is, of this arm.
+    fn target(&self, waypoint: &FileWaypoint, arm: &Arm) -> Result<kinematics::Target, WaypointError> {
+        let (path, place) = (self.path.clone(), waypoint.place.clone());
+        Ok(match &waypoint.target {
+            Target::Joints(q) => kinematics::Target::Joints(*q),
+            Target::Pose(name) => {
+                kinematics::Target::Joints(arm.pose(name).map_err(|source| WaypointError::Pose {
+                    path,
+                    place,
+                    source: Box::new(source),
+                })?)
+            }
+            Target::Flange(position, orientation) => kinematics::Target::Flange(
+                orientation.at(*position).map_err(|source| WaypointError::Flange {
+                    path,
+                    place,
+                    source: Box::new(source),
+                })?,
+            ),
+        })
+    }
+
     fn position(
         &self,
         waypoint: &FileWaypoint,
@@ -203,6 +297,31 @@ impl WaypointFile {
     pub fn place_of(&self, number: usize) -> Option<String> {
         let waypoint = self.waypoints.get(number.checked_sub(1)?)?;
         Some(format!("{}{}", self.path.display(), waypoint.place))
+    }
+}
+
+/// How the arm gets to a waypoint, by the word in a file; `None`: the file does not say it.
+///
+/// # Errors
+///
+/// A word that is none of them.
+fn leg_kind(word: &str) -> Result<Option<LegKind>, String> {
+    Ok(Some(match word.to_ascii_lowercase().as_str() {
+        "" => return Ok(None),
+        "joint" => LegKind::Joint,
+        "line" => LegKind::Line,
+        "via" => LegKind::Via,
+        "arc" => LegKind::Arc,
+        _ => return Err(format!("\"{}\" is no leg; known: joint, line, via, arc", short(word))),
+    }))
+}
+
+fn leg_word(leg: LegKind) -> &'static str {
+    match leg {
+        LegKind::Joint => "joint",
+        LegKind::Line => "line",
+        LegKind::Via => "via",
+        LegKind::Arc => "arc",
     }
 }
 

@@ -1,0 +1,133 @@
+//! Motions with the flange on lines and arcs, and how far others leave the line.
+
+use jtc_core::{JOINTS, SetPoint, interpolate};
+use jtc_dynamics::ArmModel;
+use jtc_plan::kinematics::{Kinematics, LegKind, Route, RoutePoint, Target};
+use jtc_plan::{Limits, on_route};
+
+use super::{PlanError, Planned, Planner, set_point};
+use crate::trajectory::Trajectory;
+
+/// How far the flange may be from its line between two points of a trajectory, m.
+const ASIDE_M: f64 = 1e-4;
+/// Places looked at between two points.
+const PARTS: usize = 4;
+
+/// How far a leg in joint space leaves the straight line between its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aside {
+    /// Waypoint that the leg leads to, from 1.
+    pub waypoint: usize,
+    /// Distance of the flange from the line where it is furthest, m.
+    pub distance_m: f64,
+}
+
+impl Planner<'_> {
+    /// Through the waypoints of a route, from rest to rest, straight in joint space or with the flange on lines and arcs. Times that are
+    /// given are kept.
+    ///
+    /// # Errors
+    ///
+    /// As [`Planner::through`].
+    pub fn on_route(&self, route: &Route, times: &[Option<f64>]) -> Result<Planned, PlanError> {
+        self.along_route(route, times, None)
+    }
+
+    /// From where the arm is at rest (rad) to `target`, straight in joint space or with the flange on a straight line.
+    ///
+    /// # Errors
+    ///
+    /// As [`Planner::to`]; [`PlanError::Plan`] for a pose that the arm does not reach, or a line that cannot be.
+    pub fn to_target(
+        &self,
+        model: &ArmModel,
+        from: &[f64; JOINTS],
+        target: &Target,
+        line: bool,
+    ) -> Result<Planned, PlanError> {
+        let kinematics = Kinematics::new(model, &Limits::of(self.config).position);
+        if line {
+            let start = RoutePoint { target: Target::Joints(*from), leg: LegKind::Line };
+            let points = [start, RoutePoint { target: *target, leg: LegKind::Line }];
+            let route = Route::new(&kinematics, &points, from, (0.0, 0.0))?;
+            return self.along_route(&route, &[], Some(*from));
+        }
+        let to = match target {
+            Target::Joints(to) => *to,
+            Target::Flange(pose) => kinematics.solve(pose, from).map_err(jtc_plan::PlanError::from)?,
+        };
+        self.to(from, &to)
+    }
+
+    fn along_route(
+        &self,
+        route: &Route,
+        times: &[Option<f64>],
+        start: Option<[f64; JOINTS]>,
+    ) -> Result<Planned, PlanError> {
+        let (limits, arm) = (self.limits(route.positions())?, self.dynamics());
+        let motion = on_route(route, times, &limits, arm.as_ref())?;
+        let first = route.positions().first().copied().unwrap_or_default();
+        let timed = times.iter().skip(1).any(Option::is_some);
+        let planned = self.checked(&motion, &first, start, timed)?;
+        let seconds = planned.trajectory.duration_s();
+        let scale = if timed { 1.0 } else { seconds / motion.duration() };
+        if let Some(model) = self.model
+            && between_points(&planned.trajectory, model, |t| motion.at(t / scale).position) > ASIDE_M
+        {
+            return Err(PlanError::TooLong { seconds });
+        }
+        Ok(planned)
+    }
+}
+
+/// How far the flange is from its way, where the controller computes it between two points (J-32), m. Where it is ahead or behind on its way does
+/// not count.
+fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -> [f64; JOINTS]) -> f64 {
+    const MOMENT: f64 = 1e-4;
+    let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
+    let flange = |q: &[f64; JOINTS]| kinematics.flange(q).position;
+    let h = f64::from(trajectory.step_ms) * 1e-3;
+    let mut most = 0.0f64;
+    for (i, pair) in trajectory.points.windows(2).enumerate() {
+        let (a, b): (SetPoint, SetPoint) = (set_point(&pair[0]), set_point(&pair[1]));
+        for part in 0..PARTS {
+            let u = part as f64 / PARTS as f64;
+            let t = (i as f64 + u) * h;
+            let here = flange(&interpolate(&a, &b, h, u).position);
+            let (before, at, after) = (flange(&way(t - MOMENT)), flange(&way(t)), flange(&way(t + MOMENT)));
+            most = most.max(from_line(&here, &at, &sub(&after, &before)));
+        }
+    }
+    most
+}
+
+/// Of the legs in joint space to the waypoints with these indices the one on which the flange leaves the straight line by most.
+pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
+    let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
+    let times = &planned.waypoint_times;
+    let flange = |ms: f64| {
+        let at = planned.trajectory.at_ms(ms.round().max(0.0) as u32).unwrap_or_default();
+        kinematics.flange(&at.position).position
+    };
+    let aside = |&leg: &usize| {
+        let (from, to) = (1e3 * times.get(leg.checked_sub(1)?)?, 1e3 * times.get(leg)?);
+        let (a, b) = (flange(from), flange(to));
+        let places = (0..=100).map(|k| flange(from + (to - from) * f64::from(k) / 100.0));
+        let distance_m = places.map(|p| from_line(&p, &a, &sub(&b, &a))).fold(0.0, f64::max);
+        Some(Aside { waypoint: leg + 1, distance_m })
+    };
+    legs.iter().filter_map(aside).max_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+}
+
+fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// Distance of `p` from the line through `a` along `direction`; from `a` where there is none.
+fn from_line(p: &[f64; 3], a: &[f64; 3], direction: &[f64; 3]) -> f64 {
+    let (off, squared) = (sub(p, a), direction.iter().map(|d| d * d).sum::<f64>());
+    let along: f64 = off.iter().zip(direction).map(|(o, d)| o * d).sum();
+    let share = if squared > 1e-18 { along / squared } else { 0.0 };
+    (0..3).map(|i| (off[i] - share * direction[i]).powi(2)).sum::<f64>().sqrt()
+}

@@ -76,8 +76,10 @@ pub enum TrajCommand {
     /// Go on with a run that an error, a stop or a lost link broke off
     #[command(
         after_help = "The recording of that run shows how far it got; an MCAP file holds the whole trajectory as well, for a CSV file\n\
-                            --trajectory names it. Where the arm stands on the path behind that place, the rest begins there; else an approach\n\
-                            leads to the place at which the run was seen last. The rest speeds up from standstill and follows the same path.\n\n\
+                            --trajectory names it. The rest begins at the last place that is proved: that at which the recording shows the arm, or a\n\
+                            later one only where the controller shows that it went on by itself. Where the arm stands elsewhere (after an error,\n\
+                            or a controller that was started anew) an approach leads there. The rest speeds up from standstill and follows the\n\
+                            same path.\n\n\
                             Examples:\n  jtc traj run cycle.csv --record run.mcap\n  jtc traj continue run.mcap\n  \
                             jtc traj continue run.csv --trajectory cycle.csv --record rest.mcap"
     )]

@@ -2,8 +2,7 @@
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
-use jtc_host::plan::where_it_stands;
-use jtc_host::recording::{BrokenOff, NothingLeft, Recording};
+use jtc_host::recording::{BrokenOff, NothingLeft, Recording, Resumption};
 use jtc_host::trajectory::{Loaded, Trajectory};
 use jtc_wire::Status;
 
@@ -65,7 +64,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     })
 }
 
-/// The path time to go on from, ms: where the arm stands on the path, or where the run was seen last.
+/// The path time to go on from, ms, with the reason on stderr.
 fn place(
     job: &Job,
     whole: &Trajectory,
@@ -73,18 +72,22 @@ fn place(
     status: &Status,
     out: &Output,
 ) -> Result<u32, NothingLeft> {
-    let BrokenOff { last_ms, until_ms } = broken;
-    let tolerance = job.config.start_tolerance_rad;
-    let stands = where_it_stands(whole, (last_ms, until_ms), &status.positions(), tolerance);
-    let from_ms = stands.map_or(last_ms, |stands| stands.ms);
+    let on = broken.resumption(whole, status, job.config.start_tolerance_rad)?;
     let seconds = |ms: u32| format!("{:.3} s", f64::from(ms) * 1e-3);
-    let (from, end) = (seconds(from_ms), seconds((whole.duration_s() * 1e3).round() as u32));
-    if f64::from(from_ms) * 1e-3 + 1e-3 >= whole.duration_s() {
-        return Err(NothingLeft::Finished);
-    }
-    out.note(match stands {
-        Some(_) => format!("the arm stands at {from} of {end} of its path: it goes on from there"),
-        None => format!("the run was seen last at {from} of {end} of its path: an approach leads there"),
+    let of_path = format!("{} of {:.3} s of its path", seconds(on.ms), whole.duration_s());
+    out.note(match on {
+        Resumption { shown: true, .. } => {
+            format!("the controller went on by itself to {of_path}, and the arm stands there: it goes on from there")
+        }
+        Resumption { stands: true, .. } => {
+            format!("the recording shows the run up to {of_path}, and the arm stands there: it goes on from there")
+        }
+        _ => format!(
+            "the recording shows the run up to {of_path}, and the controller no later place of it (trajectory {}, at {}): an approach \
+             leads there, and it goes on from there",
+            status.trajectory,
+            seconds(status.point)
+        ),
     });
-    Ok(from_ms)
+    Ok(on.ms)
 }

@@ -140,6 +140,28 @@ impl Drop for Sim {
     }
 }
 
+/// Starts a command that moves the arm, and waits until it has moved for so many seconds.
+pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
+    let mut child = sim
+        .command(&[&["--json"], words].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut err = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    loop {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended early");
+        let event: Value = serde_json::from_str(&line).unwrap_or_default();
+        if event["path_s"].as_f64().is_some_and(|s| s > seconds) {
+            break;
+        }
+    }
+    std::thread::spawn(move || err.read_to_string(&mut String::new()));
+    child
+}
+
 /// A smooth trajectory file from the zero pose and back: `amplitude` rad in 1.2 s.
 pub fn motion(amplitude: f64) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");

@@ -33,7 +33,7 @@ use serde::Serialize;
 
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
-pub use rest_of::{Standstill, rest_of, where_it_stands};
+pub use rest_of::rest_of;
 pub use speed::at_speed;
 pub(crate) use speed::set_point;
 

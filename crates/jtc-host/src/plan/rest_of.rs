@@ -1,43 +1,10 @@
 //! The rest of a trajectory that was broken off: from standstill on its path to its end, on the same path.
 
-use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
+use jtc_core::{POINTS_MAX, SetPoint, interpolate};
 
 use super::sampled::step_ms;
 use super::{PlanError, set_point};
 use crate::trajectory::{Point, Trajectory};
-
-/// Where an arm stands on a path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standstill {
-    /// Path time, ms from the first point.
-    pub ms: u32,
-    /// How far it is from there, rad of the joint that is furthest.
-    pub away_rad: f64,
-}
-
-/// The first place between `from_ms` and `to_ms` of the path that is within `tolerance` of `position` (rad each) in all joints, and there
-/// the nearest one; `None` where the arm stands beside the path.
-pub fn where_it_stands(
-    trajectory: &Trajectory,
-    (from_ms, to_ms): (u32, u32),
-    position: &[f64; JOINTS],
-    tolerance: f64,
-) -> Option<Standstill> {
-    let end = (trajectory.duration_s() * 1e3).round() as u32;
-    let mut nearest: Option<Standstill> = None;
-    for ms in from_ms..=to_ms.min(end) {
-        let at = trajectory.at_ms(ms)?.position;
-        let away_rad = (0..JOINTS).map(|j| (at[j] - position[j]).abs()).fold(0.0, f64::max);
-        match &mut nearest {
-            Some(before) if away_rad <= before.away_rad => *before = Standstill { ms, away_rad },
-            // The path has left the place again: a later passage is another one.
-            Some(_) if away_rad > tolerance => break,
-            None if away_rad <= tolerance => nearest = Some(Standstill { ms, away_rad }),
-            _ => {}
-        }
-    }
-    nearest
-}
 
 /// The path from `from_ms` on: it speeds up from standstill in `ramp_s` seconds, and then goes on at its own times. The first point is
 /// where the path is at `from_ms`, the last one that of the trajectory.
@@ -96,12 +63,11 @@ fn place(trajectory: &Trajectory, t: f64) -> SetPoint {
 
 #[cfg(test)]
 mod tests {
-    use jtc_core::Config;
+    use jtc_core::{Config, JOINTS};
 
     use super::*;
     use crate::check::Checker;
     use crate::example::demo_motion;
-    use crate::plan::joint_move;
 
     fn near(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
         (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
@@ -128,25 +94,5 @@ mod tests {
                 assert!(aside < 1.5e-3, "{from_ms}, {ms}: {aside}");
             }
         }
-    }
-
-    #[test]
-    fn an_arm_is_found_where_it_stands_first() {
-        let there = joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-        // There and back: each place is passed twice.
-        let mut both = there.clone();
-        both.points.extend(
-            there.points.iter().rev().skip(1).map(|p| Point { velocity: p.velocity.map(|v| -v), ..*p }),
-        );
-        let end = (there.duration_s() * 1e3) as u32;
-        for ms in [0, 200, 900] {
-            let at = both.at_ms(ms).unwrap().position;
-            let found = where_it_stands(&both, (0, 2 * end), &at, 0.02).unwrap();
-            assert!(found.ms.abs_diff(ms) < 30 && found.away_rad < 1e-3, "{ms}: {found:?}");
-            let back = where_it_stands(&both, (end, 2 * end), &at, 0.02).unwrap();
-            assert!(back.ms.abs_diff(2 * end - ms) < 30, "{ms}: {back:?}");
-        }
-        assert_eq!(where_it_stands(&both, (0, end), &[0.5, 0.1, 0.0, 0.0, 0.0, 0.0], 0.02), None);
-        assert_eq!(where_it_stands(&both, (0, 10), &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 0.02), None);
     }
 }

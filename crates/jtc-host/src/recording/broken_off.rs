@@ -2,7 +2,7 @@
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
-use jtc_wire::{ControllerState, TrajectoryState};
+use jtc_wire::{ControllerState, Status, TrajectoryState};
 
 use super::Recording;
 use crate::sample::Sample;
@@ -10,16 +10,70 @@ use crate::trajectory::Trajectory;
 
 /// The arm comes to rest within this time after a stop, ms of path time.
 const RAMP_MS: u32 = 1000;
+/// A measured position is that of a path at rest to this, rad.
+const AT_REST: f64 = 0.01;
 /// Commanded positions of a recording are those of its trajectory to this, rad.
 const SAME: f64 = 2e-3;
 
-/// How far a run got along its path.
+/// How far a run got along its path, as far as its recording proves it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BrokenOff {
-    /// Path time of its last sample in motion, ms; 0 where the motion had not begun.
+    /// Path time of the last place that the recording shows, ms; 0 where the motion had not begun.
     pub last_ms: u32,
-    /// Path time up to which the arm may have gone on unseen, ms.
-    pub until_ms: u32,
+}
+
+/// Where to go on with a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resumption {
+    /// Path time, ms.
+    pub ms: u32,
+    /// The controller itself shows this place: it went on when nobody recorded it. Else it is the last one of the recording.
+    pub shown: bool,
+    /// The arm stands there.
+    pub stands: bool,
+}
+
+impl BrokenOff {
+    /// Where to go on with the run on `trajectory`, of which nothing may be left out: the last place that the recording shows, or a later
+    /// one where the controller's `status` shows that it went on by itself, which is where the arm stands, too. That an arm stands
+    /// anywhere on the rest of the path proves nothing: it may have been brought there. A controller that was started anew, or that
+    /// was given another motion, shows no place of this one; nor does one that was stopped, whose points begin anew.
+    ///
+    /// `tolerance` (rad) is how far from a place an arm may be and stand there.
+    ///
+    /// # Errors
+    ///
+    /// [`NothingLeft::Finished`]: the controller shows the end of the path.
+    pub fn resumption(
+        &self,
+        trajectory: &Trajectory,
+        status: &Status,
+        tolerance: f64,
+    ) -> Result<Resumption, NothingLeft> {
+        let (end_ms, q) = (end_ms(trajectory), status.positions());
+        let stands_at = |ms: u32| trajectory.at_ms(ms).is_some_and(|at| away(&at.position, &q) <= tolerance);
+        let on_its_way = status.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
+        // A motion finishes at its own end only.
+        let at_end = status.trajectory == TrajectoryState::Finish && status.point == end_ms;
+        let shown = (on_its_way || at_end) && status.point >= self.last_ms && stands_at(status.point);
+        let ms = if shown { status.point } else { self.last_ms };
+        if ms >= end_ms {
+            return Err(NothingLeft::Finished);
+        }
+        Ok(Resumption { ms, shown, stands: stands_at(ms) })
+    }
+}
+
+/// Path time of the last point, ms.
+fn end_ms(trajectory: &Trajectory) -> u32 {
+    (trajectory.duration_s() * 1e3).round() as u32
+}
+
+/// Of the joint that is furthest, rad.
+fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
+    // A joint that is not known is at no place.
+    let far = |(a, b): (&f64, &f64)| if (a - b).is_nan() { f64::INFINITY } else { (a - b).abs() };
+    a.iter().zip(b).map(far).fold(0.0, f64::max)
 }
 
 /// There is nothing to go on with.
@@ -51,16 +105,16 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// How far the last run of this recording got along `trajectory`. Where an error or a stop ended it, the arm came to rest soon after
-    /// its last sample; where the link was lost or the program was killed, the controller may have gone on to the end.
+    /// How far the last run of this recording got along `trajectory`: to its last sample in motion or, where it was stopped, to the place
+    /// behind that at which the recording shows the arm at rest.
     ///
     /// # Errors
     ///
     /// [`NothingLeft`]: it came to its end, is no run, or one of another trajectory.
     pub fn broken_off(&self, trajectory: &Trajectory) -> Result<BrokenOff, NothingLeft> {
-        let end_ms = (trajectory.duration_s() * 1e3).round() as u32;
-        let moving = |s: &&Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
-        let last = self.samples.iter().rfind(moving).ok_or(NothingLeft::NoExecution)?;
+        let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
+        let number = self.samples.iter().rposition(moving).ok_or(NothingLeft::NoExecution)?;
+        let (last, behind) = (&self.samples[number], &self.samples[number + 1..]);
         if self.ending.outcome == "finished" {
             return Err(NothingLeft::Finished);
         }
@@ -68,17 +122,36 @@ impl Recording {
         if !is_on(last, trajectory) {
             let own = self.info.as_ref().and_then(|info| info.commanded.as_deref()) == Some(trajectory);
             // The way to the first point of its own trajectory: nothing of that was run.
-            return if own { Ok(BrokenOff { last_ms: 0, until_ms: 0 }) } else { Err(NothingLeft::Other) };
+            return if own { Ok(BrokenOff { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
-        if is_end || last.point >= end_ms {
+        if is_end || last.point >= end_ms(trajectory) {
             return Err(NothingLeft::Finished);
         }
-        let seen = self.samples.last().is_some_and(|s| !moving(&s))
-            || self.samples.iter().any(|s| s.errors != 0 || s.state == ControllerState::Error)
-            || self.ending.outcome == "stopped";
-        let until_ms = if seen { last.point.saturating_add(RAMP_MS).min(end_ms) } else { end_ms };
-        Ok(BrokenOff { last_ms: last.point, until_ms })
+        Ok(BrokenOff { last_ms: at_rest(last.point, behind, trajectory).unwrap_or(last.point) })
     }
+}
+
+/// The path time at which a stop brought the arm to rest, ms: the first place behind the last one in motion (`last_ms`) where the path is as
+/// the arm then stood. Without torque an arm leaves its path, and proves nothing.
+fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
+    let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
+    let rest = behind.last().filter(|_| behind.iter().all(held))?;
+    if rest.trajectory != TrajectoryState::Stop {
+        return None;
+    }
+    let stood = rest.joints.map(|joint| joint.position);
+    let mut nearest: Option<(u32, f64)> = None;
+    for ms in last_ms..=last_ms.saturating_add(RAMP_MS).min(end_ms(trajectory)) {
+        let far = away(&trajectory.at_ms(ms)?.position, &stood);
+        match nearest {
+            Some((_, least)) if far < least => nearest = Some((ms, far)),
+            // The path has left the place again: a later passage is another one.
+            Some(_) if far > AT_REST => break,
+            None if far <= AT_REST => nearest = Some((ms, far)),
+            _ => {}
+        }
+    }
+    nearest.map(|(ms, _)| ms)
 }
 
 /// What was commanded then is the trajectory's; of a recording that does not hold it, where the arm was.
@@ -100,10 +173,14 @@ mod tests {
     use super::super::{Ending, RecordingInfo, write_all};
     use super::*;
     use crate::example::demo_motion;
+    use crate::trajectory::Point;
 
     /// Samples of the demo's motion at these points, with their states.
     fn recording(points: &[(u32, TrajectoryState)], outcome: &str) -> Recording {
-        let whole = demo_motion();
+        recording_of(&demo_motion(), points, outcome)
+    }
+
+    fn recording_of(whole: &Trajectory, points: &[(u32, TrajectoryState)], outcome: &str) -> Recording {
         let sample = |(point, trajectory): &(u32, TrajectoryState)| {
             let at = whole.at_ms(*point).unwrap();
             let mut sample = Sample { point: *point, trajectory: (*trajectory).into(), ..Sample::default() };
@@ -117,22 +194,20 @@ mod tests {
     }
 
     #[test]
-    fn the_last_sample_in_motion_counts_and_what_may_have_followed() {
+    fn the_last_sample_in_motion_counts() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let of = |points: &[(u32, TrajectoryState)], outcome| {
             recording(points, outcome).broken_off(&demo_motion())
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
-        // The link was lost, or the program killed.
+        let at = |last_ms| Ok(BrokenOff { last_ms });
+        // The link was lost, the program killed, or the controller ended it.
         for outcome in ["", "fault"] {
-            assert_eq!(of(&way, outcome), Ok(BrokenOff { last_ms: 4_000, until_ms: 10_000 }));
+            assert_eq!(of(&way, outcome), at(4_000));
         }
-        let stopped = [&way[..], &[(4_300, Stop)]].concat();
-        assert_eq!(of(&stopped, "stopped"), Ok(BrokenOff { last_ms: 4_000, until_ms: 5_000 }));
+        assert_eq!(of(&[&way[..], &[(0, Null)]].concat(), "fault"), at(4_000));
         let paused = [&way[..], &[(4_300, Pause)]].concat();
-        assert_eq!(of(&paused, "stopped"), Ok(BrokenOff { last_ms: 4_300, until_ms: 5_300 }));
-        let fault = [&way[..], &[(0, Null)]].concat();
-        assert_eq!(of(&fault, "fault"), Ok(BrokenOff { last_ms: 4_000, until_ms: 5_000 }));
+        assert_eq!(of(&paused, "stopped"), at(4_300));
         assert_eq!(of(&[&way[..], &[(10_000, Finish)]].concat(), "finished"), Err(NothingLeft::Finished));
         assert_eq!(of(&[(0, Stop)], "stopped"), Err(NothingLeft::NoExecution));
         // Its points are those of another path.
@@ -142,7 +217,79 @@ mod tests {
         // Unless that is the recording's own: it was on the way to its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
-        assert_eq!(approach.broken_off(&demo_motion()), Ok(BrokenOff { last_ms: 0, until_ms: 0 }));
+        assert_eq!(approach.broken_off(&demo_motion()), at(0));
+    }
+
+    /// A controller that was stopped is at its start again (point 0); where the arm came to rest shows its place.
+    #[test]
+    fn a_stop_proves_the_place_at_which_the_arm_came_to_rest() {
+        use TrajectoryState::{Execute, Stop};
+        let path = back_and_forth();
+        let stopped = |last: u32, joint_1: f64| {
+            let mut stopped =
+                recording_of(&path, &[(last - 40, Execute), (last, Execute), (0, Stop)], "stopped");
+            let at = [joint_1, 0.0, 0.0, 0.0, 0.0, 0.0];
+            stopped.samples[2].state = ControllerState::HoldPos.into();
+            stopped.samples[2].joints.iter_mut().zip(at).for_each(|(joint, q)| joint.position = q + 1e-4);
+            stopped
+        };
+        let stood = |last: u32, ms: u32| stopped(last, path.at_ms(ms).unwrap().position[0]);
+        for ms in [3_400, 3_580, 3_700, 4_200] {
+            let found = stood(3_400, ms).broken_off(&path).unwrap().last_ms;
+            assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
+        }
+        // It turned round meanwhile, and is where it was before: the turn is run again rather than left out.
+        assert!(stood(4_900, 5_100).broken_off(&path).unwrap().last_ms < 4_920);
+        // Elsewhere on the path, beside it, or without torque nothing is proved.
+        let elsewhere = stood(3_400, 12_000);
+        let (mut beside, mut error) = (stood(3_400, 3_700), stood(3_400, 3_700));
+        beside.samples[2].joints[3].position += 0.05;
+        error.samples[2].errors = 1;
+        for recording in [elsewhere, beside, error] {
+            assert_eq!(recording.broken_off(&path), Ok(BrokenOff { last_ms: 3_400 }));
+        }
+    }
+
+    /// 0.5 → 1.0 → 0.5 → −0.5 rad of joint 1, at 0.1 rad/s.
+    fn back_and_forth() -> Trajectory {
+        let q = |k: i32| 0.01 * f64::from(if k <= 50 { 50 + k } else { 150 - k });
+        let point = |k: i32| Point { position: [q(k), 0.0, 0.0, 0.0, 0.0, 0.0], ..Point::default() };
+        Trajectory { step_ms: 100, points: (0..=200).map(point).collect() }
+    }
+
+    fn status(trajectory: TrajectoryState, point: u32, joint_1: f32) -> Status {
+        let mut status = Status { trajectory: trajectory.into(), point, ..Status::default() };
+        status.joints[0].position = joint_1;
+        status
+    }
+
+    /// An arm that stands on the rest of its path has not been there on its way unless the controller shows that.
+    #[test]
+    fn only_what_is_proved_counts_as_done() {
+        use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
+        let (path, broken) = (back_and_forth(), BrokenOff { last_ms: 3_400 });
+        let at = |status: &Status| broken.resumption(&path, status, 0.02);
+        let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
+        // Started anew, stopped, or moved meanwhile: at 0 rad it is where the path is after 15 s, at −0.5 where it ends.
+        for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
+            for (trajectory, point) in
+                [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
+            {
+                assert_eq!(
+                    at(&status(trajectory, point, joint_1)),
+                    recorded(stands),
+                    "{trajectory:?} {joint_1}"
+                );
+            }
+        }
+        // It went on by itself.
+        for trajectory in [Execute, Pause] {
+            let on = at(&status(trajectory, 8_000, 0.7));
+            assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
+        }
+        assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
+        // At the end of a closed path an arm stands before it as well.
+        assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 
     #[cfg(feature = "mcap")]

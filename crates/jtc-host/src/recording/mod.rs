@@ -28,7 +28,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-pub use broken_off::{BrokenOff, NothingLeft};
+pub use broken_off::{BrokenOff, NothingLeft, Resumption};
 pub use error::RecordingError;
 pub use info::{Ending, JointInfo, RecordingInfo};
 pub use live::{FLUSH, LiveRecorder, SampleSink};

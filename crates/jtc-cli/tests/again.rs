@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Sim, jtc, moving_while};
+use common::{Sim, jtc, moving_while, slow_motion};
 use serde_json::Value;
 
 const FAST: [&str; 3] = ["--speed", "max", "--no-throttle"];
@@ -44,4 +44,23 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
+}
+
+/// Also where it begins, and has no speed yet.
+#[test]
+fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let (file, arm) = (
+        sim.file("motion.csv", &slow_motion(600)),
+        sim.file("arm.toml", include_str!("../../../arms/avena.toml")),
+    );
+    let mut run = moving_while(&sim, &["traj", "run", &file], 0.1);
+    cli_kit::trial::signal(&run, "-KILL");
+    run.wait().unwrap();
+    let refused = sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(4);
+    assert!(refused.err.contains("the arm is on the path of a trajectory"), "{}", refused.err);
+    assert_eq!(std::fs::read_to_string(&arm).unwrap(), include_str!("../../../arms/avena.toml"));
+    sim.jtc(&["traj", "pause"]).ends(0);
+    std::thread::sleep(std::time::Duration::from_millis(800));
+    sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(0);
 }

@@ -141,7 +141,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 pub enum PoseCommand {
     /// Save where the arm is into the arm file
     #[command(
-        after_help = "The arm stands still meanwhile. The rest of the file stays as it is, comments included.\n\nExamples:\n  \
+        after_help = "The arm stands still meanwhile: while a trajectory is executed or a joint is jogged it is refused. The rest of the file stays as it is, comments included.\n\nExamples:\n  \
                             jtc pose save home --arm my-arm.toml\n  jtc pose save above-table --arm my-arm.toml --force"
     )]
     Save {

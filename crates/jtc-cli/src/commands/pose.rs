@@ -1,11 +1,13 @@
 //! `jtc pose`: named positions in the arm file.
 
 use std::path::Path;
+use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::arm::{Arm, remove_pose, save_pose};
-use jtc_host::{sample, words};
-use jtc_wire::Joint;
+use jtc_host::port::SerialPort;
+use jtc_host::{Session, sample, words};
+use jtc_wire::{Joint, Status};
 use serde_json::json;
 
 use super::arm::poses_table;
@@ -14,6 +16,10 @@ use crate::args::{LinkArgs, PoseCommand};
 
 /// Faster than this, rad/s, an arm is on its way: a pose is where it stands.
 const STANDS: f64 = 0.02;
+/// What moves by less than this within [`WATCHED`] stands, rad: the slowest jog moves twice as far.
+const STILL: f64 = 1.2e-3;
+/// So long the arm is watched: a slow jog is in no status.
+const WATCHED: Duration = Duration::from_millis(250);
 
 /// Does one of the family.
 pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
@@ -36,24 +42,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, force: bool, out: &Output) -> 
         let path = file.to_owned();
         return Err(jtc_host::arm::PoseError::Exists { path, name: name.into() }.into());
     }
-    let status = link.session()?.fresh_status()?;
-    for joint in Joint::ALL {
-        let j = joint.index();
-        if !sample::is_measured(&status, j) || words::is_absent(&status, j) {
-            let message = format!("{joint}: its position is not known; nothing was saved");
-            return Err(Failure::new(ErrorKind::Device, "not-measured", message)
-                .hint("`jtc status` shows the joints, `jtc recover` brings them up"));
-        }
-        let speed = f64::from(status.joints[j].velocity);
-        if speed.abs() > STANDS {
-            let message = format!(
-                "{joint} moves at {speed:.2} rad/s, and a pose is where the arm stands; nothing was saved"
-            );
-            return Err(Failure::new(ErrorKind::Refused, "moving", message)
-                .hint("wait until it stands, or `jtc traj pause`"));
-        }
-    }
-    let position = status.positions();
+    let position = standing(&mut link.session()?)?.positions();
     save_pose(file, name, &position, force)?;
     let arm = Arm::load(file)?;
     let saved = arm.poses.get(name).copied().unwrap_or(position);
@@ -72,6 +61,48 @@ fn save(name: &str, file: &Path, link: &LinkArgs, force: bool, out: &Output) -> 
     Ok(())
 }
 
+/// The arm stands, for as long as it is watched; else where it moves is the reason why nothing is saved.
+fn standing(session: &mut Session<SerialPort>) -> Result<Status, Failure> {
+    let begin = session.fresh_status()?;
+    let (start, mut now) = (session.now(), begin);
+    loop {
+        stands(&begin, &now)?;
+        if session.now() - start >= WATCHED {
+            return Ok(now);
+        }
+        now = session.next_status()?;
+    }
+}
+
+fn stands(begin: &Status, now: &Status) -> Result<(), Failure> {
+    let moving = |what: String| {
+        let message = format!("{what}, and a pose is where the arm stands; nothing was saved");
+        Err(Failure::new(ErrorKind::Refused, "moving", message)
+            .hint("wait until it stands, or `jtc traj pause`"))
+    };
+    // Also where it begins, turns round or ends, and has no speed for a moment.
+    if now.is_executing() {
+        return moving("the arm is on the path of a trajectory".into());
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
+        if !sample::is_measured(now, j) || words::is_absent(now, j) {
+            let message = format!("{joint}: its position is not known; nothing was saved");
+            return Err(Failure::new(ErrorKind::Device, "not-measured", message)
+                .hint("`jtc status` shows the joints, `jtc recover` brings them up"));
+        }
+        let speed = f64::from(now.joints[j].velocity);
+        if speed.abs() > STANDS {
+            return moving(format!("{joint} moves at {speed:.2} rad/s"));
+        }
+        let way = now.positions()[j] - begin.positions()[j];
+        if way.abs() > STILL {
+            return moving(format!("{joint} moves slowly, by {:.1} mrad since a moment ago", way * 1e3));
+        }
+    }
+    Ok(())
+}
+
 fn list(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
     let arm = Arm::load(file)?;
     out.result(&json!({ "file": file, "arm": arm.name, "poses_rad": arm.poses }), || {
@@ -86,4 +117,31 @@ fn list(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
         poses_table(&arm, deg)
     });
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_wire::TrajectoryState;
+
+    use super::*;
+
+    /// A slow jog is in no field of the status: places that differ show it.
+    #[test]
+    fn an_arm_that_is_jogged_slowly_does_not_stand() {
+        let at = |q: f32| {
+            let mut status = Status::default();
+            status.joints[3].position = q;
+            status.joints.iter_mut().for_each(|joint| joint.velocity = 0.01);
+            status
+        };
+        stands(&at(0.5), &at(0.5005)).unwrap();
+        for (begin, now) in [(0.5, 0.5025), (0.5025, 0.5)] {
+            let failure = stands(&at(begin), &at(now)).unwrap_err();
+            assert!(failure.message.starts_with("joint 4 moves slowly"), "{}", failure.message);
+        }
+        let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
+        assert_eq!(stands(&executing, &executing).unwrap_err().kind, ErrorKind::Refused);
+        // Led by hand, or paused, it may stand.
+        stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
+    }
 }

@@ -44,6 +44,49 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
+    // The whole of it again, and what was measured of it.
+    let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
+    assert!(
+        output.err.contains("the whole trajectory that the recording holds; the run got to"),
+        "{}",
+        output.err
+    );
+    assert!((output.json()["verdict"]["duration_s"].as_f64().unwrap() - whole).abs() < 0.1);
+    let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach", "--measured"]).ends(0);
+    let part = &output.json()["verdict"]["joints"][0];
+    assert!(part["position_min_rad"].as_f64().unwrap() > -0.01, "{part}");
+}
+
+/// A recording that does not hold the trajectory ends in motion: what can be done with it is named, and works.
+#[test]
+fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let (file, record) = (sim.file("motion.csv", &slow_motion(50)), sim.path("part.csv"));
+    let run = moving_while(&sim, &["traj", "run", &file, "--record", &record], 1.5);
+    cli_kit::trial::signal(&run, "-INT");
+    run.wait_with_output().unwrap();
+    let refused = sim.jtc(&["traj", "replay", &record, "--approach"]).ends(4);
+    assert!(refused.err.contains(" --measured` the part that was measured"), "{}", refused.err);
+    assert!(refused.err.contains("jtc traj continue "), "{}", refused.err);
+    let value = sim.json(&["traj", "replay", &record, "--approach", "--measured"], 0);
+    assert_eq!(value["outcome"], "finished");
+    sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
+}
+
+/// As fast as the limits allow, recorded in virtual time: what was measured is run again within the limits.
+#[test]
+fn a_measured_motion_at_its_limits_is_run_again() {
+    let sim = Sim::start(&FAST).held();
+    let (file, record, again) = (sim.path("cycle.csv"), sim.path("run.mcap"), sim.path("again.mcap"));
+    jtc(&["example", "cycle", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
+    jtc(&["plan", &sim.path("cycle-waypoints.csv"), "-o", &file, "--blend", "0.05"]).ends(0);
+    sim.jtc(&["traj", "run", &file, "--record", &record]).ends(0);
+    let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
+    let value = sim.json(&words, 0);
+    let executed = value["verdict"]["duration_s"].as_f64().unwrap();
+    assert!((2.4..8.0).contains(&executed), "{executed} s");
+    let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
+    assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
 /// Also where it begins, and has no speed yet.

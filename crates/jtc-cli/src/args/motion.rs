@@ -59,10 +59,13 @@ pub enum TrajCommand {
                             jtc traj run cycle.csv --approach --repeat 10"
     )]
     Run(RunArgs),
-    /// Run again what a recording is of: its last execution, along the commanded path or the measured one
+    /// Run again what a recording is of: its trajectory, or the way that was measured
     #[command(
-        after_help = "As `jtc traj run`, which takes recordings too; here any other file is refused. --measured takes what was measured\n\
-                            every 40 ms: of a motion by hand nothing was commanded.\n\nExamples:\n  \
+        after_help = "As `jtc traj run`, which takes recordings too; here any other file is refused. An MCAP file of `traj run` or `move` holds\n\
+                            the whole trajectory, which is run also where its run was broken off (`jtc traj continue` runs the rest alone). Of\n\
+                            other recordings it is the last execution, along the commanded path as far as it is recorded.\n\n\
+                            --measured takes what was measured every 40 ms: of a motion by hand nothing was commanded. Where that is not\n\
+                            within the limits, or ends in motion, its way is planned anew, no faster than it was, and a note reports it.\n\nExamples:\n  \
                             jtc traj replay run.mcap --approach\n  jtc traj replay run.csv --speed 50 --record again.mcap\n  \
                             jtc traj replay taught.mcap --measured --approach"
     )]

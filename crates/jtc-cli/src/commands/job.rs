@@ -5,7 +5,7 @@ use std::path::Path;
 use cli_kit::{ErrorKind, Failure, Output, exit::REFUSED};
 use jtc_core::{Config, Friction, JOINTS};
 use jtc_host::arm::Arm;
-use jtc_host::check::{Checker, Suspicion, Verdict};
+use jtc_host::check::{Checker, ProblemKind, Suspicion, Verdict};
 use jtc_host::plan::{self, Planner};
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
@@ -109,6 +109,25 @@ impl Job {
         self.trajectory = trajectory;
     }
 
+    /// The same way within the limits, where those of a way that was measured are not kept by its own times. What stays wrong is for
+    /// the check to name.
+    pub fn plan_anew(&mut self, out: &Output) {
+        let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
+        let Some(why) = verdict.refusals().next() else { return };
+        let friction = self.arm.friction();
+        let Ok(planned) = self.planner(friction.as_ref()).anew(&self.loaded.trajectory) else { return };
+        let Ok(at_speed) = plan::at_speed(&planned.trajectory, self.speed) else { return };
+        out.note(format!(
+            "note: as it was measured the motion is not within the limits ({why}): its way is planned anew, at most {} rad beside it, in \
+             {:.2} s instead of {:.2} s",
+            Planner::ASIDE,
+            planned.trajectory.duration_s(),
+            self.loaded.trajectory.duration_s()
+        ));
+        self.loaded.trajectory = planned.trajectory;
+        self.trajectory = at_speed;
+    }
+
     /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
     pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> String {
         if self.made {
@@ -125,6 +144,14 @@ impl Job {
             };
             return format!(
                 "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
+            );
+        }
+        let ends_in_motion = verdict.refusals().any(|p| p.kind == ProblemKind::NotAtRest);
+        if self.loaded.form == Form::Recording && ends_in_motion {
+            let words = &self.words;
+            return format!(
+                "the recording shows a part of a motion: `jtc traj continue {words} --trajectory FILE` runs the rest of that file, `jtc traj \
+                 replay {words} --measured` the part that was measured, from rest to rest"
             );
         }
         verdict.hint_with(&self.words, self.speed, passing_speed)

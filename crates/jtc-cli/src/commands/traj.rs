@@ -49,7 +49,13 @@ fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
         let message = format!("{} is no recording of a run", args.file.display());
         return Err(Failure::usage(message).hint(format!("`jtc traj run {}` runs it", typed(&args.file))));
     }
-    let load = |out: &Output| Job::of(recorded, &args.file, &args.check, out);
+    let load = |out: &Output| {
+        let mut job = Job::of(recorded, &args.file, &args.check, out)?;
+        if measured {
+            job.plan_anew(out);
+        }
+        Ok(job)
+    };
     run::perform(&run::Course::of(args), load, None, out)
 }
 

@@ -16,6 +16,7 @@
 //! # Ok::<(), jtc_host::plan::PlanError>(())
 //! ```
 
+mod again;
 mod error;
 mod lines;
 mod rest_of;

@@ -12,7 +12,7 @@ use jtc_wire::{ControllerState, TrajectoryState};
 use super::fit::Samples;
 use super::{Form, Loaded, Point};
 use crate::file::{FileError, Place};
-use crate::recording::{Recording, RecordingError};
+use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
 /// Points further apart than this are left as they are, ms.
@@ -35,7 +35,10 @@ pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
 /// Reads a recording and takes its last execution out of it.
 pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
-    if let Some(whole) = held(&recording) {
+    if let Some(mut whole) = held(&recording) {
+        if let Some(cut) = recording.cut {
+            whole.notes.insert(0, format!("{}: {cut}", path.display()));
+        }
         return Ok(whole);
     }
     let mut loaded = executed(&recording.samples).map_err(|e| match (e, &recording.cut) {
@@ -50,13 +53,22 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// The trajectory that the recording of a finished run holds, exactly as it was run.
+/// The trajectory that the recording of a run holds, exactly as it was run, and whole also where the run was broken off.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
-    (recording.ending.outcome == "finished" && recording.cut.is_none()).then(|| Loaded {
+    let note = match recording.broken_off(whole) {
+        Ok(broken) => format!(
+            "the whole trajectory that the recording holds; the run got to {:.3} s of its {:.3} s, and `jtc traj continue` runs the rest alone",
+            f64::from(broken.last_ms) * 1e-3,
+            whole.duration_s()
+        ),
+        Err(NothingLeft::Finished) => "the trajectory that the recording holds, as it was run".to_owned(),
+        Err(_) => "the trajectory that the recording holds".to_owned(),
+    };
+    Some(Loaded {
         trajectory: whole.clone(),
         form: Form::Recording,
-        notes: vec!["the trajectory that the recording holds, as it was run".to_owned()],
+        notes: vec![note],
         overshoot: Vec::new(),
         units_named: true,
     })
@@ -88,17 +100,14 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
 
 /// The last motion by hand, or else of a trajectory, as it was measured, without the standing still before and after it.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
-    let taught = |s: &Sample| s.state == ControllerState::Teaching;
-    let by_hand = samples.iter().any(taught);
-    let counts = |s: &Sample| if by_hand { taught(s) } else { s.is_operating() };
-    let end = samples.iter().rposition(counts).map_or(0, |i| i + 1);
-    let begin = samples[..end].iter().rposition(|s| !counts(s)).map_or(0, |i| i + 1);
+    let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
+    let timed = if by_hand { led(samples) } else { followed(samples) };
     let mut path = Samples::default();
-    for sample in &samples[begin..end] {
+    for (time_s, sample) in timed {
         let position = sample.joints.map(|joint| joint.position);
-        let due = path.times.last().is_none_or(|t| sample.time_s - t >= MEASURED_S - 1e-6);
+        let due = path.times.last().is_none_or(|t| time_s - t >= MEASURED_S - 1e-6);
         if due && position.iter().all(|q| q.is_finite()) {
-            path.times.push(sample.time_s);
+            path.times.push(time_s);
             path.position.push(position);
         }
     }
@@ -120,6 +129,36 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let mut loaded = Loaded::fitted(fitted, Form::Recording);
     loaded.notes.insert(0, format!("the last {what} in the recording, as it was measured"));
     Ok(loaded)
+}
+
+/// The last motion by hand, on the clock of whoever recorded it.
+fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
+    let taught = |s: &Sample| s.state == ControllerState::Teaching;
+    let end = samples.iter().rposition(taught).map_or(0, |i| i + 1);
+    let begin = samples[..end].iter().rposition(|s| !taught(s)).map_or(0, |i| i + 1);
+    samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
+}
+
+/// The last execution, over its pauses, on the clock of its path: that of the host blurs it, and has no meaning in virtual time. Where the
+/// arm came to rest is the end of it.
+fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
+    let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
+    let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
+    let mut begin = end;
+    while begin > 0
+        && on_path(&samples[begin - 1])
+        && (begin == end || samples[begin - 1].point <= samples[begin].point)
+    {
+        begin -= 1;
+    }
+    let seconds = |s: &Sample| f64::from(s.point) * 1e-3;
+    let mut timed: Vec<(f64, &Sample)> = samples[begin..end].iter().map(|s| (seconds(s), s)).collect();
+    let at_rest =
+        |s: &&Sample| s.trajectory.is_in(&[TrajectoryState::Stop, TrajectoryState::Finish]) && s.errors == 0;
+    if let (Some((last, _)), Some(rest)) = (timed.last().copied(), samples.get(end).filter(at_rest)) {
+        timed.push((seconds(rest).max(last + MEASURED_S), rest));
+    }
+    timed
 }
 
 /// Places of a path that were seen, at the controller's milliseconds.

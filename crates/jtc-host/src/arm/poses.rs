@@ -30,7 +30,8 @@ const DECIMALS: f64 = 1e6;
 pub enum PoseError {
     /// A name that no waypoint file or option could hold.
     #[error(
-        "\"{name}\" is no name of a pose: it begins with a letter and has letters, digits, _, - and . only, {NAME_MAX} at most"
+        "\"{name}\" is no name of a pose: it begins with a letter, has letters, digits, _, - and . only, {NAME_MAX} at most, and is no number \
+         (nan, inf)"
     )]
     Name {
         /// The name.
@@ -159,6 +160,7 @@ fn is_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
         && name.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c))
+        && name.parse::<f64>().is_err()
 }
 
 /// The poses of a file's table.
@@ -245,7 +247,7 @@ fn edit(
     let poses = document.entry("poses").or_insert_with(|| Item::Table(Table::new()));
     let table = poses.as_table_like_mut().ok_or_else(|| in_file(FileError::form("poses is no table")))?;
     change(table, &mut arm)?;
-    let written = document.to_string();
+    let written = as_it_was(&document.to_string(), &text);
     if !toml_form::read(&written).is_ok_and(|read| read == arm) {
         return Err(in_file(FileError::form(
             "its poses cannot be changed by this program: change them by hand",
@@ -254,6 +256,33 @@ fn edit(
     write_whole(path, written.as_bytes())
         .map_err(|source| FileError::Io { path: path.to_owned(), source })?;
     Ok(())
+}
+
+/// A changed text with the byte order mark and the line ends of the one before, which the TOML library does not keep: lines before and
+/// behind the change have their own, those between them that of the first line.
+fn as_it_was(changed: &str, before: &str) -> String {
+    const MARK: char = '\u{feff}';
+    let (lines, old): (Vec<&str>, Vec<&str>) = (
+        changed.trim_start_matches(MARK).split_inclusive('\n').collect(),
+        before.trim_start_matches(MARK).split_inclusive('\n').collect(),
+    );
+    let content = |line: &str| line.trim_end_matches(['\r', '\n']).to_owned();
+    let same = |pair: &(&&str, &&str)| content(pair.0) == content(pair.1);
+    let head = lines.iter().zip(&old).take_while(same).count();
+    let most = lines.len().min(old.len()) - head;
+    let tail = lines.iter().rev().zip(old.iter().rev()).take(most).take_while(same).count();
+    let returns = old.first().is_some_and(|line| line.ends_with("\r\n"));
+    let fresh = |line: &&str| match line.strip_suffix('\n') {
+        Some(text) if returns && !text.ends_with('\r') => format!("{text}\r\n"),
+        _ => (*line).to_owned(),
+    };
+    let mark = before.starts_with(MARK).then(|| MARK.to_string());
+    // The line that was the last may have had no end.
+    let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
+    let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
+    let between = lines[head..lines.len() - tail].iter().map(fresh);
+    let rest = old[last..].iter().map(|line| (*line).to_owned());
+    mark.into_iter().chain(first).chain(between).chain(rest).collect()
 }
 
 #[cfg(test)]
@@ -298,6 +327,35 @@ mod tests {
         assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
     }
 
+    /// Line ends and the byte order mark stay, also where they are mixed: without the pose the file has its own bytes again.
+    #[test]
+    fn every_byte_of_the_rest_stays() {
+        let with_home = format!("{AVENA_TOML}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n# the end\n");
+        let every_third: String = with_home
+            .split_inclusive('\n')
+            .enumerate()
+            .map(|(i, line)| if i % 3 == 1 { line.replace('\n', "\r\n") } else { line.to_owned() })
+            .collect();
+        let no_end = with_home.trim_end().to_owned();
+        for text in [with_home.replace('\n', "\r\n"), format!("\u{feff}{with_home}"), every_third, no_end] {
+            let (_dir, path) = file(&text);
+            save_pose(&path, "up", &[0.25; 6], false).unwrap();
+            let saved = std::fs::read_to_string(&path).unwrap();
+            if !text.replace("\r\n", "").contains('\n') {
+                assert!(!saved.replace("\r\n", "").contains('\n'), "the new line ends as the others do");
+            }
+            save_pose(&path, "up", &[0.5; 6], true).unwrap();
+            assert_eq!(Arm::load(&path).unwrap().poses["up"], [0.5; 6]);
+            remove_pose(&path, "up").unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+            save_pose(&path, "home", &[0.5; 6], true).unwrap();
+            let changed = std::fs::read_to_string(&path).unwrap();
+            let differs =
+                text.split_inclusive('\n').zip(changed.split_inclusive('\n')).filter(|(a, b)| a != b);
+            assert_eq!(differs.count(), 1);
+        }
+    }
+
     #[test]
     fn poses_are_no_part_of_what_a_controller_is_given() {
         let plain = Arm::avena();
@@ -321,7 +379,7 @@ mod tests {
             message(save_pose(&path, "home", &[0.0; 6], false))
                 .contains("\"home\" is there already | choose another")
         );
-        for name in ["", "1", "a b", "a,b", "-x", "ä\n"] {
+        for name in ["", "1", "1e3", "nan", "NaN", "inf", "Infinity", "a b", "a,b", "-x", "ä\n"] {
             assert!(
                 message(save_pose(&path, name, &HOME, false)).contains("is no name of a pose"),
                 "{name:?}"
@@ -363,7 +421,7 @@ mod tests {
     proptest! {
         /// Whatever the name and the numbers are, the pose that is read is the one that was saved.
         #[test]
-        fn what_was_saved_is_read(name in "[a-zA-Zäλ][a-zA-Z0-9_.ö-]{0,20}", q in prop::array::uniform6(-3.0..3.0f64)) {
+        fn what_was_saved_is_read(name in "[a-zA-Zäλ][a-zA-Z0-9_.ö-]{0,20}".prop_filter("a number", |name| name.parse::<f64>().is_err()), q in prop::array::uniform6(-3.0..3.0f64)) {
             let (_dir, path) = file(AVENA_TOML);
             save_pose(&path, &name, &q, false).unwrap();
             let read = Arm::load(&path).unwrap().poses[&name];

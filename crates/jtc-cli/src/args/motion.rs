@@ -125,7 +125,7 @@ pub struct RunArgs {
     /// Points of a segment, 1 to 1500, in at most 100 segments; default: short enough for the CRC to be strong
     #[arg(long, env = "JTC_POINTS_PER_SEGMENT", value_name = "N")]
     pub points_per_segment: Option<usize>,
-    /// Run it so many times; a path that does not end where it begins needs --approach
+    /// Run it so many times; figures are kept of the last 1000, samples of the last one. A path that does not end where it begins needs --approach
     #[arg(long, env = "JTC_REPEAT", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     #[command(flatten)]
@@ -160,7 +160,7 @@ pub struct RunFiles {
     /// Record the motion, .mcap or .csv
     #[arg(long, env = "JTC_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Write the report page, .html
+    /// Write the report page, .html; of several runs it is that of the last one
     #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]

@@ -25,7 +25,7 @@ use crate::args::{LinkArgs, RunArgs, RunFiles};
 use crate::limits;
 use crate::operator::Operator;
 use crate::progress::Progress;
-use conclude::{Done, Legs, conclude};
+use conclude::{Done, Finished, Legs, conclude};
 use leg::{APPROACH, Leg, Reel, cancelled};
 use outputs::Outputs;
 
@@ -223,14 +223,14 @@ impl Stage<'_> {
         operator: &mut Operator,
         mut status: Status,
     ) -> Result<Legs, Failure> {
-        let (mut done, mut samples) = (Vec::new(), Vec::new());
+        let mut done = Finished::default();
         let repeat = self.course.repeat.max(1);
         for n in 1..=repeat {
             let (checked, phase) = self.next(&status)?;
             let mut leg = self.leg(session, &checked, phase, operator)?;
             let mut verdict = checked.verdict().clone();
             if phase == APPROACH && leg.is_finished() {
-                self.approached(n == 1, leg, &mut done, &mut samples);
+                self.approached(n == 1, leg, &mut done);
                 // From where the approach ended, not from where it should have.
                 let checked = self.job.checked(&self.job.trajectory, &session.fresh_status()?, self.course);
                 let checked = checked.map_err(|e| self.job.not_checked(e, self.out))?;
@@ -240,10 +240,10 @@ impl Stage<'_> {
             let over = n == repeat || !leg.is_finished();
             let cut = !over && operator.wants_the_end();
             if over || cut {
-                return Ok(Legs { done, samples, last: leg, verdict, cut });
+                return Ok(Legs { done, last: leg, verdict, cut });
             }
             self.out.note(format!("run {n} of {repeat} finished"));
-            self.take(leg, &mut done, &mut samples);
+            self.take(&leg, &mut done);
             status = session.fresh_status()?;
         }
         Err(cancelled("run"))
@@ -295,15 +295,9 @@ impl Stage<'_> {
     }
 
     /// An approach is over. The recording is that of the motion: before the first one it is begun again.
-    fn approached(
-        &mut self,
-        first: bool,
-        leg: Leg,
-        done: &mut Vec<Done>,
-        samples: &mut Vec<jtc_host::Sample>,
-    ) {
+    fn approached(&mut self, first: bool, leg: Leg, done: &mut Finished) {
         if !first {
-            return self.take(leg, done, samples);
+            return self.take(&leg, done);
         }
         if let Some(Reel { info, tape, .. }) = self.reel.take() {
             done.push(Done { phase: leg.phase, summary: Summary::of(&info, &leg.samples) });
@@ -313,10 +307,10 @@ impl Stage<'_> {
         }
     }
 
-    fn take(&mut self, leg: Leg, done: &mut Vec<Done>, samples: &mut Vec<jtc_host::Sample>) {
+    /// Its figures; its samples are in the recording.
+    fn take(&mut self, leg: &Leg, done: &mut Finished) {
         let Some(reel) = &self.reel else { return };
         done.push(Done { phase: leg.phase, summary: Summary::of(&reel.info, &leg.samples) });
-        samples.extend(leg.samples);
     }
 }
 

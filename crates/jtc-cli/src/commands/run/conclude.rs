@@ -1,12 +1,14 @@
 //! How a run ended: its files, its figures, and the exit code.
 
+use std::collections::VecDeque;
+
 use cli_kit::{ErrorKind, Failure, Output, table};
 use jtc_host::check::Verdict;
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::{ReportInput, RunFailure, Summary};
 use jtc_host::session::Outcome;
-use jtc_host::{Error, MotionError, Sample, Session};
+use jtc_host::{Error, MotionError, Session};
 use serde_json::{Value, json};
 
 use super::super::job::Job;
@@ -14,12 +16,13 @@ use super::super::run_report;
 use super::leg::{APPROACH, Leg, Reel};
 use super::outputs::Outputs;
 
+/// Motions whose figures are kept: many runs must not fill the memory of a PC.
+const KEPT: usize = 1000;
+
 /// The motions of a run, in their order.
 pub struct Legs {
     /// Those that were finished, with their figures.
-    pub done: Vec<Done>,
-    /// Their samples; those of an approach before the first motion are not among them.
-    pub samples: Vec<Sample>,
+    pub done: Finished,
     /// The one that ended the run.
     pub last: Leg,
     /// What the check found of it.
@@ -32,6 +35,27 @@ pub struct Legs {
 pub struct Done {
     pub phase: &'static str,
     pub summary: Summary,
+}
+
+/// Motions that were finished: how many, and the figures of the last ones.
+#[derive(Default)]
+pub struct Finished {
+    kept: VecDeque<Done>,
+    /// Runs among all of them, without approaches.
+    runs: usize,
+    /// Runs and approaches that are not kept any more.
+    left_out: usize,
+}
+
+impl Finished {
+    pub fn push(&mut self, done: Done) {
+        self.runs += usize::from(done.phase != APPROACH);
+        if self.kept.len() == KEPT {
+            self.kept.pop_front();
+            self.left_out += 1;
+        }
+        self.kept.push_back(done);
+    }
 }
 
 /// How a motion ended, in a word.
@@ -63,19 +87,18 @@ pub fn conclude(
     outputs: Outputs,
     out: &Output,
 ) -> Result<(), Failure> {
-    let Legs { done, mut samples, last, verdict, cut } = legs;
+    let Legs { done, last, verdict, cut } = legs;
     let Reel { mut info, tape, .. } = reel;
     let link = session.statistics();
     let facts = [run_report::link_facts(&last.upload, &link, session.port().baud())];
     let broken = what_broke(&info, &last);
     let (word, summary) =
         (if cut { "stopped" } else { word(&last.outcome) }, Summary::of(&info, &last.samples));
-    let Leg { phase, upload, samples: of_last, outcome } = last;
-    samples.extend(of_last);
+    let Leg { phase, upload, samples, outcome } = last;
     let where_ =
         if phase == APPROACH { format!(" on the {APPROACH} to the first point") } else { String::new() };
     let reason = match &outcome {
-        Ok(_) if cut => format!("ended between two runs, {} were done", done.len() + 1),
+        Ok(_) if cut => format!("ended between two runs, {} were done", done.runs + 1),
         Ok(_) => where_.trim_start().to_owned(),
         Err(e) if where_.is_empty() => e.to_string(),
         Err(e) => format!("{}: {e}", where_.trim_start()),
@@ -102,6 +125,8 @@ pub fn conclude(
         "samples": summary.samples,
         "joints": summary.joints,
         "runs": runs,
+        "runs_finished": done.runs + usize::from(word == "finished" && phase != APPROACH || cut),
+        "runs_left_out": done.left_out,
         "failure": broken,
         "verdict": verdict,
         "upload": upload,
@@ -112,7 +137,8 @@ pub fn conclude(
     out.result(&value, || {
         let made: String = files.iter().map(|f| format!("\n{f}")).collect();
         let line = run_report::link_line(&upload, &link);
-        let each = if runs.len() > 1 { format!("\n{}", each_run(&runs)) } else { String::new() };
+        let each =
+            if runs.len() > 1 { format!("\n{}", each_run(&runs, done.left_out)) } else { String::new() };
         format!(
             "{each}\n{word}{where_}: {:.2} s\n{}\n{line}{made}",
             summary.executed_s,
@@ -132,9 +158,9 @@ pub fn conclude(
 }
 
 /// Every motion of the run as JSON, approaches among them; the last one ended it.
-fn runs(done: &[Done], last: (&'static str, &'static str, &Summary)) -> Vec<Value> {
-    let before = done.iter().map(|d| (d.phase, "finished", &d.summary));
-    let mut number = 0;
+fn runs(done: &Finished, last: (&'static str, &'static str, &Summary)) -> Vec<Value> {
+    let before = done.kept.iter().map(|d| (d.phase, "finished", &d.summary));
+    let mut number = done.runs - done.kept.iter().filter(|d| d.phase != APPROACH).count();
     let value = |(phase, outcome, summary): (&str, &str, &Summary)| {
         number += usize::from(phase != APPROACH);
         json!({
@@ -148,8 +174,8 @@ fn runs(done: &[Done], last: (&'static str, &'static str, &Summary)) -> Vec<Valu
     before.chain([last]).map(value).collect()
 }
 
-/// A line for each motion: the worst of its joints.
-fn each_run(runs: &[Value]) -> String {
+/// A line for each motion whose figures are kept: the worst of its joints.
+fn each_run(runs: &[Value], left_out: usize) -> String {
     let row = |run: &Value| {
         let worst = |key: &str, scale: f64, digits: usize| {
             let joints = run["joints"].as_array().into_iter().flatten();
@@ -167,5 +193,33 @@ fn each_run(runs: &[Value]) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-    table(&["worst joint", "", ">s", ">RMS mrad", ">max mrad", ">share %"], &rows)
+    let before =
+        if left_out > 0 { format!("{left_out} motions were finished before these\n") } else { String::new() };
+    before + &table(&["worst joint", "", ">s", ">RMS mrad", ">max mrad", ">share %"], &rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_host::Sample;
+    use jtc_host::recording::RecordingInfo;
+
+    use super::*;
+
+    /// The memory of 100,000 runs is that of the last thousand, which have their numbers.
+    #[test]
+    fn figures_of_the_last_motions_are_kept() {
+        let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);
+        let mut done = Finished::default();
+        for n in 0..3_001 {
+            let phase = if n % 3 == 2 { APPROACH } else { "motion" };
+            done.push(Done { phase, summary: summary.clone() });
+        }
+        assert_eq!((done.kept.len(), done.runs, done.left_out), (1000, 2001, 2001));
+        let runs = runs(&done, ("motion", "stopped", &summary));
+        assert_eq!(runs.len(), 1001);
+        let number = |i: usize| runs[i]["run"].as_u64();
+        assert_eq!((number(1000), number(999), number(998)), (Some(2002), Some(2001), None));
+        assert_eq!(number(0), Some(1335));
+        assert!(each_run(&runs, done.left_out).starts_with("2001 motions were finished before these\n"));
+    }
 }

@@ -107,3 +107,31 @@ fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     std::thread::sleep(std::time::Duration::from_millis(800));
     sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(0);
 }
+
+/// What would be ignored is refused before anything is sent.
+#[test]
+fn options_without_a_meaning_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("w.csv"), "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0,0,0,0,0\n").unwrap();
+    for out in ["out.mcap", "out.yaml", "out.YML", "out.json"] {
+        let refused = jtc(&["plan", &path("w.csv"), "-o", &path(out)]).ends(2);
+        assert!(refused.err.contains("out.csv`"), "{}", refused.err);
+        assert!(!std::path::Path::new(&path(out)).exists());
+    }
+    assert!(jtc(&["plan", &path("w.csv"), "-o", "-"]).ends(2).err.contains("- is no file"));
+    jtc(&["plan", &path("w.csv"), "-o", &path("out.csv")]).ends(0);
+    for quaternion in ["0,0,0,0", "0,0,0,2"] {
+        std::fs::write(
+            path("q.csv"),
+            format!("x,y,z,qx,qy,qz,qw\n0.3,0,0.8,{quaternion}\n0.3,0,0.7,0,0,0,1\n"),
+        )
+        .unwrap();
+        let refused = jtc(&["plan", &path("q.csv"), "-o", &path("q-out.csv")]).ends(2);
+        assert!(refused.err.contains("the quaternion has the length"), "{}", refused.err);
+    }
+    let words = ["move", "--to", "home", "--deg", "--port", "/dev/null"];
+    assert!(jtc(&words).ends(2).err.contains("--deg is for joint positions"));
+    let words = ["teach", "record", &path("t.csv"), "--tolerance", "0.1", "--port", "/dev/null"];
+    assert!(jtc(&words).ends(2).err.contains("--waypoints"));
+}

@@ -198,8 +198,8 @@ pub enum TeachCommand {
         /// Write waypoints instead of the motion
         #[arg(long, env = "JTC_WAYPOINTS", value_parser = FalseyValueParser::new())]
         waypoints: bool,
-        /// How far the motion may be from the legs between waypoints, rad of the joint that is furthest
-        #[arg(long, env = "JTC_TOLERANCE", value_name = "RAD", default_value_t = 0.01)]
-        tolerance: f64,
+        /// How far the motion may be from the legs between waypoints, rad of the joint that is furthest; default: 0.01
+        #[arg(long, env = "JTC_TOLERANCE", value_name = "RAD", requires = "waypoints")]
+        tolerance: Option<f64>,
     },
 }

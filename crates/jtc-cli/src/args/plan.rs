@@ -13,7 +13,7 @@ use super::{AcceptArgs, ForceArgs, LinkArgs, RunFiles};
 pub struct PlanArgs {
     /// Waypoints, CSV or JSON
     pub file: PathBuf,
-    /// Trajectory to write, CSV
+    /// Trajectory to write, .csv
     #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
     pub out: PathBuf,
     /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each
@@ -82,7 +82,7 @@ pub struct MoveArgs {
     /// The flange keeps to a straight line
     #[arg(long, env = "JTC_LINE", value_parser = FalseyValueParser::new())]
     pub line: bool,
-    /// The positions, or roll, pitch and yaw, are degrees
+    /// The positions, or roll, pitch and yaw, are degrees; not for poses by name, whose unit is known
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
     pub deg: bool,
     /// Speed in percent of what the limits allow, 1 to 100

@@ -14,6 +14,10 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if !(1.0..=100.0).contains(&args.speed) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent: args.speed, most: 100.0 }));
     }
+    if args.deg && matches!(args.to, Some(Target::Pose(_))) {
+        let message = "--deg is for joint positions and poses of the flange, and the unit of a named pose is known; nothing was sent";
+        return Err(Failure::usage(message).hint("leave --deg out (and JTC_DEG, where it is set)"));
+    }
     let (name, option) = match (&args.to, &args.to_flange) {
         (Some(Target::Pose(name)), _) => (name.clone(), "--to"),
         (Some(Target::Joints(q)), _) => (q.map(|v| format!("{v}")).join(","), "--to"),

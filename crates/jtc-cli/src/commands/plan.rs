@@ -31,6 +31,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if !(-40.0..=120.0).contains(&args.temperature) {
         return Err(Failure::usage(format!("--temperature {} °C is outside -40..120", args.temperature)));
     }
+    readable(&args.out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
     for warning in &arm.warnings {
         out.note(format!("note: {warning}"));
@@ -127,6 +128,24 @@ fn off_the_line(planned: &Planned, file: &WaypointFile, arm: &Arm, args: &PlanAr
          or `line` in a column `leg`, keeps it on the line",
         to - 1
     ))
+}
+
+/// What is written is CSV: under the ending of another form hardly a command would read it.
+fn readable(out: &Path) -> Result<(), Failure> {
+    let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
+        let message = format!(
+            "{}: a plan is written as CSV, and .{ending} is the ending of another form",
+            out.display()
+        );
+        let name = typed(&out.with_extension("csv"));
+        return Err(Failure::usage(message).hint(format!("name a file with the ending .csv: `-o {name}`")));
+    }
+    if out.as_os_str() == "-" {
+        let message = "- is no file: the trajectory is written to a file, and its figures to standard output";
+        return Err(Failure::usage(message).hint("name a file with the ending .csv: `-o motion.csv`"));
+    }
+    Ok(())
 }
 
 /// With the lines of the file that waypoints stand in.

@@ -18,6 +18,9 @@ use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 
+/// Waypoints describe a motion as exactly as this, rad, where nothing else is asked for.
+const TOLERANCE: f64 = 0.01;
+
 /// Does one of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
@@ -28,7 +31,8 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
         TeachCommand::Record { file, force, link, duration, waypoints, tolerance } => {
-            if *waypoints && !(1e-6..=1.0).contains(tolerance) {
+            let tolerance = tolerance.unwrap_or(TOLERANCE);
+            if *waypoints && !(1e-6..=1.0).contains(&tolerance) {
                 let message =
                     format!("a tolerance of {tolerance} rad is outside 0.000001..1; nothing was sent");
                 return Err(Failure::usage(message).hint("0.01 rad is half a degree"));
@@ -41,7 +45,7 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
                 return Err(Failure::usage(message).hint("name a file, or leave --waypoints out"));
             }
             let output = OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?;
-            record(output, link, *duration, waypoints.then_some(*tolerance), out)
+            record(output, link, *duration, waypoints.then_some(tolerance), out)
         }
     }
 }

@@ -107,7 +107,16 @@ impl Diagnose for WaypointError {
             Self::File(e) => e.diagnosis(),
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
-            Self::Flange { source, .. } => Diagnosis::new(ErrorKind::Refused, "flange-pose", source.hint()),
+            Self::Flange { source, .. } => {
+                // Numbers that are no pose, for whichever arm.
+                let kind = match **source {
+                    kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
+                        ErrorKind::Usage
+                    }
+                    _ => ErrorKind::Refused,
+                };
+                Diagnosis::new(kind, "flange-pose", source.hint())
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 use jtc_wire::Joint;
 
 use crate::path::{Path, PathPoint, Waypointed};
-use crate::{JOINTS, JointVec, PlanError};
+use crate::{JOINTS, JointVec, PlanError, thin};
 
 /// Waypoints closer than this, rad, are one.
 const SAME: f64 = 1e-9;
@@ -24,8 +24,17 @@ const BACK: f64 = 0.05;
 pub struct BlendedPath {
     /// Without repetitions.
     corners: Vec<Corner>,
-    /// Index in `corners` of each waypoint given.
-    given: Vec<usize>,
+    /// Of each waypoint given.
+    given: Vec<Given>,
+}
+
+/// Where a waypoint is on the path.
+#[derive(Clone, Copy, Debug)]
+struct Given {
+    /// Index of the last corner up to it.
+    corner: usize,
+    /// That of this corner, where it is one.
+    parameter: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +46,8 @@ struct Corner {
     /// Half of the rounding's parameters; 0: none.
     half: f64,
     stop: bool,
+    /// A stop for no other reason.
+    leads_back: bool,
 }
 
 impl BlendedPath {
@@ -53,10 +64,19 @@ impl BlendedPath {
         if !(blend >= 0.0 && blend.is_finite()) {
             return Err(PlanError::Blend { value: blend });
         }
-        let (mut corners, given) = distinct(waypoints)?;
+        let (corners, given) = distinct(waypoints)?;
         if corners.len() < 2 {
             return Err(PlanError::Path { leg: 1, parameter: 0.0 });
         }
+        let given = given.into_iter().map(|corner| Given { corner, parameter: 0.0 }).collect();
+        let mut path = Self { corners, given };
+        path.round(blend);
+        Ok(path)
+    }
+
+    /// Directions, parameters and rounded corners of the positions.
+    fn round(&mut self, blend: f64) {
+        let corners = &mut self.corners;
         let mut length_before = 0.0;
         for i in 0..corners.len() - 1 {
             let (from, to) = (corners[i], corners[i + 1].position);
@@ -70,7 +90,68 @@ impl BlendedPath {
             }
             length_before = length;
         }
-        Ok(Self { corners, given })
+        for given in &mut self.given {
+            given.parameter = corners[given.corner].parameter;
+        }
+    }
+
+    /// The same path without the corners that lie within `share` of the blend of the straight line between the ones that stay, where
+    /// it follows the line and waypoints are so close to each other that all of the line is within the blend of them; the waypoints
+    /// for which `keep` holds stay. `None` where that leaves nothing out.
+    pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
+        let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
+        for (i, given) in self.given.iter().enumerate() {
+            stays[given.corner] |= keep(i);
+        }
+        let positions: Vec<JointVec> = self.corners.iter().map(|c| c.position).collect();
+        let kept = thin::kept(&positions, &stays, blend, share);
+        if kept.len() == self.corners.len() {
+            return None;
+        }
+        let fresh =
+            |&i: &usize| Corner { half: 0.0, stop: stays[i] && self.corners[i].stop, ..self.corners[i] };
+        let corners: Vec<Corner> = kept.iter().map(fresh).collect();
+        let index = |old: usize| kept.partition_point(|k| *k <= old) - 1;
+        let given = self.given.iter().map(|g| Given { corner: index(g.corner), parameter: 0.0 });
+        let mut path = Self { given: given.collect(), corners };
+        path.round(blend);
+        for (new, old) in path.given.iter_mut().zip(&self.given) {
+            if kept[new.corner] != old.corner {
+                let (from, to) = (&path.corners[new.corner], &path.corners[new.corner + 1]);
+                let along = thin::along(&from.position, &to.position, &self.corners[old.corner].position);
+                new.parameter = from.parameter + along * (to.parameter - from.parameter);
+            }
+        }
+        Some(path)
+    }
+
+    /// How many corners it has, both ends counted.
+    pub(crate) fn corners(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Whether the corner with this index is rounded.
+    pub(crate) fn is_rounded(&self, corner: usize) -> bool {
+        self.corners[corner].half > 0.0
+    }
+
+    /// The positions of the legs' ends.
+    pub(crate) fn legs(&self) -> impl Iterator<Item = (JointVec, JointVec)> {
+        self.corners.windows(2).map(|pair| (pair[0].position, pair[1].position))
+    }
+
+    /// The middles of the legs.
+    pub(crate) fn middles(&self) -> Vec<f64> {
+        self.corners.windows(2).map(|pair| 0.5 * (pair[0].parameter + pair[1].parameter)).collect()
+    }
+
+    /// The same with stops at the corners with these indices.
+    pub(crate) fn stopping_at(&self, corners: &[usize]) -> Self {
+        let mut path = self.clone();
+        for &i in corners {
+            (path.corners[i].half, path.corners[i].stop) = (0.0, true);
+        }
+        path
     }
 
     /// Whether two waypoints are so near to each other that there is no leg between them.
@@ -139,6 +220,7 @@ impl Corner {
             parts.fold(0.0, f64::max)
         };
         let (turn, sum) = (size(-1.0), size(1.0));
+        self.leads_back = !self.stop && half > 0.0 && sum < BACK;
         self.stop |= half <= 0.0 || sum < BACK;
         if !self.stop && turn > STRAIGHT {
             self.half = half;
@@ -164,8 +246,7 @@ impl Path for BlendedPath {
     }
 
     fn waypoint(&self, s: f64) -> Option<usize> {
-        let corner = self.corners.partition_point(|c| c.parameter <= s).max(1) - 1;
-        Some(self.given.partition_point(|&g| g <= corner).max(1))
+        Some(self.given.partition_point(|g| g.parameter <= s).max(1))
     }
 
     fn breaks(&self) -> Vec<f64> {
@@ -196,18 +277,19 @@ impl Path for BlendedPath {
     }
 
     fn waypoints(&self) -> Vec<f64> {
-        self.given.iter().map(|&g| self.corners[g].parameter).collect()
+        self.given.iter().map(|g| g.parameter).collect()
     }
 }
 
 impl Waypointed for BlendedPath {
     fn is_one_place(&self, from: usize, to: usize) -> bool {
-        self.given[from] == self.given[to]
+        self.given[from].parameter == self.given[to].parameter
     }
 
     fn stops_at(&self, waypoint: usize) -> bool {
-        let corner = self.given[waypoint];
-        corner == 0 || corner + 1 == self.corners.len() || self.corners[corner].stop
+        let Given { corner, parameter } = self.given[waypoint];
+        let is_end = corner == 0 || corner + 1 == self.corners.len();
+        self.corners[corner].parameter == parameter && (is_end || self.corners[corner].stop)
     }
 }
 
@@ -230,6 +312,7 @@ fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanErr
                 direction: [0.0; JOINTS],
                 half: 0.0,
                 stop: false,
+                leads_back: false,
             }),
         }
         given.push(corners.len() - 1);
@@ -238,6 +321,6 @@ fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanErr
 }
 
 /// Of the joint that moves most, rad.
-fn distance(a: &JointVec, b: &JointVec) -> f64 {
+pub(crate) fn distance(a: &JointVec, b: &JointVec) -> f64 {
     a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }

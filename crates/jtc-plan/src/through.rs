@@ -5,7 +5,7 @@ use crate::along::{Choices, along_at};
 use crate::binding::{Binding, LimitKind};
 use crate::kinematics::Route;
 use crate::path::Waypointed;
-use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, p2p, verify, warp};
+use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, choose, p2p, verify, warp};
 
 /// How near a motion passes a waypoint to the time that was given for it, s: half a tick of the controller.
 const ON_TIME: f64 = 5e-4;
@@ -39,7 +39,8 @@ impl From<JointVec> for Waypoint {
 }
 
 /// From the first waypoint to the last, as fast as the limits allow, on straight legs whose corners are rounded within `blend` rad (see
-/// [`BlendedPath`]); 0: a stop at each waypoint. Waypoints that are all the same are a rest of 10 ms.
+/// [`BlendedPath`]); 0: a stop at each waypoint. Where it is faster the arm stops at a corner, or waypoints closer to each other than the
+/// blend are passed on a straighter line, within the blend of each of them. Waypoints that are all the same are a rest of 10 ms.
 ///
 /// A waypoint with a time is passed at that time, to half a millisecond; where it could be earlier, the motion since the waypoint
 /// with a time before it is slower; between waypoints at one place the arm rests. Legs without a time after them are as fast as they can be.
@@ -48,7 +49,7 @@ impl From<JointVec> for Waypoint {
 ///
 /// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`] and [`PlanError::Position`] for one that is none or
 /// outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not rise from 0, [`PlanError::TooEarly`] for one
-/// that the limits do not allow, and those of [`along`].
+/// that the limits do not allow, and those of [`along`](crate::along).
 pub fn through(
     waypoints: &[Waypoint],
     blend: f64,
@@ -71,7 +72,18 @@ pub fn through(
         return verify::finished(rest(&positions, &given), limits, arm);
     }
     let path = BlendedPath::new(&positions, blend)?;
-    if given.len() < 2 { along(&path, limits, arm) } else { on_time(&path, &given, limits, arm) }
+    let keep = |i: usize| waypoints[i].time.is_some();
+    if given.len() < 2 {
+        return Ok(choose::fastest(path, blend, &keep, limits, arm)?.motion);
+    }
+    match on_time(&path, &given, limits, arm) {
+        // Another path may be faster.
+        Err(PlanError::TooEarly { .. }) if blend > 0.0 => {
+            let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
+            on_time(&chosen.path, &given, limits, arm)
+        }
+        motion => motion,
+    }
 }
 
 /// From the first waypoint of a route to its last, as fast as the limits allow. `times` are those of its waypoints, as those of [`Waypoint`];

@@ -191,7 +191,7 @@ impl Case {
                     - 1;
             let legs = leg.saturating_sub(1)..=(leg + 1).min(self.waypoints.len() - 2);
             let on_leg = legs.clone().any(|l| self.distance_to_leg(l, &q) < 1e-7);
-            let in_corner = legs.clone().skip(1).any(|l| self.is_in_corner(l, &q));
+            let in_corner = legs.clone().skip(1).any(|l| self.is_in_corner(l, &q)) || self.is_in_row(leg, &q);
             if !on_leg && !in_corner && wrong.len() < 2000 {
                 let away = legs.map(|l| self.distance_to_leg(l, &q)).fold(f64::INFINITY, f64::min);
                 let _ = writeln!(wrong, "off the legs by {away} rad at {time:.4} s, not within a blend");
@@ -208,6 +208,19 @@ impl Case {
         distance(q, &std::array::from_fn(|j| a[j] + u * way[j]))
     }
 
+    /// Within the blend of one of some waypoints that are close to each other around a leg, and in the box of all of them.
+    fn is_in_row(&self, leg: usize, q: &JointVec) -> bool {
+        [leg, leg + 1].into_iter().any(|at| {
+            let row = &self.waypoints[row(&self.waypoints, at, self.blend)];
+            let inside = (0..JOINTS).all(|j| {
+                let low = row.iter().map(|w| w[j]).fold(f64::INFINITY, f64::min);
+                let high = row.iter().map(|w| w[j]).fold(f64::NEG_INFINITY, f64::max);
+                (low - 1e-9..=high + 1e-9).contains(&q[j])
+            });
+            row.len() > 3 && inside && row.iter().any(|w| distance(q, w) <= self.blend + 1e-9)
+        })
+    }
+
     fn is_in_corner(&self, corner: usize, q: &JointVec) -> bool {
         let [a, b, c] = [corner - 1, corner, corner + 1].map(|i| &self.waypoints[i]);
         let inside = (0..JOINTS).all(|j| {
@@ -217,6 +230,19 @@ impl Case {
         });
         inside && distance(q, b) <= self.blend + 1e-9
     }
+}
+
+/// Waypoints closer to each other than the blend, of which some may be left out.
+fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
+    let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
+    let (mut from, mut to) = (at, at);
+    while from > 0 && dense(from - 1) {
+        from -= 1;
+    }
+    while to + 1 < waypoints.len() && dense(to) {
+        to += 1;
+    }
+    from.saturating_sub(1)..=(to + 1).min(waypoints.len() - 1)
 }
 
 /// A walk inside the position limits, some of whose waypoints repeat, go straight on or go back.

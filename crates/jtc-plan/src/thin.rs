@@ -1,0 +1,55 @@
+//! Fewer waypoints on the same way.
+use crate::JointVec;
+use crate::blend::distance;
+
+/// Share of the blend that waypoints may be apart which are left out: the line between them is then within the blend of one of them.
+const GAP_SHARE: f64 = 0.9;
+/// Most waypoints that are left out in a row.
+const ROW_MAX: usize = 256;
+
+/// Indices of the positions that are kept, rising: both ends, those that have to stay (`stays`), and as many others as it takes for all that
+/// are left out to be within `share` of the blend of the straight line between their kept neighbours, along which they follow each other.
+pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f64) -> Vec<usize> {
+    let last = positions.len() - 1;
+    let dense = |i: usize| distance(&positions[i - 1], &positions[i]) <= GAP_SHARE * blend;
+    let mut kept = vec![0];
+    let mut from = 0;
+    while from < last {
+        let mut to = from + 1;
+        while to < last
+            && to - from < ROW_MAX
+            && !stays[to]
+            && dense(to)
+            && dense(to + 1)
+            && follows(positions, from, to + 1, share * blend)
+        {
+            to += 1;
+        }
+        kept.push(to);
+        from = to;
+    }
+    kept
+}
+
+/// Whether what is between the two positions lies no further than `most` from the line between them, one after the other.
+fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
+    let (a, b) = (&positions[from], &positions[to]);
+    let mut before = 0.0;
+    positions[from + 1..to].iter().all(|q| {
+        let u = along(a, b, q);
+        let on_line: JointVec = std::array::from_fn(|j| a[j] + u * (b[j] - a[j]));
+        let in_order = u >= before && u < 1.0;
+        before = u;
+        in_order && u > 0.0 && distance(&on_line, q) <= most
+    })
+}
+
+/// Where on the way from `a` (0) to `b` (1) the place nearest to `q` is.
+pub(crate) fn along(a: &JointVec, b: &JointVec, q: &JointVec) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for ((a, b), q) in a.iter().zip(b).zip(q) {
+        product += (b - a) * (q - a);
+        square += (b - a) * (b - a);
+    }
+    if square > 0.0 { (product / square).clamp(0.0, 1.0) } else { 0.0 }
+}

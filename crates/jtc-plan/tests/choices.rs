@@ -1,0 +1,66 @@
+//! Whatever is the fastest within the blend is taken.
+use jtc_core::Config;
+use jtc_plan::{JOINTS, JointVec, Limits, Motion, Waypoint, through};
+use proptest::prelude::*;
+
+mod judge;
+
+use judge::Case;
+
+fn given(positions: &[JointVec]) -> Vec<Waypoint> {
+    positions.iter().copied().map(Waypoint::from).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// A stop lies within every blend: corners that may be rounded cost no time.
+    #[test]
+    fn a_blend_is_never_slower_than_stops(seed in any::<u64>(), small in 1e-9..0.05f64) {
+        let case = Case::random(seed);
+        let arm = case.arm();
+        let Ok(stops) = through(&case.given(), 0.0, &case.limits, arm.as_ref()) else { return Ok(()) };
+        for blend in [small, case.blend] {
+            let blended = through(&case.given(), blend, &case.limits, arm.as_ref()).unwrap();
+            let (blended, stops) = (blended.duration(), stops.duration());
+            prop_assert!(blended <= stops * (1.0 + 1e-9), "seed {}, {} rad: {} s, {} s", seed, blend, blended, stops);
+        }
+    }
+
+    /// Waypoints that lie densely on a smooth curve are not slower than a few of them; all of them are passed within the blend.
+    #[test]
+    fn more_waypoints_on_a_curve_cost_no_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
+        let rng = &mut fastrand::Rng::with_seed(seed);
+        let amplitudes: [JointVec; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.f64() - 0.5));
+        let curve = |u: f64| -> JointVec {
+            std::array::from_fn(|j| {
+                let turn = std::f64::consts::TAU * u;
+                amplitudes[0][j] * turn.sin() + amplitudes[1][j] * (1.0 - turn.cos())
+            })
+        };
+        let through_some = |count: usize| {
+            let positions: Vec<JointVec> = (0..count).map(|i| curve(i as f64 / (count - 1) as f64)).collect();
+            (through(&given(&positions), blend, &Limits::of(&Config::avena()), None).unwrap(), positions)
+        };
+        let few = through_some(25).0.duration();
+        let (many, positions) = through_some(401);
+        prop_assert!(many.duration() < 1.1 * few, "seed {}: {} s, {} s", seed, many.duration(), few);
+        passes_all(&many, &positions, blend, seed)?;
+    }
+}
+
+/// Each waypoint is passed within the blend, and no place is further than that from one.
+fn passes_all(motion: &Motion, positions: &[JointVec], blend: f64, seed: u64) -> Result<(), TestCaseError> {
+    let distance = |a: &JointVec, b: &JointVec| (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max);
+    let places: Vec<JointVec> =
+        (0..=4000).map(|i| motion.at(motion.duration() * f64::from(i) / 4000.0).position).collect();
+    for q in positions {
+        let nearest = places.iter().map(|p| distance(p, q)).fold(f64::INFINITY, f64::min);
+        prop_assert!(nearest <= blend, "seed {}: {} rad from a waypoint", seed, nearest);
+    }
+    for p in &places {
+        let nearest = positions.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min);
+        prop_assert!(nearest <= blend, "seed {}: {} rad from all waypoints", seed, nearest);
+    }
+    Ok(())
+}

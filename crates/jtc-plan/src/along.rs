@@ -35,11 +35,9 @@ pub(crate) fn along_at(
 ) -> Result<Motion, PlanError> {
     limits.check()?;
     let limits_of_motion = verify::with_table(limits, arm);
-    if let Some(arm) = arm {
-        let rests = std::iter::once(0.0).chain(path.stops()).chain([path.end()]);
-        for s in rests.filter(|s| s.is_finite()) {
-            verify::can_be_held(&path.at(s).position, path.waypoint(s).unwrap_or(1), limits, arm)?;
-        }
+    let rests = std::iter::once(0.0).chain(path.stops()).chain([path.end()]);
+    for s in rests.filter(|s| s.is_finite()) {
+        verify::holds(&path.at(s).position, path.waypoint(s).unwrap_or(1), limits, arm)?;
     }
     let mut motion: Option<Motion> = None;
     for (i, section) in sections(path)?.iter().enumerate() {
@@ -144,7 +142,8 @@ fn caps(
         let Some(arm) = arm else { return Ok(cap) };
         cell.friction_cap(cap, limits, arm).map_err(|(joint, torque, limit): (Joint, f64, f64)| {
             let waypoint = section.path.waypoint(section.from + cell.from).unwrap_or(1);
-            PlanError::Torque { waypoint, joint, torque, limit, holding: false }
+            let whole = limits.torque[joint.index()];
+            PlanError::Torque { waypoint, joint, torque, limit, whole, holding: false }
         })
     };
     cells.iter().map(cap).collect()

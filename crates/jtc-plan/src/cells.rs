@@ -25,6 +25,8 @@ const SPEED_TORQUE_SHARE: f64 = 0.8;
 pub(crate) const TORQUE_SHARE: f64 = 0.999;
 /// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
 const MOTION_SHARE: f64 = 0.05;
+/// Share of it with which the arm can still creep.
+const CREEP_SHARE: f64 = 0.002;
 
 /// The parts of the torque at a place, N·m: q̈ = q′·s̈ + q″·ṡ² makes it hold + mass·s̈ + speed·ṡ², and friction.
 #[derive(Clone, Copy, Debug)]
@@ -186,11 +188,12 @@ impl Cell {
                 }
                 if cap <= SLOWEST * fastest {
                     // The last few percent are enough to creep.
-                    if share > 0.002 {
+                    if share > CREEP_SHARE {
                         break;
                     }
                     let joint = Joint::ALL[j];
-                    return Err((joint, (1.0 - share) * limits.torque[j], limits.torque[j]));
+                    let of_limit = |share: f64| (TORQUE_SHARE - share) * limits.torque[j];
+                    return Err((joint, of_limit(share), of_limit(CREEP_SHARE)));
                 }
                 cap *= 0.8;
             }

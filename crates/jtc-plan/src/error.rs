@@ -95,8 +95,9 @@ pub enum PlanError {
     },
     /// The torque does not suffice however slow the motion is.
     #[error(
-        "waypoint {waypoint}, {joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m",
-        if *.holding { "holding the arm there" } else { "the slowest motion from there" }
+        "waypoint {waypoint}, {joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
+        if *.holding { "holding the arm there" } else { "the slowest motion from there" },
+        100.0 * limit / whole
     )]
     Torque {
         /// Where, or the one before the place where; from 1.
@@ -105,8 +106,10 @@ pub enum PlanError {
         joint: Joint,
         /// N·m.
         torque: f64,
-        /// N·m.
+        /// What is left for that, N·m.
         limit: f64,
+        /// The torque limit, of which that is a share, N·m.
+        whole: f64,
         /// The arm could not even be held there, where the motion begins, rests or ends.
         holding: bool,
     },

@@ -28,6 +28,8 @@ pub fn point_to_point(
     limits.check()?;
     limits.holds(from, 1)?;
     limits.holds(to, 2)?;
+    verify::holds(from, 1, limits, arm)?;
+    verify::holds(to, 2, limits, arm)?;
     let motion = fastest(from, to, &verify::with_table(limits, arm))?;
     verify::finished(motion, limits, arm)
 }

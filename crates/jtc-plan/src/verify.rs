@@ -178,7 +178,9 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     while let Some((time, joint, torque, limit)) = over(slow) {
         if slow > SLOWEST {
             let waypoint = waypoint_at(&motion, time);
-            return Err(PlanError::Torque { waypoint, joint, torque: torque.abs(), limit, holding: false });
+            let (torque, whole) = (torque.abs(), limit);
+            let limit = TORQUE_SHARE * whole;
+            return Err(PlanError::Torque { waypoint, joint, torque, limit, whole, holding: false });
         }
         fast = slow;
         slow *= 1.25;
@@ -199,24 +201,26 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     for (i, &time) in motion.waypoint_times.iter().enumerate() {
         let state = motion.at(time);
         if state.velocity.iter().all(|v| v.abs() <= 1e-6) {
-            can_be_held(&state.position, i + 1, limits, arm)?;
+            holds(&state.position, i + 1, limits, Some(arm))?;
         }
     }
     Ok(())
 }
 
-/// Whether the arm can be held at a place, which `waypoint` (from 1) names in the error.
-pub(crate) fn can_be_held(
+/// Whether the arm, if there is one, can be held at a place; `waypoint`, from 1, names it in the error.
+pub(crate) fn holds(
     position: &JointVec,
     waypoint: usize,
     limits: &Limits,
-    arm: &ArmDynamics,
+    arm: Option<&ArmDynamics>,
 ) -> Result<(), PlanError> {
+    let Some(arm) = arm else { return Ok(()) };
     let torques = arm.holding(position);
     for joint in Joint::ALL {
-        let (torque, limit) = (torques[joint.index()].abs(), HOLD_SHARE * limits.torque[joint.index()]);
+        let (torque, whole) = (torques[joint.index()].abs(), limits.torque[joint.index()]);
+        let limit = HOLD_SHARE * whole;
         if torque > limit || torque.is_nan() {
-            return Err(PlanError::Torque { waypoint, joint, torque, limit, holding: true });
+            return Err(PlanError::Torque { waypoint, joint, torque, limit, whole, holding: true });
         }
     }
     Ok(())

@@ -131,8 +131,9 @@ impl<'a> Planner<'a> {
     /// [`PlanError::Speed`]; [`PlanError::Plan`] for a place outside the limits or that no torque holds; [`PlanError::Refused`] when the
     /// check finds what no speed mends.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
-        let (limits, arm) = (self.limits(&[*from, *to])?, self.dynamics());
-        let motion = jtc_plan::point_to_point(from, to, &limits, arm.as_ref())?;
+        let arm = self.dynamics();
+        let motion =
+            self.within(&[*from, *to], |limits| jtc_plan::point_to_point(from, to, limits, arm.as_ref()))?;
         self.checked(&motion, from, Some(*from), false)
     }
 
@@ -147,8 +148,9 @@ impl<'a> Planner<'a> {
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
             return Err(PlanError::Nowhere { count: positions.len() });
         }
-        let (limits, arm) = (self.limits(&positions)?, self.dynamics());
-        let motion = jtc_plan::through(waypoints, self.blend, &limits, arm.as_ref())?;
+        let arm = self.dynamics();
+        let motion =
+            self.within(&positions, |limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
         let first = positions.first().copied().unwrap_or_default();
         self.checked(&motion, &first, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
     }
@@ -188,6 +190,29 @@ impl<'a> Planner<'a> {
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {
         self.model
             .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
+    }
+
+    /// A motion within the limits of a plan; where a joint's share of the torque leaves nothing for it, that joint has more of it.
+    fn within(
+        &self,
+        places: &[[f64; JOINTS]],
+        plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
+    ) -> Result<Motion, PlanError> {
+        let mut limits = self.limits(places)?;
+        let mut raised = [false; JOINTS];
+        loop {
+            match plan(&limits) {
+                Err(jtc_plan::PlanError::Torque { joint, .. })
+                    if limits.torque[joint.index()] < self.config.joints[joint.index()].torque_max =>
+                {
+                    let (j, whole) = (joint.index(), self.config.joints[joint.index()].torque_max);
+                    // The half of it first: a little is left for the controller's own corrections.
+                    limits.torque[j] = if raised[j] { whole } else { 0.5 * (limits.torque[j] + whole) };
+                    raised[j] = true;
+                }
+                motion => return Ok(motion?),
+            }
+        }
     }
 
     /// What a plan keeps to. A place that takes more than the usual share of a torque to be held, but not too much, can be left again.

@@ -118,3 +118,50 @@ fn given_times_are_kept_or_refused() {
     assert!(error.to_string().contains("waypoint 2") && error.to_string().contains("joint 1"), "{error}");
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
+
+/// Joint 2 of the arm with a payload (kg), between a pose that takes most of its torque and the upright one.
+fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
+    let arm = Arm::avena();
+    let (mut config, friction) = (arm.config(), arm.friction());
+    config.payload.mass = mass;
+    let planner = Planner { model: Some(&arm.model), friction: friction.as_ref(), ..Planner::new(&config) };
+    let places = [0.0, 1.4, 0.0].map(|q| [0.0, q, 0.0, 0.0, 0.0, 0.0]);
+    planner.through(&waypoints(&places))
+}
+
+/// What the whole torque limit can hold and leave is planned, though a plan uses less of it elsewhere.
+#[test]
+fn a_pose_that_can_be_held_can_be_left() {
+    let (arm, mut masses) = (Arm::avena(), 0);
+    let limit = arm.config().joints[1].torque_max;
+    for tenths in 0..40 {
+        let mut config = arm.config();
+        config.payload.mass = 0.1 * f64::from(tenths);
+        let hold = jtc_dynamics::Dynamics::with_payload(&arm.model, config.gravity, &config.payload).inverse(
+            &[0.0, 1.4, 0.0, 0.0, 0.0, 0.0],
+            &[0.0; 6],
+            &[0.0; 6],
+        )[1];
+        if (0.8..0.93).contains(&(hold.abs() / limit)) {
+            let planned = lowered_with(config.payload.mass).unwrap();
+            assert!(planned.verdict.is_ok());
+            masses += 1;
+        }
+    }
+    assert!(masses > 0);
+}
+
+/// The waypoint that cannot be held is named, with what it takes and how much of the limit holding may take.
+#[test]
+fn too_much_payload_names_the_pose_that_cannot_be_held() {
+    let error = lowered_with(8.0).unwrap_err();
+    let PlanError::Plan(jtc_plan::PlanError::Torque { waypoint, joint, torque, limit, whole, holding }) =
+        &error
+    else {
+        panic!("{error}")
+    };
+    assert_eq!((*waypoint, joint.number(), *holding), (2, 2, true), "{error}");
+    let of_arm = Arm::avena().config().joints[1].torque_max;
+    assert!(*whole == of_arm && (limit / of_arm - HOLD_SHARE).abs() < 1e-9 && torque > limit, "{error}");
+    assert!(error.to_string().contains("97.0 % of its limit of 180.0 N·m"), "{error}");
+}

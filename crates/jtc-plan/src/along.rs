@@ -6,7 +6,7 @@ use crate::compose::Section;
 use crate::law::Law;
 use crate::motion::Motion;
 use crate::path::Path;
-use crate::{ArmDynamics, Limits, PlanError, jerk, reach, verify};
+use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
 /// As fast along a path as velocity, acceleration and torque allow, from rest to rest: time-optimal path parameterisation by
 /// reachability analysis (Pham and Pham 2018). Where the limits have a jerk, the law of time is averaged over a window, so that the
@@ -18,7 +18,7 @@ use crate::{ArmDynamics, Limits, PlanError, jerk, reach, verify};
 /// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and [`PlanError::Path`] where the
 /// path leads outside or has no direction, [`PlanError::Torque`] where the torque does not suffice at any speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
-    along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
+    along_at(path, limits, arm, &|_| 1.0, &mut Choices::default()).map(reasons::completed)
 }
 
 /// What was chosen for each section of a path, so that it can be planned again alike: a law that depends on it without jumps.

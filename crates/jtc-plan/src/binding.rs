@@ -49,7 +49,7 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// From when to when which limit of which joint is used up: what a faster motion would have to exceed.
+/// From when to when which limit of which joint is used up, or comes closest to that: what a faster motion would have to exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
     /// s from the start.

@@ -18,6 +18,7 @@ mod path;
 mod plateau;
 mod profile;
 mod reach;
+mod reasons;
 mod thin;
 mod through;
 mod torque;

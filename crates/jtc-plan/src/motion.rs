@@ -1,5 +1,7 @@
 //! Motions in time.
-use crate::binding::Binding;
+use jtc_wire::Joint;
+
+use crate::binding::{Binding, LimitKind};
 use crate::{JOINTS, JointVec};
 
 /// Position, velocity and acceleration at a moment.
@@ -87,13 +89,15 @@ pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) end: State,
     pub(crate) binding: Vec<Binding>,
+    /// What binds where nothing of that does.
+    pub(crate) else_binding: Vec<Binding>,
     pub(crate) waypoint_times: Vec<f64>,
 }
 
 impl Motion {
     /// Of the pieces, which follow each other without a gap, and rest at `end`.
     pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
-        Self { pieces, end: State::rest(end), binding: Vec::new(), waypoint_times }
+        Self { pieces, end: State::rest(end), binding: Vec::new(), else_binding: Vec::new(), waypoint_times }
     }
 
     /// Seconds from rest to rest, above 0.
@@ -122,7 +126,8 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Which limit binds when, in the order of time. In between no limit is used up.
+    /// Which limit binds when, in the order of time: where none is used up, the one that is closest to it around there, or for which all of the
+    /// motion was slowed down.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }
@@ -147,6 +152,7 @@ impl Motion {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
             end: self.end,
             binding: Vec::new(),
+            else_binding: Vec::new(),
             waypoint_times: self.waypoint_times.iter().map(|t| t * factor).collect(),
         }
     }
@@ -163,15 +169,16 @@ impl Motion {
         for time in &mut self.waypoint_times[waypoint + 1..] {
             *time += length;
         }
-        for b in &mut self.binding {
-            let later = |t: &mut f64| {
-                if *t > time + 1e-9 {
-                    *t += length
-                }
-            };
-            later(&mut b.to);
-            later(&mut b.from);
-        }
+        let mut binding = Vec::with_capacity(self.binding.len() + 2);
+        let after = self.binding.partition_point(|b| b.from < time);
+        let joint = self.binding.get(after.saturating_sub(1)).map_or(Joint::ALL[0], |b| b.joint);
+        binding.extend(self.binding[..after].iter().map(|b| Binding { to: b.to.min(time), ..*b }));
+        binding.push(Binding { from: time, to: time + length, joint, limit: LimitKind::GivenTime });
+        // One that goes on after the rest has two parts.
+        let both = self.binding[..after].last().filter(|b| b.to > time).map(|b| Binding { from: time, ..*b });
+        let later = both.into_iter().chain(self.binding[after..].iter().copied());
+        binding.extend(later.map(|b| Binding { from: b.from + length, to: b.to + length, ..b }));
+        self.binding = binding;
     }
 
     /// Appends another motion that begins where this one ends. The first waypoint of `next` is the last one of this.

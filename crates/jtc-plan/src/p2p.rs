@@ -4,7 +4,7 @@ use rsruckig::prelude::{
 };
 
 use crate::motion::{Motion, Piece};
-use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, trapezoid, verify};
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, trapezoid, verify};
 
 /// Length of a motion that leads nowhere, s: a trajectory has two points, and so some time.
 const STANDING: f64 = 0.01;
@@ -31,7 +31,7 @@ pub fn point_to_point(
     verify::holds(from, 1, limits, arm)?;
     verify::holds(to, 2, limits, arm)?;
     let motion = fastest(from, to, &verify::with_table(limits, arm))?;
-    verify::finished(motion, limits, arm)
+    Ok(reasons::completed(verify::finished(motion, limits, arm)?))
 }
 
 /// The same without torque.

@@ -5,7 +5,9 @@ use crate::along::{Choices, along_at};
 use crate::binding::{Binding, LimitKind};
 use crate::kinematics::Route;
 use crate::path::Waypointed;
-use crate::{ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, choose, p2p, verify, warp};
+use crate::{
+    ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, choose, p2p, reasons, verify, warp,
+};
 
 /// How near a motion passes a waypoint to the time that was given for it, s: half a tick of the controller.
 const ON_TIME: f64 = 5e-4;
@@ -179,7 +181,7 @@ fn on_time(
     let (rests, mut stretches): (Vec<Stretch>, Vec<Stretch>) =
         given.windows(2).map(between).partition(|s| path.is_one_place(s.from, s.to));
     let motion = moving_on_time(path, &mut stretches, limits, arm)?;
-    let mut motion = with_given_times(motion, &stretches);
+    let mut motion = reasons::completed(with_given_times(motion, &stretches));
     for rest in rests {
         motion.rest_at(rest.from, rest.wanted);
     }
@@ -263,6 +265,7 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
 
 /// What limits a stretch that takes longer than it may.
 fn too_early(late: &Stretch, motion: &Motion) -> PlanError {
+    let motion = &reasons::completed(motion.clone());
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);
     let inside = |b: &Binding| (b.to.min(to) - b.from.max(from)).max(0.0);
     let mut longest = (Joint::ALL[0], LimitKind::Velocity, 0.0);

@@ -1,10 +1,10 @@
 //! What a motion uses of its limits, between samples too, and slowing it down until they hold.
 use jtc_wire::Joint;
 
-use crate::binding::{Binding, LimitKind};
+use crate::binding::LimitKind;
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
-use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, reasons};
 
 /// Of a limit that the arithmetic may exceed it by.
 const ROUNDING: f64 = 1e-9;
@@ -12,14 +12,12 @@ const ROUNDING: f64 = 1e-9;
 const TORQUE_STEP: f64 = 0.004;
 /// What the torque may reach of its limit at the samples: between them it may be higher.
 const TORQUE_SHARE: f64 = 0.9995;
+/// A motion that is made slower than this, as a factor of its time, is bound by what that was done for.
+const MUCH: f64 = 1.01;
 /// Samples of the torque at most; a longer motion has them further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
 /// The slowest that a motion is made for its torque, as a factor of its time.
 const SLOWEST: f64 = 64.0;
-/// Samples at which it is looked what binds, at most.
-const BINDING_SAMPLES_MAX: f64 = 50_000.0;
-/// From this share of it on a limit binds.
-const BINDS: f64 = 0.985;
 
 /// The limits with the speeds that the friction table has (J-36).
 pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
@@ -40,10 +38,11 @@ pub(crate) fn finished(
 ) -> Result<Motion, PlanError> {
     let within = with_table(limits, arm);
     let mut motion = within_kinematics(motion, &within)?;
+    let mut slowed = None;
     if let Some(arm) = arm {
-        motion = within_torque(motion, &within, arm)?;
+        (motion, slowed) = within_torque(motion, &within, arm)?;
     }
-    motion.binding = binding(&motion, &within, arm);
+    reasons::find(&mut motion, &within, arm, slowed.map(|joint| (joint, LimitKind::Torque)));
     Ok(motion)
 }
 
@@ -154,8 +153,12 @@ struct Load {
     velocity: JointVec,
 }
 
-/// Slows a motion down until the torque suffices.
-fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
+/// Slows a motion down until the torque suffices; the joint for which that was much.
+fn within_torque(
+    motion: Motion,
+    limits: &Limits,
+    arm: &ArmDynamics,
+) -> Result<(Motion, Option<Joint>), PlanError> {
     holds_where_it_rests(&motion, limits, arm)?;
     let loads = loads(&motion, limits, arm);
     let over = |factor: f64| {
@@ -171,9 +174,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
             })
         })
     };
-    if over(1.0).is_none() {
-        return Ok(motion);
-    }
+    let Some((_, mut joint, ..)) = over(1.0) else { return Ok((motion, None)) };
     let (mut fast, mut slow) = (1.0, 1.25);
     while let Some((time, joint, torque, limit)) = over(slow) {
         if slow > SLOWEST {
@@ -187,9 +188,12 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     }
     for _ in 0..10 {
         let middle = 0.5 * (fast + slow);
-        if over(middle).is_some() { fast = middle } else { slow = middle }
+        match over(middle) {
+            Some(found) => (fast, joint) = (middle, found.1),
+            None => slow = middle,
+        }
     }
-    Ok(motion.stretched(slow))
+    Ok((motion.stretched(slow), (slow > MUCH).then_some(joint)))
 }
 
 /// Waypoint, from 1, that was passed last at `time`.
@@ -270,44 +274,4 @@ fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
         }
     }
     loads
-}
-
-/// Which limit is closest to being exceeded, where it is close.
-fn binding(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Vec<Binding> {
-    let duration = motion.duration();
-    let step = (duration / BINDING_SAMPLES_MAX).max(0.002);
-    let count = (duration / step).ceil() as usize;
-    let mut found: Vec<Binding> = Vec::new();
-    let mut open = false;
-    for i in 0..count {
-        let time = (i as f64 + 0.5) * duration / count as f64;
-        let state = motion.at(time);
-        let torque = arm.map(|arm| arm.torque(&state));
-        let jerk = motion.jerk_at(time);
-        let mut most = (BINDS, None);
-        for joint in Joint::ALL {
-            let j = joint.index();
-            let mut take = |value: f64, limit: f64, kind| {
-                if value.abs() / limit > most.0 {
-                    most = (value.abs() / limit, Some((joint, kind)));
-                }
-            };
-            take(state.velocity[j], limits.velocity[j], LimitKind::Velocity);
-            take(state.acceleration[j], limits.acceleration[j], LimitKind::Acceleration);
-            take(jerk[j], limits.jerk[j], LimitKind::Jerk);
-            if let Some(torque) = torque {
-                take(torque[j], limits.torque[j], LimitKind::Torque);
-            }
-        }
-        let (from, to) = (duration * i as f64 / count as f64, duration * (i + 1) as f64 / count as f64);
-        match (most.1, found.last_mut()) {
-            (Some((joint, limit)), Some(last)) if open && last.joint == joint && last.limit == limit => {
-                last.to = to;
-            }
-            (Some((joint, limit)), _) => found.push(Binding { from, to, joint, limit }),
-            (None, _) => {}
-        }
-        open = most.1.is_some();
-    }
-    found
 }

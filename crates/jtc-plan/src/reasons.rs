@@ -1,0 +1,140 @@
+//! Why a motion is not faster, at each moment of it.
+use jtc_wire::Joint;
+
+use crate::binding::{Binding, LimitKind};
+use crate::motion::Motion;
+use crate::{ArmDynamics, Limits};
+
+/// From this share of it on a limit binds.
+const BINDS: f64 = 0.985;
+/// Distance of the samples, s, and how many there are at most.
+const STEP: f64 = 0.002;
+const SAMPLES_MAX: f64 = 4000.0;
+/// How far from a moment, s, what binds it may be: the ramps of the acceleration are that long, and it is slow in a corner for that which is
+/// ahead.
+const NEAR: f64 = 0.05;
+/// Torque below this share of its limit is what holds the arm, which no speed changes.
+const TORQUE: f64 = 0.9;
+/// What is shorter than this, s, belongs to what was before it.
+const SHORT: f64 = 0.004;
+
+/// A limit and how much of it is used, as a share of the speed at which it is used up.
+type Use = (f64, Joint, LimitKind);
+
+/// Finds what binds a motion: where a limit is used up, that; else what it was `slowed` down for as a whole, or the limit that comes
+/// closest around there.
+pub(crate) fn find(
+    motion: &mut Motion,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+    slowed: Option<(Joint, LimitKind)>,
+) {
+    let duration = motion.duration();
+    let count = (duration / (duration / SAMPLES_MAX).max(STEP)).ceil().max(1.0) as usize;
+    let step = duration / count as f64;
+    let uses: Vec<(Use, Option<Use>)> =
+        (0..count).map(|i| uses(motion, (i as f64 + 0.5) * step, limits, arm)).collect();
+    let used_up = uses.iter().map(|u| u.1.map(|(_, joint, limit)| (joint, limit)));
+    motion.binding = runs(used_up, step);
+    motion.else_binding = match slowed {
+        Some((joint, limit)) => vec![Binding { from: 0.0, to: duration, joint, limit }],
+        None => {
+            let reach = (NEAR / step).ceil() as usize;
+            runs(highest(&uses, reach).into_iter().map(|(_, joint, limit)| Some((joint, limit))), step)
+        }
+    };
+}
+
+/// The limit that is used most at `time`, and the one that is used up.
+fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
+    let state = motion.at(time);
+    let torque = arm.map(|arm| arm.torque(&state));
+    let jerk = motion.jerk_at(time);
+    let mut most: Use = (0.0, Joint::ALL[0], LimitKind::Velocity);
+    let mut used_up: Option<Use> = None;
+    for joint in Joint::ALL {
+        let j = joint.index();
+        let mut take = |value: f64, limit: f64, kind, as_speed: fn(f64) -> f64| {
+            let share = value.abs() / limit;
+            if as_speed(share) > most.0 {
+                most = (as_speed(share), joint, kind);
+            }
+            if share > used_up.map_or(BINDS, |u| u.0) {
+                used_up = Some((share, joint, kind));
+            }
+        };
+        take(state.velocity[j], limits.velocity[j], LimitKind::Velocity, |share| share);
+        take(state.acceleration[j], limits.acceleration[j], LimitKind::Acceleration, f64::sqrt);
+        take(jerk[j], limits.jerk[j], LimitKind::Jerk, f64::cbrt);
+        if let Some(torque) = torque {
+            let moves = |share| if share > TORQUE { share } else { 0.0 };
+            take(torque[j], limits.torque[j], LimitKind::Torque, moves);
+        }
+    }
+    (most, used_up)
+}
+
+/// The highest use within `reach` samples of each.
+fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
+    // Indices whose uses fall: the first one is the highest of those within reach.
+    let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
+    let mut next = 0;
+    let at = |i: usize| {
+        while next < uses.len().min(i + reach + 1) {
+            while falling.back().is_some_and(|&b| uses[b].0.0 <= uses[next].0.0) {
+                falling.pop_back();
+            }
+            falling.push_back(next);
+            next += 1;
+        }
+        while falling.front().is_some_and(|f| f + reach < i) {
+            falling.pop_front();
+        }
+        uses[falling.front().copied().unwrap_or(i)].0
+    };
+    (0..uses.len()).map(at).collect()
+}
+
+/// Samples one after the other that are alike.
+fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) -> Vec<Binding> {
+    let mut runs: Vec<Binding> = Vec::new();
+    for (i, sample) in samples.enumerate() {
+        let Some((joint, limit)) = sample else { continue };
+        let (from, to) = (i as f64 * step, (i + 1) as f64 * step);
+        match runs.last_mut() {
+            Some(last) if last.joint == joint && last.limit == limit && from - last.to < SHORT => {
+                last.to = to
+            }
+            _ => runs.push(Binding { from, to, joint, limit }),
+        }
+    }
+    runs
+}
+
+/// Fills what is left open in the binding of a motion.
+pub(crate) fn completed(mut motion: Motion) -> Motion {
+    let duration = motion.duration();
+    let mut all: Vec<Binding> = Vec::new();
+    let mut take = |next: Binding| match all.last_mut() {
+        _ if next.to <= next.from => {}
+        Some(last) if next.to - next.from < SHORT || (last.joint, last.limit) == (next.joint, next.limit) => {
+            last.to = next.to;
+        }
+        _ => all.push(next),
+    };
+    let (mut time, mut other) = (0.0, 0);
+    let end = Binding { from: duration, to: duration, joint: Joint::ALL[0], limit: LimitKind::Velocity };
+    for b in motion.binding.iter().chain([&end]) {
+        while let Some(o) = motion.else_binding.get(other).filter(|o| o.from < b.from) {
+            take(Binding { from: o.from.max(time), to: o.to.min(b.from), ..*o });
+            if o.to > b.from {
+                break;
+            }
+            other += 1;
+        }
+        take(Binding { from: b.from.max(time), ..*b });
+        time = b.to.max(time);
+    }
+    motion.binding = all;
+    motion
+}

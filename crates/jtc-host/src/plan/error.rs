@@ -30,6 +30,26 @@ pub enum PlanError {
         /// The most, %.
         most: f64,
     },
+    /// More corners than a trajectory has points for.
+    #[error(
+        "{corners} sharp corners are more than the {POINTS_MAX} points of a trajectory can follow: it has room for {most}"
+    )]
+    TooManyCorners {
+        /// Found.
+        corners: usize,
+        /// At most.
+        most: usize,
+    },
+    /// So long that its points are too far apart for its corners.
+    #[error(
+        "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
+    )]
+    TooFine {
+        /// s.
+        seconds: f64,
+        /// Step of the points, ms.
+        step_ms: u16,
+    },
     /// Longer than a trajectory can be.
     #[error("the motion takes {seconds:.0} s, more than {POINTS_MAX} points can hold")]
     TooLong {
@@ -61,11 +81,14 @@ impl Diagnose for PlanError {
             Self::Speed { .. } => {
                 Diagnosis::new(ErrorKind::Usage, "speed", "100 is as fast as the limits allow")
             }
-            Self::TooLong { .. } => Diagnosis::new(
+            Self::TooManyCorners { .. } | Self::TooFine { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-long",
-                "plan it in parts, at a higher speed, or with corners that are rounded (`--blend`)",
+                "plan it in parts, each of fewer waypoints, or leave waypoints out",
             ),
+            Self::TooLong { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
+            }
         }
     }
 }

@@ -148,6 +148,7 @@ impl<'a> Planner<'a> {
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
             return Err(PlanError::Nowhere { count: positions.len() });
         }
+        sampled::fits_corners(&positions, self.blend)?;
         let arm = self.dynamics();
         let motion =
             self.within(&positions, |limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
@@ -261,7 +262,7 @@ impl<'a> Planner<'a> {
             let verdict = if cold.is_ok() { checker.check(&sampled.trajectory) } else { cold };
             // Corners closer than its steps are no motion that a longer trajectory could carry.
             if step > STEP_MS && verdict.warnings().next().is_some() {
-                return Err(PlanError::TooLong { seconds: sampled.trajectory.duration_s() });
+                return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
             let Some(worst) = verdict.refusals().next().cloned() else {
                 let scale = sampled.scale;

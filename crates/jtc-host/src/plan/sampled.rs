@@ -14,6 +14,11 @@ const STEP_MIN_MS: f64 = 2.0;
 const STEP_MAX_MS: f64 = 1000.0;
 /// How far a trajectory may be from the motion between its points, rad.
 const ASIDE: f64 = 1e-3;
+/// Fewest points from one corner to the next, where a corner turns by more than this share of the way and its legs are longer than that, rad:
+/// with fewer the trajectory is further aside.
+const CORNER_POINTS: usize = 3;
+const CORNER_TURN: f64 = 0.5;
+const CORNER_LEG: f64 = 0.05;
 /// Places looked at in each interval.
 const PARTS: usize = 4;
 
@@ -41,7 +46,7 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] where the step is too long for the motion's corners.
+/// [`PlanError::TooFine`] where the step is too long for the motion's corners.
 pub(super) fn sampled(
     motion: &Motion,
     first: &[f64; JOINTS],
@@ -64,9 +69,29 @@ pub(super) fn sampled(
     points.push(rest);
     let aside = aside(&points, h, at);
     if aside > ASIDE && step_ms > STEP_MS {
-        return Err(PlanError::TooLong { seconds });
+        return Err(PlanError::TooFine { seconds, step_ms });
     }
     Ok(Sampled { trajectory: Trajectory { step_ms, points }, scale })
+}
+
+/// Refuses waypoints with more sharp corners than there can be points for.
+///
+/// # Errors
+///
+/// [`PlanError::TooManyCorners`].
+pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<(), PlanError> {
+    let most = (POINTS_MAX - 1) / CORNER_POINTS;
+    let leg = |pair: &[[f64; JOINTS]]| {
+        let way: [f64; JOINTS] = std::array::from_fn(|j| pair[1][j] - pair[0][j]);
+        (way, way.iter().map(|w| w.abs()).fold(0.0, f64::max))
+    };
+    let is_sharp = |three: &&[[f64; JOINTS]]| {
+        let ((a, long), (b, longer)) = (leg(&three[..2]), leg(&three[1..]));
+        let turn = (0..JOINTS).map(|j| (b[j] / longer - a[j] / long).abs()).fold(0.0, f64::max);
+        long.min(longer) > CORNER_LEG.max(blend) && turn > CORNER_TURN
+    };
+    let corners = positions.windows(3).filter(is_sharp).count();
+    if corners > most { Err(PlanError::TooManyCorners { corners, most }) } else { Ok(()) }
 }
 
 fn slowed(state: &State, scale: f64) -> Point {

@@ -99,7 +99,7 @@ fn any_length_fits_or_is_refused() {
     let places: Vec<[f64; JOINTS]> =
         (0..10_000).map(|i| [if i % 2 == 0 { 0.0 } else { 0.2 }; JOINTS]).collect();
     let error = Planner::new(&config).through(&waypoints(&places)).unwrap_err();
-    assert!(matches!(error, PlanError::TooLong { .. }), "{error}");
+    assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
 /// Given times are kept, or refused with the shortest one.
@@ -164,4 +164,18 @@ fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let of_arm = Arm::avena().config().joints[1].torque_max;
     assert!(*whole == of_arm && (limit / of_arm - HOLD_SHARE).abs() < 1e-9 && torque > limit, "{error}");
     assert!(error.to_string().contains("97.0 % of its limit of 180.0 N·m"), "{error}");
+}
+
+/// More corners than points are refused before anything is planned.
+#[test]
+fn too_many_corners_are_refused_at_once() {
+    let places: Vec<[f64; JOINTS]> = (0..10_000)
+        .map(|i| std::array::from_fn(|j| if (i * 7 + j * 3) % 5 < 2 { 0.3 } else { -0.2 }))
+        .collect();
+    let config = Config::avena();
+    for blend in [0.0, 0.05] {
+        let error = Planner { blend, ..Planner::new(&config) }.through(&waypoints(&places)).unwrap_err();
+        assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
+        assert!(!error.diagnosis().next.contains("speed"), "{error}");
+    }
 }

@@ -28,7 +28,7 @@ pub struct PlanArgs {
     /// Speed in percent of what the limits allow, 1 to 100
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
-    /// Let the acceleration jump: faster, and harder on gears and load
+    /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load
     #[arg(long, env = "JTC_NO_JERK_LIMIT", value_parser = FalseyValueParser::new())]
     pub no_jerk_limit: bool,
     /// Arm whose limits, masses and poses count, TOML or URDF; default: the built-in one

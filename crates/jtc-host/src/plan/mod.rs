@@ -44,6 +44,9 @@ use sampled::{sampled, step_ms};
 
 /// Step of planned moves, ms.
 const STEP_MS: u16 = 10;
+/// Time that the acceleration has to change where jerk is not limited, s: in less than two steps the position between the points (J-32)
+/// would accelerate more than the points do.
+const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
 /// Share of the velocity and acceleration limits that a plan uses: the rest is for the rounding of the wire.
 const SHARE: f64 = 0.98;
 /// Share of the torque limit that a plan uses: the rest is for the controller's own corrections, or it would be at its limit for longer
@@ -74,7 +77,7 @@ pub struct Planner<'a> {
     pub speed_pct: f64,
     /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each waypoint.
     pub blend: f64,
-    /// Whether jerk is limited, too.
+    /// Whether jerk is limited, too; else the acceleration changes within two steps.
     pub jerk: bool,
     /// Segments that the trajectory will be sent in.
     pub upload: UploadOptions,
@@ -234,7 +237,10 @@ impl<'a> Planner<'a> {
             limits.torque[j] *= to_hold.clamp(TORQUE_SHARE, 1.0);
         }
         let limits = limits.at_speed(self.speed_pct / 100.0);
-        Ok(if self.jerk { limits } else { limits.without_jerk() })
+        if self.jerk {
+            return Ok(limits);
+        }
+        Ok(Limits { jerk: limits.acceleration.map(|a| a / JUMP_S), ..limits })
     }
 
     /// The motion as a trajectory that passes the check, slowed down as far as it has to be; one that is `timed` is not.

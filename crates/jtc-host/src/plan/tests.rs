@@ -179,3 +179,27 @@ fn too_many_corners_are_refused_at_once() {
         assert!(!error.diagnosis().next.contains("speed"), "{error}");
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Without a limit of jerk, too, the position that the controller computes between the points (J-32) keeps the acceleration.
+    #[test]
+    fn j32_the_position_between_points_keeps_the_acceleration(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.2f64, jerk: bool) {
+        let config = Config::avena();
+        let planned = Planner { jerk, blend, ..Planner::new(&config) }.through(&waypoints(&places)).unwrap();
+        let h = f64::from(planned.trajectory.step_ms) * 1e-3;
+        for pair in planned.trajectory.points.windows(2) {
+            let (a, b) = (set_point(&pair[0]), set_point(&pair[1]));
+            for k in 1..20 {
+                let at = |k: i32| jtc_core::interpolate(&a, &b, h, f64::from(k) / 20.0).position;
+                let (p, q, r) = (at(k - 1), at(k), at(k + 1));
+                for j in 0..JOINTS {
+                    let acceleration = (p[j] - 2.0 * q[j] + r[j]) / (h * h / 400.0);
+                    let share = acceleration.abs() / config.joints[j].acceleration_max;
+                    prop_assert!(share < 1.05, "joint {}: {} of the limit", j + 1, share);
+                }
+            }
+        }
+    }
+}

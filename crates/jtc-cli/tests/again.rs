@@ -73,10 +73,10 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
 }
 
-/// As fast as the limits allow, recorded in virtual time: what was measured is run again within the limits.
+/// As fast as the limits allow: what was measured is run again within the limits.
 #[test]
 fn a_measured_motion_at_its_limits_is_run_again() {
-    let sim = Sim::start(&FAST).held();
+    let sim = Sim::start(&["--no-throttle"]).held();
     let (file, record, again) = (sim.path("cycle.csv"), sim.path("run.mcap"), sim.path("again.mcap"));
     jtc(&["example", "cycle", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
     jtc(&["plan", &sim.path("cycle-waypoints.csv"), "-o", &file, "--blend", "0.05"]).ends(0);

@@ -88,9 +88,9 @@ fn a_run_that_is_killed_leaves_its_recording() {
         assert!(moving, "nothing of the motion is in {name}");
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file holds the whole trajectory, 10 s at 20 %, however much of it was run.
+        // An MCAP file holds the whole trajectory, 6 s at 20 %, however much of it was run.
         assert!(
-            if name == "run.mcap" { (seen - 50.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
+            if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
         );
         let notes = info["notes"].to_string();

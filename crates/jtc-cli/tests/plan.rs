@@ -224,7 +224,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     jtc(&["traj", "check", &out]).ends(0);
     let output = jtc(&["plan", &file, "-o", &out, "--force"]).ends(4);
     assert!(
-        output.err.contains("more than 12000 points can hold") && output.err.contains("--blend"),
+        output.err.contains("12000 points are") && output.err.contains("plan it in parts"),
         "{}",
         output.err
     );

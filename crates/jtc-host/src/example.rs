@@ -249,6 +249,10 @@ mod tests {
         for part in FORMS.split("```").skip(1).step_by(2) {
             let (kind, text) = part.split_once('\n').unwrap();
             match kind {
+                "csv" if text.contains("leg") => {
+                    let file = WaypointFile::parse(text).unwrap();
+                    file.route(&arm, false, (0.0, 0.01)).unwrap_or_else(|e| panic!("{e}: {text}"));
+                }
                 "csv" | "json" if text.contains("pose") => {
                     let poses = [("home", [0.0; JOINTS]), ("pick", [0.2; JOINTS])]
                         .map(|(name, q)| (name.to_owned(), q));
@@ -271,6 +275,6 @@ mod tests {
             }
             blocks += 1;
         }
-        assert_eq!(blocks, 9);
+        assert_eq!(blocks, 10);
     }
 }

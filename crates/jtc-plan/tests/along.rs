@@ -160,7 +160,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).unwrap_err(),
         through(&[[0.0; 6].into(), stretched.into()], 0.0, &limits, Some(&arm)).unwrap_err(),
     ] {
-        let PlanError::Torque { waypoint, joint, torque, limit, holding } = error.clone() else {
+        let PlanError::Torque { waypoint, joint, torque, limit, holding, .. } = error.clone() else {
             panic!("{error}")
         };
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");

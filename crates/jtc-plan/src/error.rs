@@ -9,7 +9,7 @@ use crate::kinematics::PoseError;
 #[non_exhaustive]
 pub enum PlanError {
     /// No way from one waypoint, or from none.
-    #[error("{count} waypoints are no motion; at least 2 are")]
+    #[error("a motion takes at least 2 waypoints; given: {count}")]
     TooFew {
         /// Waypoints given.
         count: usize,

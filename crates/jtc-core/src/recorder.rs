@@ -8,6 +8,7 @@
 //! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared ([`Recorder::record`] executes that command, and
 //! those that read the log). It is also kept when the device was reset because it failed. A log in which the controller never had torque
 //! gives way to a new one as soon as torque comes on: an error at the start of a day is not to take the place of the one that matters.
+mod block;
 mod inputs;
 mod memory;
 mod reader;
@@ -26,7 +27,7 @@ use inputs::Reference;
 use memory::Writer;
 
 #[doc(hidden)]
-pub use memory::sealed_block;
+pub use block::sealed_block;
 
 pub use recorded::{RecordedEvent, RecordedInputs, RecordedKind};
 pub use replay::{Log, Outcome, Record, Replay, Step, Unsure};

@@ -1,6 +1,6 @@
 //! The bits of blocks that follow each other, read back.
 use super::Block;
-use super::memory::Whole;
+use super::block::Whole;
 use crate::remembered::BitSource;
 
 /// Reads the bits of blocks that follow each other.

@@ -2,8 +2,8 @@
 use jtc_bus::Frame;
 use jtc_wire::{EVENTS_MAX, FrameType, IMAGE_MAX, LogState, RawPoint};
 
+use super::block::Whole;
 use super::inputs::Reference;
-use super::memory::Whole;
 use super::reader::Reader;
 use super::recorded::{RecordedEvent, RecordedInputs};
 use super::snapshot::{Origin, Snapshot};

@@ -1,0 +1,101 @@
+//! What of the nodes is an error: missing answers (J-14, J-35), joints that leave OperationEnable or do not reach it (J-16).
+use jtc_bus::{NodeState, warning};
+use jtc_wire::can_flag;
+
+use super::{GRIPPER, Goal, Nodes};
+use crate::JOINTS;
+use crate::config::Config;
+use crate::io::Inputs;
+
+impl Nodes {
+    /// Counts Moves without answer, without usable answer, and without acknowledge (J-14, J-35).
+    pub(super) fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
+        let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
+        // While every node boots, no node acknowledges.
+        let any_booted = self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
+        if on_the_bus {
+            self.unacknowledged = 0;
+        } else if self.sent_move && any_booted {
+            self.unacknowledged = self.unacknowledged.saturating_add(1);
+        }
+        for (n, node) in self.nodes.iter_mut().enumerate() {
+            let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
+            node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
+            let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
+            // No node can have answered, and the bus is not given up yet: the joint is predicted all the same (J-63).
+            let predicted =
+                self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
+            let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
+            if answered {
+                node.silent = 0;
+            } else if unanswered {
+                node.silent = more(node.silent);
+            }
+            if usable || self.unacknowledged >= config.missed_moves_max {
+                // Or the transmit timeout stands for all of them.
+                node.missed = 0;
+            } else if answered || unanswered || predicted {
+                node.missed = more(node.missed);
+            }
+            let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
+            if node.silent == config.missed_moves_max && !enabled_gripper {
+                // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that
+                // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
+                node.lose_configuration();
+            } else if node.missed == config.missed_moves_max && n < JOINTS {
+                // J-35: its answers have impossible positions. Or too few of its Moves were acknowledged to decide
+                // whether it answers: for longer than this it is not to be predicted (J-63).
+                node.misbehaved = true;
+                node.missed = 0;
+                node.measured.forget();
+            }
+        }
+    }
+
+    /// Sees joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
+    pub(super) fn watch(&mut self, config: &Config, goal: Goal) {
+        let may_enable = self.may_enable(config);
+        for node in self.nodes.iter_mut().take(JOINTS) {
+            if goal != Goal::Enabled {
+                (node.enabled, node.enable_wait) = (false, 0);
+                continue;
+            }
+            if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
+                node.misbehaved = true;
+            }
+            if node.report.state == NodeState::ENABLED {
+                (node.enabled, node.enable_wait) = (true, 0);
+                continue;
+            }
+            if node.enabled && !node.starting() {
+                node.misbehaved = true;
+            }
+            node.enabled = false;
+            // J-16: while the arm falls no state is requested.
+            node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
+            if node.enable_wait > config.enable_timeout_ms {
+                (node.misbehaved, node.enable_wait) = (true, 0);
+            }
+        }
+    }
+
+    /// CAN flags of this tick that are errors: transmit timeout or bus-off, and the receive timeouts of the joints.
+    pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
+        let transmit = inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max;
+        let mut flags = can_flag::TRANSMIT_TIMEOUT * u32::from(transmit);
+        for (n, node) in self.joints().iter().enumerate() {
+            flags |= can_flag::no_answer(n) * u32::from(node.silent >= config.missed_moves_max);
+        }
+        flags
+    }
+
+    /// A joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not count.
+    pub fn external_error(&self, powered: bool) -> bool {
+        self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
+    }
+
+    /// A joint is still being cleared: the cause of its error is not gone.
+    pub fn clearing(&self) -> bool {
+        self.joints().iter().any(|node| node.clear)
+    }
+}

@@ -1,0 +1,121 @@
+//! A block of the flight recorder's memory, as it lies there (J-56).
+//!
+//! A block has a head of [`HEAD`] words and bits behind it. Its *commit* word has the number of bits and their check, and is written once
+//! a tick, last: what a cut tick has left behind the committed bits is not read. Memory that was never written, or has been damaged, fails
+//! the check and reads as no block.
+use jtc_wire::LogState;
+
+use super::{BLOCK_WORDS, Block};
+
+/// "JTCF" and the version of the layout, to be raised with each change of what is written, a list of `remembered!` among it.
+pub(super) const MAGIC: u32 = 0x4A46_0002;
+/// Words in front of the bits.
+pub(super) const HEAD: usize = 5;
+/// Bits of a block.
+pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
+
+/// Where the words of the head are.
+pub(super) mod head {
+    pub const MAGIC: usize = 0;
+    /// Number of the block.
+    pub const SEQUENCE: usize = 1;
+    /// Bits (low half) and their check.
+    pub const COMMIT: usize = 2;
+    /// Where the first snapshot begins (low half, [`super::NONE`]: nowhere) and the complement.
+    pub const SNAPSHOT: usize = 3;
+    /// State of the log (low half) and the complement.
+    pub const FLAGS: usize = 4;
+}
+
+/// No snapshot begins in a block.
+pub(super) const NONE: u16 = 0xFFFF;
+
+/// The controller has had torque since the log was begun.
+pub(super) const POWERED: u16 = 0x100;
+/// The next block goes on where this one ends.
+pub(super) const CLOSED: u16 = 0x200;
+
+/// A number with its complement above it.
+pub(super) const fn doubled(value: u16) -> u32 {
+    value as u32 | (!value as u32) << 16
+}
+
+/// The number, if the complement is right.
+fn halved(word: u32) -> Option<u16> {
+    let value = word as u16;
+    (doubled(value) == word).then_some(value)
+}
+
+pub(super) fn mix(hash: u32, word: u32) -> u32 {
+    (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
+}
+
+/// The commit word for so many bits, the last of them in `rest`.
+pub(super) fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
+    let hash = mix(hash, rest);
+    bits | (hash ^ hash << 16) & 0xFFFF_0000
+}
+
+/// A block that was written, and whose head and bits are whole.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Whole<'a> {
+    pub sequence: u32,
+    /// Bits that are committed.
+    pub bits: u32,
+    /// The next block goes on behind them.
+    pub closed: bool,
+    /// Where the first snapshot begins.
+    pub snapshot: Option<u32>,
+    pub state: LogState,
+    pub powered: bool,
+    pub words: &'a [u32],
+}
+
+impl<'a> Whole<'a> {
+    /// `None` for memory that holds no block.
+    pub fn parse(block: &'a Block) -> Option<Self> {
+        let (head, words) = block.split_first_chunk::<HEAD>()?;
+        let bits = head[head::COMMIT] & 0xFFFF;
+        if head[head::MAGIC] != MAGIC || bits > BITS {
+            return None;
+        }
+        let (snapshot, flags) = (halved(head[head::SNAPSHOT])?, halved(head[head::FLAGS])?);
+        let state = LogState::from_byte(flags as u8)?;
+        let (full, rest) = (bits as usize / 32, bits % 32);
+        let begin = mix(MAGIC, head[head::SEQUENCE]);
+        let hash = words.iter().take(full).fold(begin, |hash, word| mix(hash, *word));
+        let last = words.get(full).map_or(0, |word| word & ((1 << rest) - 1));
+        if commit(hash, last, bits) != head[head::COMMIT] {
+            return None;
+        }
+        let snapshot = (snapshot != NONE && u32::from(snapshot) < bits).then_some(snapshot.into());
+        let (sequence, closed, powered) = (head[head::SEQUENCE], flags & CLOSED != 0, flags & POWERED != 0);
+        Some(Self { sequence, bits, closed, snapshot, state, powered, words })
+    }
+}
+
+/// A block with these bits, as the recorder writes it: for tests of what reads a log.
+#[doc(hidden)]
+pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    let count = bits.len().min(BLOCK_WORDS - HEAD);
+    for (to, word) in block.iter_mut().skip(HEAD).zip(bits) {
+        *to = *word;
+    }
+    let hash = bits.iter().take(count).fold(mix(MAGIC, sequence), |hash, word| mix(hash, *word));
+    block[head::MAGIC] = MAGIC;
+    block[head::SEQUENCE] = sequence;
+    block[head::COMMIT] = commit(hash, 0, 32 * count as u32);
+    block[head::SNAPSHOT] = doubled(snapshot);
+    block[head::FLAGS] = doubled(flags(LogState::Error, true) | CLOSED);
+    block
+}
+
+pub(super) fn flags(state: LogState, powered: bool) -> u16 {
+    state as u16 | if powered { POWERED } else { 0 }
+}
+
+/// The block has this number; what is in it is not looked at.
+pub(super) fn in_place(block: &Block, sequence: u32) -> bool {
+    block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
+}

@@ -1,26 +1,23 @@
 //! The extensions of the protocol (J-50 to J-59): who the device is, its settings, the arm as one thing, jogging.
 mod answers;
+mod arm;
 mod image;
 mod log;
 
 use jtc_wire::{
-    Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, LogState, Name,
-    PAGE_BYTES, PAGE_VALUES, RawPoint, StoreState, VALUE_LEN, Values, capability,
+    Answer, BootCause, Command, DataStatus, Floats, Hash, Info, LogState, Name, PAGE_VALUES, RawPoint,
+    StoreState, VALUE_LEN, Values, capability,
 };
 
 use crate::controller::Controller;
 use crate::defaults;
 use crate::host::slices::{SliceOutcome, SliceProgress};
-use crate::received::ReceivedParameters;
 use crate::recorder::LogRequest;
 use crate::settings::{self, Live};
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use answers::Answers;
-use image::{ImageSource, StoredArm};
+use image::StoredArm;
 pub use log::firmware_hash;
-
-/// Bytes of an arm image that are hashed or written in one tick.
-const IMAGE_PER_TICK: usize = 256;
 
 /// Most values of a SetSettings frame in motion.
 const LIVE_MAX: usize = 4;
@@ -95,49 +92,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
-    }
-
-    /// The arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
-    /// parameters stay missing. For the board to call before the first tick. False when it is no arm that this controller takes: its
-    /// settings stay as they were, and the UseDefault frames are refused until an arm is stored.
-    pub fn load_arm(&mut self, image: &[u8]) -> bool {
-        let arm = ArmImage::parse(image);
-        let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // Its numbers are taken where they are used, not tried on the stack, which is no larger than it has to be.
-        let loaded = arm.zip(config).is_some_and(|(arm, config)| {
-            let taken = takes(&mut self.parameters, &arm, &config);
-            if taken {
-                self.extensions.stored.set(image);
-                self.extensions.name = arm.name;
-                self.nodes.use_settings(&config, &self.config);
-                self.config = config;
-            }
-            taken
-        });
-        if !loaded {
-            self.parameters.begin(&self.config);
-        }
-        // The host has to ask for them.
-        self.parameters.forget();
-        self.extensions.forget_hash();
-        self.extensions.unusable = !loaded;
-        loaded
-    }
-
-    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] asks for it; empty where there is none.
-    pub fn stored_arm(&self) -> &[u8] {
-        self.extensions.stored.bytes()
-    }
-
-    /// What has become of the stored arm, and its number: for the board to call when that changes.
-    pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
-        let before = core::mem::replace(&mut self.extensions.store, state);
-        self.extensions.sequence = sequence;
-        if before == StoreState::Busy && state == StoreState::Failed {
-            // After the next start it would be another one: until then there is none.
-            self.extensions.stored.clear();
-            self.extensions.unusable = true;
-        }
     }
 
     /// What an extension request returns, to be sent when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
@@ -247,10 +201,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn image(&self) -> ImageSource<'_> {
-        ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
-    }
-
     /// J-50: what was asked for on this line before is on its way.
     fn asked_twice(&self, line: usize, command: &Command<'_>) -> bool {
         let returns = matches!(
@@ -265,21 +215,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn get_info(&mut self, line: usize) -> SliceOutcome {
-        let hash = match self.extensions.hash {
-            Some(hash) => hash,
-            None => {
-                let (offset, hash) = match self.slice_progress {
-                    SliceProgress::Hash(offset, hash) => (offset, hash),
-                    _ => (0, Hash::new()),
-                };
-                let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
-                if !self.image().hashed(offset) {
-                    return SliceOutcome::Unfinished(SliceProgress::Hash(offset, hash));
-                }
-                self.extensions.hash = Some(hash.value());
-                hash.value()
-            }
-        };
+        self.hash_arm();
+        let Some(hash) = self.extensions.hash else { return SliceOutcome::Unfinished(SliceProgress::Begin) };
         let info = self.info(hash);
         self.extensions.answers.put(line, &Answer::Info(info));
         SliceOutcome::Done
@@ -327,13 +264,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             let total = settings::count(false) as u16;
             self.extensions.answers.put(line, &Answer::Settings { first, total, values });
         }
-    }
-
-    fn get_arm(&mut self, line: usize, offset: u16) {
-        let mut bytes = [0; PAGE_BYTES];
-        let (read, total) = (self.image().read(offset.into(), &mut bytes), self.image().len() as u16);
-        let bytes = bytes.get(..read).unwrap_or(&[]);
-        self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
     /// All values or none (J-53). Where friction tables are in use, one is checked a tick.
@@ -395,31 +325,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// J-54: first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
-    fn store_arm(&mut self) -> SliceOutcome {
-        let offset = match self.slice_progress {
-            SliceProgress::Image(offset) => offset,
-            _ if !self.settable()
-                || !self.parameters.all_given()
-                || matches!(self.extensions.store, StoreState::Absent | StoreState::Busy) =>
-            {
-                return SliceOutcome::Refused(DataStatus::NotAllowed);
-            }
-            _ => 0,
-        };
-        let Self { extensions, config, parameters, .. } = self;
-        let source = ImageSource { config, parameters, name: &extensions.name };
-        let next = extensions.stored.write(&source, offset, IMAGE_PER_TICK);
-        if next < source.len() && next > offset {
-            return SliceOutcome::Unfinished(SliceProgress::Image(next));
-        }
-        extensions.stored.finish(source.len());
-        extensions.unusable = false;
-        extensions.store = StoreState::Busy;
-        extensions.store_requested = true;
-        SliceOutcome::Done
-    }
-
     /// J-59: hosts that send nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         self.extensions.answers.tick();
@@ -437,27 +342,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.leave_path(jtc_wire::ExecCommand::Pause);
         }
     }
-}
-
-/// Takes gains, model and friction of an arm; false when they are not such as these settings take.
-fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
-    let friction = match arm.friction {
-        FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
-        FrictionImage::Table(floats) => {
-            let mut progress = SliceProgress::Begin;
-            // Twelve slices are all of it.
-            (0..16).any(|_| match parameters.take_table(&floats, progress, config) {
-                SliceOutcome::Unfinished(next) => {
-                    progress = next;
-                    false
-                }
-                outcome => matches!(outcome, SliceOutcome::Done),
-            })
-        }
-    };
-    friction
-        && parameters.take_pid(&arm.pid, config).is_ok()
-        && parameters.take_model(&arm.model, None, config).is_ok()
 }
 
 #[cfg(test)]

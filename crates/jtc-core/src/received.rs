@@ -1,8 +1,9 @@
 //! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
 mod floats;
+mod frames;
 
-use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
-use jtc_wire::{DataStatus, Floats, missing_parameter};
+use jtc_dynamics::{ArmModel, Dynamics};
+use jtc_wire::{DataStatus, missing_parameter};
 
 use crate::JOINTS;
 use crate::config::Config;
@@ -223,15 +224,6 @@ impl ReceivedParameters {
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
-    pub fn take_pid(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
-        let mut gains = [PidGains::default(); JOINTS];
-        for (j, gain) in gains.iter_mut().enumerate() {
-            let at = |i: usize| finite(floats, 5 * j + i);
-            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
-        }
-        self.set_pid(gains, config)
-    }
-
     pub fn set_pid(&mut self, gains: [PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
         for (gains, joint) in gains.iter().zip(&config.joints) {
             config.parameter_bounds.check_gains(gains, joint)?;
@@ -242,23 +234,6 @@ impl ReceivedParameters {
     }
 
     /// `at`: measured positions (rad), once all are known.
-    pub fn take_model(
-        &mut self,
-        floats: &Floats<'_>,
-        at: Option<&[f64; JOINTS]>,
-        config: &Config,
-    ) -> Result<(), DataStatus> {
-        let mut next = Reader { floats, next: 0 };
-        let mut model = ArmModel::default();
-        for joint in &mut model.joints {
-            *joint = next.origin()?;
-        }
-        for link in &mut model.links {
-            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
-        }
-        self.set_model(&model, at, config)
-    }
-
     pub fn set_model(
         &mut self,
         model: &ArmModel,
@@ -278,18 +253,6 @@ impl ReceivedParameters {
         Ok(())
     }
 
-    pub fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
-        // 4 or 6 per joint, highest index first.
-        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
-        let mut polynomial = [[0.0; 6]; JOINTS];
-        for (j, coefficients) in polynomial.iter_mut().enumerate() {
-            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
-                *c = finite(floats, count * j + i)?;
-            }
-        }
-        self.set_polynomial(&polynomial, config)
-    }
-
     pub fn take_default_polynomial(&mut self, config: &Config) -> Result<(), DataStatus> {
         self.set_polynomial(&defaults::POLYNOMIAL, config)
     }
@@ -299,16 +262,6 @@ impl ReceivedParameters {
         self.polynomial = *polynomial;
         self.friction_received(false);
         Ok(())
-    }
-
-    /// The tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
-    pub fn take_table(
-        &mut self,
-        floats: &Floats<'_>,
-        progress: SliceProgress,
-        config: &Config,
-    ) -> SliceOutcome {
-        self.take_tables(|j| read_table(floats, j), progress, config)
     }
 
     /// The default tables, alike.
@@ -374,52 +327,6 @@ fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> b
     let gravity = dynamics.gravity_torque(position);
     // Written so that NaN is too much. A joint that is absent holds nothing (J-53).
     (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
-}
-
-/// Float `i`, refused when it is NaN, infinite or not there (J-06).
-fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
-    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
-}
-
-/// Takes finite floats one after the other.
-struct Reader<'a> {
-    floats: &'a Floats<'a>,
-    next: usize,
-}
-
-impl Reader<'_> {
-    fn float(&mut self) -> Result<f64, DataStatus> {
-        self.next += 1;
-        finite(self.floats, self.next - 1)
-    }
-
-    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.float()?;
-        }
-        Ok(values)
-    }
-
-    fn origin(&mut self) -> Result<Origin, DataStatus> {
-        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
-    }
-}
-
-fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
-    let mut table = NO_TABLE;
-    let start = joint * TABLE_FLOATS;
-    let slots =
-        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
-    for (i, slot) in slots.enumerate() {
-        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
-    }
-    for axis in [&table.velocity, &table.temperature] {
-        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(DataStatus::IncorrectValue);
-        }
-    }
-    Ok(table)
 }
 
 #[cfg(test)]

@@ -1,8 +1,6 @@
-//! What the flight recorder has of the extensions (J-56): the hash of the arm without being asked for it, and the points of the
-//! trajectory.
+//! What logs have of the extensions (J-56): the name of the firmware, and the points of the trajectory.
 use jtc_wire::{Answer, Hash, PAGE_POINTS, POINT_LEN, Points, RawPoint};
 
-use super::{Extensions, IMAGE_PER_TICK};
 use crate::controller::Controller;
 
 /// Hash of a firmware's version and revision, by which a log names it (FNV-1a, 64 bits).
@@ -10,31 +8,7 @@ pub fn firmware_hash(version: &str, revision: &str) -> u64 {
     Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
 }
 
-impl Extensions {
-    /// The arm in use has changed.
-    pub fn forget_hash(&mut self) {
-        (self.hash, self.hashed) = (None, (0, Hash::new()));
-    }
-}
-
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Another part of the hash of the arm, where it is not known.
-    pub(crate) fn hash_arm(&mut self) {
-        if self.extensions.hash.is_none() {
-            self.hash_more();
-        }
-    }
-
-    #[inline(never)]
-    fn hash_more(&mut self) {
-        let (offset, hash) = self.extensions.hashed;
-        let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
-        self.extensions.hashed = (offset, hash);
-        if self.image().hashed(offset) {
-            self.extensions.hash = Some(hash.value());
-        }
-    }
-
     /// Points in memory, also of a trajectory that was given up (J-56).
     pub(super) fn get_points(&mut self, line: usize, first: u16) {
         let held = self.store.held_points(first.into());

@@ -1,5 +1,5 @@
 //! Frames that are too long for one tick: how far one has been executed, and what became of a slice of it (J-06).
-use jtc_wire::{DataStatus, Hash};
+use jtc_wire::DataStatus;
 
 /// How far a long frame has been executed, a slice in each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,8 +14,6 @@ pub(crate) enum SliceProgress {
     TableCheck(usize),
     /// Joints whose table is copied.
     TableCopy(usize),
-    /// Bytes of the arm image that are hashed, and their hash.
-    Hash(usize, Hash),
     /// Bytes of the arm image that are written.
     Image(usize),
 }

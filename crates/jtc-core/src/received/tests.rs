@@ -2,6 +2,8 @@
 extern crate std;
 use std::vec::Vec;
 
+use jtc_wire::Floats;
+
 use super::*;
 
 #[test]

@@ -1,5 +1,6 @@
 //! The arm that is kept over a loss of power (J-54).
 use super::*;
+use crate::extension::arm::IMAGE_PER_TICK;
 
 /// An arm that is not the one built in, as a stored image.
 fn other_arm() -> (Vec<u8>, u64) {

@@ -1,0 +1,139 @@
+//! The arm as one thing (J-52, J-54): loaded, read, hashed, stored.
+use jtc_wire::{Answer, ArmImage, DataStatus, FrictionImage, Hash, PAGE_BYTES, RawPoint, StoreState};
+
+use super::Extensions;
+use super::image::ImageSource;
+use crate::Config;
+use crate::controller::Controller;
+use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::received::ReceivedParameters;
+use crate::settings;
+
+/// Bytes of an arm image that are hashed or written in one tick.
+pub(super) const IMAGE_PER_TICK: usize = 256;
+
+impl Extensions {
+    /// The arm in use has changed.
+    pub fn forget_hash(&mut self) {
+        (self.hash, self.hashed) = (None, (0, Hash::new()));
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// The arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
+    /// parameters stay missing. For the board to call before the first tick. False when it is no arm that this controller takes: its
+    /// settings stay as they were, and the UseDefault frames are refused until an arm is stored.
+    pub fn load_arm(&mut self, image: &[u8]) -> bool {
+        let arm = ArmImage::parse(image);
+        let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
+        // Its numbers are taken where they are used, not tried on the stack, which is no larger than it has to be.
+        let loaded = arm.zip(config).is_some_and(|(arm, config)| {
+            let taken = takes(&mut self.parameters, &arm, &config);
+            if taken {
+                self.extensions.stored.set(image);
+                self.extensions.name = arm.name;
+                self.nodes.use_settings(&config, &self.config);
+                self.config = config;
+            }
+            taken
+        });
+        if !loaded {
+            self.parameters.begin(&self.config);
+        }
+        // The host has to ask for them.
+        self.parameters.forget();
+        self.extensions.forget_hash();
+        self.extensions.unusable = !loaded;
+        loaded
+    }
+
+    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] asks for it; empty where there is none.
+    pub fn stored_arm(&self) -> &[u8] {
+        self.extensions.stored.bytes()
+    }
+
+    /// What has become of the stored arm, and its number: for the board to call when that changes.
+    pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
+        let before = core::mem::replace(&mut self.extensions.store, state);
+        self.extensions.sequence = sequence;
+        if before == StoreState::Busy && state == StoreState::Failed {
+            // After the next start it would be another one: until then there is none.
+            self.extensions.stored.clear();
+            self.extensions.unusable = true;
+        }
+    }
+
+    fn image(&self) -> ImageSource<'_> {
+        ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
+    }
+
+    /// Another part of the hash of the arm, where it is not known.
+    pub(crate) fn hash_arm(&mut self) {
+        if self.extensions.hash.is_none() {
+            self.hash_more();
+        }
+    }
+
+    #[inline(never)]
+    fn hash_more(&mut self) {
+        let (offset, hash) = self.extensions.hashed;
+        let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
+        self.extensions.hashed = (offset, hash);
+        if self.image().hashed(offset) {
+            self.extensions.hash = Some(hash.value());
+        }
+    }
+
+    pub(super) fn get_arm(&mut self, line: usize, offset: u16) {
+        let mut bytes = [0; PAGE_BYTES];
+        let (read, total) = (self.image().read(offset.into(), &mut bytes), self.image().len() as u16);
+        let bytes = bytes.get(..read).unwrap_or(&[]);
+        self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
+    }
+
+    /// J-54: first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
+    pub(super) fn store_arm(&mut self) -> SliceOutcome {
+        let offset = match self.slice_progress {
+            SliceProgress::Image(offset) => offset,
+            _ if !self.settable()
+                || !self.parameters.all_given()
+                || matches!(self.extensions.store, StoreState::Absent | StoreState::Busy) =>
+            {
+                return SliceOutcome::Refused(DataStatus::NotAllowed);
+            }
+            _ => 0,
+        };
+        let Self { extensions, config, parameters, .. } = self;
+        let source = ImageSource { config, parameters, name: &extensions.name };
+        let next = extensions.stored.write(&source, offset, IMAGE_PER_TICK);
+        if next < source.len() && next > offset {
+            return SliceOutcome::Unfinished(SliceProgress::Image(next));
+        }
+        extensions.stored.finish(source.len());
+        extensions.unusable = false;
+        extensions.store = StoreState::Busy;
+        extensions.store_requested = true;
+        SliceOutcome::Done
+    }
+}
+
+/// Takes gains, model and friction of an arm; false when they are not such as these settings take.
+fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
+    let friction = match arm.friction {
+        FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
+        FrictionImage::Table(floats) => {
+            let mut progress = SliceProgress::Begin;
+            // Twelve slices are all of it.
+            (0..16).any(|_| match parameters.take_table(&floats, progress, config) {
+                SliceOutcome::Unfinished(next) => {
+                    progress = next;
+                    false
+                }
+                outcome => matches!(outcome, SliceOutcome::Done),
+            })
+        }
+    };
+    friction
+        && parameters.take_pid(&arm.pid, config).is_ok()
+        && parameters.take_model(&arm.model, None, config).is_ok()
+}

@@ -171,13 +171,7 @@ impl<'a> Planner<'a> {
         from_ms: u32,
         start: Option<[f64; JOINTS]>,
     ) -> Result<Trajectory, PlanError> {
-        let checker = Checker {
-            model: self.model,
-            friction: self.friction,
-            start,
-            upload: self.upload,
-            ..Checker::new(self.config)
-        };
+        let checker = self.checker(start);
         let mut ramps = RAMPS_S.into_iter();
         let mut ramp_s = RAMP_S;
         loop {
@@ -194,6 +188,12 @@ impl<'a> Planner<'a> {
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {
         self.model
             .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
+    }
+
+    /// The check before a run, where the arm stands at `start`.
+    fn checker(&self, start: Option<[f64; JOINTS]>) -> Checker<'a> {
+        let Self { model, friction, upload, .. } = *self;
+        Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
     /// A motion within the limits of a plan; where a joint's share of the torque leaves nothing for it, that joint has more of it.
@@ -251,13 +251,7 @@ impl<'a> Planner<'a> {
         start: Option<[f64; JOINTS]>,
         timed: bool,
     ) -> Result<Planned, PlanError> {
-        let checker = Checker {
-            model: self.model,
-            friction: self.friction,
-            start,
-            upload: self.upload,
-            ..Checker::new(self.config)
-        };
+        let checker = self.checker(start);
         let (mut stretch, mut slowed) = (1.0, None::<Problem>);
         loop {
             let step = step_ms(motion.duration() * stretch)?;

@@ -72,7 +72,7 @@ impl<'a> Checker<'a> {
                 Err(e) => {
                     let kind = ProblemKind::scale(e.channel);
                     verdict.add(kind, Some(e.joint), i, 0.0, e.value, e.limit);
-                    SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
+                    SetPoint::from(p)
                 }
             })
             .collect();

@@ -5,7 +5,7 @@ use jtc_dynamics::ArmModel;
 use jtc_plan::kinematics::{Kinematics, LegKind, Route, RoutePoint, Target};
 use jtc_plan::{Limits, on_route};
 
-use super::{PlanError, Planned, Planner, set_point};
+use super::{PlanError, Planned, Planner};
 use crate::trajectory::Trajectory;
 
 /// How far the flange may be from its line between two points of a trajectory, m.
@@ -90,7 +90,7 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     let h = f64::from(trajectory.step_ms) * 1e-3;
     let mut most = 0.0f64;
     for (i, pair) in trajectory.points.windows(2).enumerate() {
-        let (a, b): (SetPoint, SetPoint) = (set_point(&pair[0]), set_point(&pair[1]));
+        let (a, b) = (SetPoint::from(&pair[0]), SetPoint::from(&pair[1]));
         for part in 0..PARTS {
             let u = part as f64 / PARTS as f64;
             let t = (i as f64 + u) * h;

@@ -36,7 +36,6 @@ pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use rest_of::rest_of;
 pub use speed::at_speed;
-pub(crate) use speed::set_point;
 
 use crate::check::{Checker, HOLD_SHARE, Problem, ProblemKind, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};

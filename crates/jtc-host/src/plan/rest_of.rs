@@ -2,8 +2,8 @@
 
 use jtc_core::{POINTS_MAX, SetPoint, interpolate};
 
+use super::PlanError;
 use super::sampled::step_ms;
-use super::{PlanError, set_point};
 use crate::trajectory::{Point, Trajectory};
 
 /// The path from `from_ms` on: it speeds up from standstill in `ramp_s` seconds, and then goes on at its own times. The first point is
@@ -55,9 +55,9 @@ fn place(trajectory: &Trajectory, t: f64) -> SetPoint {
     let i = (t / h).max(0.0) as usize;
     match (trajectory.points.get(i), trajectory.points.get(i + 1)) {
         (Some(a), Some(b)) => {
-            interpolate(&set_point(a), &set_point(b), h, (t / h - i as f64).clamp(0.0, 1.0))
+            interpolate(&SetPoint::from(a), &SetPoint::from(b), h, (t / h - i as f64).clamp(0.0, 1.0))
         }
-        _ => trajectory.points.last().map(set_point).unwrap_or_default(),
+        _ => trajectory.points.last().map(SetPoint::from).unwrap_or_default(),
     }
 }
 

@@ -105,12 +105,11 @@ fn slowed(state: &State, scale: f64) -> Point {
 /// How far the controller's curve between the points is from the motion, rad.
 fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
     let mut most = 0.0f64;
-    let set =
-        |p: &Point| SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration };
     for (i, pair) in points.windows(2).enumerate() {
         for part in 1..PARTS {
             let u = part as f64 / PARTS as f64;
-            let (curve, motion) = (interpolate(&set(&pair[0]), &set(&pair[1]), h, u), at((i as f64 + u) * h));
+            let curve = interpolate(&SetPoint::from(&pair[0]), &SetPoint::from(&pair[1]), h, u);
+            let motion = at((i as f64 + u) * h);
             for j in 0..JOINTS {
                 most = most.max((curve.position[j] - motion.position[j]).abs());
             }

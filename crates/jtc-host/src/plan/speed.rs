@@ -21,7 +21,7 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
         velocity: p.velocity.map(|v| v * s),
         acceleration: p.acceleration.map(|a| a * s * s),
     };
-    let own: Vec<SetPoint> = trajectory.points.iter().map(set_point).collect();
+    let own: Vec<SetPoint> = trajectory.points.iter().map(SetPoint::from).collect();
     let step = f64::from(trajectory.step_ms) / s;
     if (step - step.round()).abs() < 1e-9 && (1.0..=1000.0).contains(&step) {
         return Ok(Trajectory { step_ms: step.round() as u16, points: own.iter().map(slower).collect() });
@@ -64,16 +64,12 @@ fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     at
 }
 
-pub(crate) fn set_point(p: &Point) -> SetPoint {
-    SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
-}
-
 impl Trajectory {
     /// Set values at the 1 ms point `k`, as the controller computes them (J-31, J-32); the last point beyond the end.
     pub fn at_ms(&self, k: u32) -> Option<SetPoint> {
         let step = u32::from(self.step_ms.max(1));
         let (i, ms) = ((k / step) as usize, k % step);
-        let wire = |p: &Point| p.raw(0).map_or_else(|_| set_point(p), |raw| SetPoint::from(&raw));
+        let wire = |p: &Point| p.raw(0).map_or_else(|_| SetPoint::from(p), |raw| SetPoint::from(&raw));
         match (self.points.get(i), self.points.get(i + 1)) {
             (Some(a), Some(b)) => {
                 let h = f64::from(self.step_ms) * 1e-3;

@@ -1,7 +1,7 @@
 //! Plans: whatever is planned passes the check, and what cannot be is refused by name.
 
 use host_kit::{Diagnose, ErrorKind};
-use jtc_core::POINTS_MAX;
+use jtc_core::{POINTS_MAX, SetPoint};
 use proptest::prelude::*;
 
 use super::*;
@@ -190,7 +190,7 @@ proptest! {
         let planned = Planner { jerk, blend, ..Planner::new(&config) }.through(&waypoints(&places)).unwrap();
         let h = f64::from(planned.trajectory.step_ms) * 1e-3;
         for pair in planned.trajectory.points.windows(2) {
-            let (a, b) = (set_point(&pair[0]), set_point(&pair[1]));
+            let (a, b) = (SetPoint::from(&pair[0]), SetPoint::from(&pair[1]));
             for k in 1..20 {
                 let at = |k: i32| jtc_core::interpolate(&a, &b, h, f64::from(k) / 20.0).position;
                 let (p, q, r) = (at(k - 1), at(k), at(k + 1));

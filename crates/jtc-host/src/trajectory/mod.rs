@@ -12,7 +12,7 @@ mod tests;
 
 use std::path::Path;
 
-use jtc_core::JOINTS;
+use jtc_core::{JOINTS, SetPoint};
 use jtc_wire::{ACCELERATION_SCALE, Joint, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 pub use overshoot::{Overshoot, overshoot_words};
@@ -29,6 +29,13 @@ pub struct Point {
     pub velocity: [f64; JOINTS],
     /// rad/s².
     pub acceleration: [f64; JOINTS],
+}
+
+impl From<&Point> for SetPoint {
+    /// As the point is given, before the wire rounds it.
+    fn from(p: &Point) -> Self {
+        Self { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
+    }
 }
 
 /// Points at a fixed step.

@@ -4,30 +4,14 @@ mod common;
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
 mod robots;
 
-use common::jtc;
+use common::{Dir, jtc};
 use jtc_core::{SetPoint, interpolate};
 use jtc_dynamics::Pose;
 use serde_json::Value;
 
 type Vec3 = [f64; 3];
 
-/// A directory with files.
-struct Dir(tempfile::TempDir);
-
 impl Dir {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.path().join(name).to_str().unwrap().to_owned()
-    }
-
-    fn file(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.path(name), text).unwrap();
-        self.path(name)
-    }
-
     /// What is printed for a plan of this text, and where the flange is at ten times in each interval of what is written, as the controller
     /// interpolates.
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {

@@ -2,30 +2,8 @@
 
 mod common;
 
-use common::jtc;
+use common::{Dir, jtc};
 use serde_json::Value;
-
-/// A directory with files.
-struct Dir(tempfile::TempDir);
-
-impl Dir {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.path().join(name).to_str().unwrap().to_owned()
-    }
-
-    fn file(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.path(name), text).unwrap();
-        self.path(name)
-    }
-
-    fn has(&self, name: &str) -> bool {
-        self.0.path().join(name).exists()
-    }
-}
 
 const WAYPOINTS: &str =
     "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.5,0.2,-0.4,0.3,0.6,0\n0.1,0.4,-0.9,0,0.6,0.5\n0,0,0,0,0,0\n";

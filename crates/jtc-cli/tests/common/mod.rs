@@ -23,6 +23,31 @@ pub fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
+/// A directory with files.
+pub struct Dir(tempfile::TempDir);
+
+impl Dir {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a directory"))
+    }
+
+    /// A path in it.
+    pub fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// A file in it.
+    pub fn file(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.path(name), text).expect("a file");
+        self.path(name)
+    }
+
+    /// Whether there is such a file.
+    pub fn has(&self, name: &str) -> bool {
+        self.0.path().join(name).exists()
+    }
+}
+
 /// A simulated controller behind a pseudo-terminal; it ends with the test.
 pub struct Sim {
     child: Child,

@@ -116,8 +116,6 @@ pub struct RunArgs {
     /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
     pub file: PathBuf,
     #[command(flatten)]
-    pub link: LinkArgs,
-    #[command(flatten)]
     pub check: CheckArgs,
     /// Move to the first point before
     #[arg(long, env = "JTC_APPROACH", value_parser = FalseyValueParser::new())]
@@ -129,9 +127,7 @@ pub struct RunArgs {
     #[arg(long, env = "JTC_REPEAT", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     #[command(flatten)]
-    pub files: RunFiles,
-    #[command(flatten)]
-    pub accept: AcceptArgs,
+    pub execute: ExecuteArgs,
 }
 
 /// Options of `jtc traj continue`.
@@ -146,6 +142,13 @@ pub struct ContinueArgs {
     /// Arm whose limits and masses count, TOML or URDF; default: that of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
+    #[command(flatten)]
+    pub execute: ExecuteArgs,
+}
+
+/// What every command takes that executes a motion.
+#[derive(Args, Clone, Debug)]
+pub struct ExecuteArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     #[command(flatten)]

@@ -6,7 +6,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 use jtc_wire::JOINTS;
 
-use super::{AcceptArgs, ForceArgs, LinkArgs, RunFiles};
+use super::{ExecuteArgs, ForceArgs, LinkArgs};
 
 /// Options of `jtc plan`.
 #[derive(Args, Debug)]
@@ -92,11 +92,7 @@ pub struct MoveArgs {
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
-    pub link: LinkArgs,
-    #[command(flatten)]
-    pub files: RunFiles,
-    #[command(flatten)]
-    pub accept: AcceptArgs,
+    pub execute: ExecuteArgs,
 }
 
 /// Where a move leads.

@@ -6,7 +6,8 @@ use jtc_host::recording::{BrokenOff, NothingLeft, Recording, Resumption};
 use jtc_host::trajectory::{Loaded, Trajectory};
 use jtc_wire::Status;
 
-use super::job::{Job, typed};
+use super::job::{Job, stem, typed};
+use super::named_arm;
 use super::run::{Course, perform};
 use crate::args::ContinueArgs;
 
@@ -16,27 +17,22 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     if let Some(cut) = &recording.cut {
         out.note(format!("note: {}: {cut}", args.run.display()));
     }
-    let arm = args.arm.as_deref().map(Arm::load).transpose().map_err(Failure::nothing_sent)?;
-    let arm_named = arm.is_some();
-    let arm = arm.unwrap_or_else(Arm::avena);
+    let arm = named_arm::load(args.arm.as_deref()).map_err(Failure::nothing_sent)?;
     let whole = whole(args, &recording, &arm)?;
     let broken = recording.broken_off(&whole).map_err(Failure::nothing_sent)?;
-    let name = args.run.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let inputs = [Some(&args.run), args.trajectory.as_ref(), args.arm.as_ref()];
     let course = Course {
-        link: args.link.clone(),
-        name: format!("rest of {name}"),
+        execute: args.execute.clone(),
+        name: format!("rest of {}", stem(&args.run)),
         words: format!("the rest of {}", args.run.display()),
         inputs: inputs.into_iter().flatten().cloned().collect(),
-        files: args.files.clone(),
-        arm_named,
-        accept_device_limits: args.accept.accept_device_limits,
+        arm_named: args.arm.is_some(),
         approach: true,
         speed_pct: 50.0,
         points_per_segment: None,
         repeat: 1,
     };
-    let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
+    let arm_words = named_arm::typed_option(args.arm.as_deref());
     let words = format!("traj continue {}{arm_words}", typed(&args.run));
     let mut make = |job: &mut Job, status: &Status| {
         let from_ms = place(job, &whole, broken, status, out).map_err(Failure::nothing_sent)?;

@@ -4,17 +4,15 @@ use std::io::{BufRead, Write};
 
 use cli_kit::{Failure, Output};
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
-use jtc_host::arm::Arm;
 use serde_json::json;
 
+use super::named_arm;
 use crate::args::{DynamicsArgs, DynamicsKind};
 
 /// Reads lines of numbers until the end of stdin.
 pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-    for warning in &arm.warnings {
-        out.note(format!("note: {warning}"));
-    }
+    let arm = named_arm::load(args.arm.as_deref())?;
+    named_arm::note_warnings(&arm, out);
     if args.rotors && arm.rotors_given.contains(&false) {
         out.note(
             "note: the arm file does not give every rotor inertia: 0 counts for those that it leaves out",

@@ -11,6 +11,7 @@ use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use serde_json::json;
 
+use super::named_arm;
 use crate::args::CheckArgs;
 
 /// Speeds tried between one that passes and one that does not.
@@ -27,12 +28,15 @@ pub fn typed(path: &Path) -> String {
     }
 }
 
+/// The name of a file without directory and ending.
+pub fn stem(path: &Path) -> String {
+    path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
 /// The arm that was named, or the built-in one; its warnings go to stderr.
 fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-    for warning in &arm.warnings {
-        out.note(format!("note: {warning}"));
-    }
+    let arm = named_arm::load(args.arm.as_deref())?;
+    named_arm::note_warnings(&arm, out);
     Ok(arm)
 }
 
@@ -81,7 +85,7 @@ impl Job {
             plan::at_speed(&loaded.trajectory, args.speed)?
         };
         let config = arm.config();
-        let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
+        let arm_words = named_arm::typed_option(args.arm.as_deref());
         let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
         let device = Config::avena();
         Ok(Self { loaded, trajectory, arm, config, device, words, speed: args.speed, made: false })
@@ -89,9 +93,7 @@ impl Job {
 
     /// Of no file: the motion comes by [`Job::take`]. `words` is the command as it is typed.
     pub fn made(arm: Arm, words: String, out: &Output) -> Self {
-        for warning in &arm.warnings {
-            out.note(format!("note: {warning}"));
-        }
+        named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
             trajectory: Trajectory::default(),
             form: Form::Csv,

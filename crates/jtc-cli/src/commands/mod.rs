@@ -17,6 +17,7 @@ mod log;
 mod maintain;
 mod monitor;
 mod moves;
+mod named_arm;
 mod params;
 mod payload;
 mod plan;

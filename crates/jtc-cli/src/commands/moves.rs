@@ -5,7 +5,8 @@ use jtc_host::arm::Arm;
 use jtc_host::plan::kinematics::{self, Orientation};
 use jtc_host::plan::{COLD, PlanError, Planner};
 
-use super::job::{Job, typed};
+use super::job::Job;
+use super::named_arm;
 use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
@@ -24,28 +25,19 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         (None, pose) => (pose.unwrap_or_default().map(|v| format!("{v}")).join(","), "--to-flange"),
     };
     let course = Course {
-        link: args.link.clone(),
+        execute: args.execute.clone(),
         name: format!("move to {name}"),
         words: name.clone(),
         inputs: args.arm.iter().cloned().collect(),
-        files: args.files.clone(),
         arm_named: args.arm.is_some(),
-        accept_device_limits: args.accept.accept_device_limits,
         approach: false,
         speed_pct: args.speed,
         points_per_segment: None,
         repeat: 1,
     };
     let line = if args.line { " --line" } else { "" };
-    let words = line.to_owned()
-        + &args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
-    let arm = args
-        .arm
-        .as_deref()
-        .map(Arm::load)
-        .transpose()
-        .map_err(Failure::nothing_sent)?
-        .unwrap_or_else(Arm::avena);
+    let words = line.to_owned() + &named_arm::typed_option(args.arm.as_deref());
+    let arm = named_arm::load(args.arm.as_deref()).map_err(Failure::nothing_sent)?;
     let target = target(args, &arm)?;
     let mut make = |job: &mut Job, status: &jtc_wire::Status| {
         let friction = job.arm.friction();

@@ -14,8 +14,8 @@ use jtc_host::{JointSample, Point, Sample};
 use jtc_wire::{ControllerState, Joint, TrajectoryState};
 use serde_json::json;
 
-use super::job::typed;
-use super::run_report;
+use super::job::{stem, typed};
+use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
 /// Rows of the page that list what binds.
@@ -32,10 +32,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         return Err(Failure::usage(format!("--temperature {} °C is outside -40..120", args.temperature)));
     }
     readable(&args.out)?;
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-    for warning in &arm.warnings {
-        out.note(format!("note: {warning}"));
-    }
+    let arm = named_arm::load(args.arm.as_deref())?;
+    named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
     // Before anything is opened: a line that cannot be leaves no file.
@@ -191,7 +189,7 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
         };
         let rows: Vec<Vec<String>> = Joint::ALL.iter().map(row).collect();
         let page = args.report.as_deref().map_or(String::new(), |page| format!("\n{}   open it in a browser", page.display()));
-        let arm = args.arm.as_deref().map_or(String::new(), |arm| format!(" --arm {}", typed(arm)));
+        let arm = named_arm::typed_option(args.arm.as_deref());
         format!(
             "{}: {waypoints} waypoints, {:.3} s, {} points every {} ms\n{}next: jtc traj run {}{arm} --approach{page}",
             args.out.display(),
@@ -221,8 +219,7 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
 
 /// The page of a run, with what is commanded alone.
 fn report(planned: &Planned, arm: &Arm, config: &Config, args: &PlanArgs) -> String {
-    let name = args.out.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let info = run_report::info(arm, "planned, not run", &name, 0);
+    let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let h = f64::from(planned.trajectory.step_ms) * 1e-3;
     let samples: Vec<Sample> = planned

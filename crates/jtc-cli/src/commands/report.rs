@@ -8,6 +8,7 @@ use jtc_host::recording::Recording;
 use jtc_host::report::{ReportInput, RunFailure, Summary, html, picture_svg};
 use serde_json::json;
 
+use super::job::stem;
 use super::run_report;
 use crate::args::ReportArgs;
 use cli_kit::OutputFile;
@@ -25,7 +26,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     if let Some(cut) = &recording.cut {
         out.note(format!("note: {}: {cut}", args.file.display()));
     }
-    let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = stem(&args.file);
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     let info = match (arm, recording.info) {
         (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),

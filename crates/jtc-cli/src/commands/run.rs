@@ -19,9 +19,9 @@ use jtc_host::trajectory::Trajectory;
 use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Session, StateError, words};
 use jtc_wire::{ControllerState, Joint, Status};
 
-use super::job::{Job, typed};
+use super::job::{Job, stem, typed};
 use super::run_report;
-use crate::args::{LinkArgs, RunArgs, RunFiles};
+use crate::args::{ExecuteArgs, RunArgs};
 use crate::limits;
 use crate::operator::Operator;
 use crate::progress::Progress;
@@ -35,18 +35,16 @@ pub(super) const BRING_UP: Duration = Duration::from_secs(15);
 /// What a motion is run with, whichever command asks for it.
 #[derive(Clone, Debug)]
 pub struct Course {
-    pub link: LinkArgs,
+    /// Link, files that it writes, what is accepted.
+    pub execute: ExecuteArgs,
     /// As recordings name it.
     pub name: String,
     /// Whose first point an approach leads to, as it is typed.
     pub words: String,
     /// Files that the command reads, which are no outputs.
     pub inputs: Vec<PathBuf>,
-    /// Those that it writes.
-    pub files: RunFiles,
     /// The arm was named, and has to be that of the controller.
     pub arm_named: bool,
-    pub accept_device_limits: bool,
     /// Where the arm stands elsewhere it is moved to the first point.
     pub approach: bool,
     /// Speed of an approach at most, %.
@@ -62,20 +60,21 @@ pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status) -> Result<(), Failure>;
 impl Course {
     /// That of a trajectory file.
     pub fn of(args: &RunArgs) -> Self {
-        let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         Self {
-            link: args.link.clone(),
-            name,
+            execute: args.execute.clone(),
+            name: stem(&args.file),
             words: typed(&args.file),
             inputs: std::iter::once(args.file.clone()).chain(args.check.arm.clone()).collect(),
-            files: args.files.clone(),
             arm_named: args.check.arm.is_some(),
-            accept_device_limits: args.accept.accept_device_limits,
             approach: args.approach,
             speed_pct: args.check.speed,
             points_per_segment: args.points_per_segment,
             repeat: args.repeat,
         }
+    }
+
+    fn accepts_device_limits(&self) -> bool {
+        self.execute.accept.accept_device_limits
     }
 
     fn upload(&self) -> UploadOptions {
@@ -97,7 +96,7 @@ pub fn perform(
     out: &Output,
 ) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    if let Some(path) = &course.files.record {
+    if let Some(path) = &course.execute.files.record {
         Format::of(path)?; // a wrong ending is reported before anything moves
     }
     let mut job = load(out)?;
@@ -112,7 +111,7 @@ fn match_device(
     course: &Course,
     out: &Output,
 ) -> Result<(), Failure> {
-    let accepted = course.accept_device_limits;
+    let accepted = course.accepts_device_limits();
     let info = session.info()?;
     job.device = session.device_config()?;
     match info {
@@ -181,7 +180,7 @@ fn drive(
     }
     let outputs = Outputs::open(course).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out, progress)?;
-    let mut session = course.link.session()?;
+    let mut session = course.execute.link.session()?;
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     match_device(&mut session, job, course, out)?;
@@ -359,7 +358,7 @@ impl Job {
         status: &Status,
         course: &Course,
     ) -> Result<CheckedTrajectory, CheckError> {
-        let accept_device_limits = course.accept_device_limits;
+        let accept_device_limits = course.accepts_device_limits();
         let options =
             CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() };
         CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)

@@ -17,12 +17,11 @@ const NO_BRAKES: &str =
 pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use std::path::Path;
 
-    use jtc_host::arm::Arm;
     use jtc_host::recording::{Ending, Format};
     use jtc_sim::{SimConfig, Support, World};
     use serde_json::json;
 
-    use super::run_report;
+    use super::{named_arm, run_report};
     use crate::serve::{Pty, Server, Typed};
     use crate::tape::Tape;
     use cli_kit::OutputFile;
@@ -32,10 +31,8 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         Format::of(path)?; // a wrong ending is reported before anything runs
     }
     let stop = Stop::listen()?;
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-    for warning in &arm.warnings {
-        out.note(format!("note: {warning}"));
-    }
+    let arm = named_arm::load(args.arm.as_deref())?;
+    named_arm::note_warnings(&arm, out);
     if arm.friction().is_none() {
         out.note("note: the arm file gives no friction: that of the default arm is simulated");
     }

@@ -11,6 +11,7 @@ use jtc_host::{Error, LinkError, Session};
 use serde_json::json;
 
 use super::super::info::hash;
+use super::super::named_arm;
 use crate::args::{AcceptArgs, ForceArgs, LinkArgs};
 use crate::limits;
 
@@ -23,9 +24,7 @@ pub(super) fn push(
     out: &Output,
 ) -> Result<(), Failure> {
     let arm = Arm::load(file)?;
-    for warning in &arm.warnings {
-        out.note(format!("note: {warning}"));
-    }
+    named_arm::note_warnings(&arm, out);
     let set = arm.parameter_set();
     if !set.missing().is_empty() {
         let message =

@@ -19,12 +19,22 @@ pub struct Outputs {
 impl Outputs {
     pub fn open(course: &Course) -> Result<Self, Failure> {
         let mut others: Vec<&Path> = course.inputs.iter().map(|path| path.as_path()).collect();
-        let force = course.files.force.force;
-        let record =
-            course.files.record.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
-        others.extend(course.files.record.as_deref());
-        let report =
-            course.files.report.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
+        let force = course.execute.files.force.force;
+        let record = course
+            .execute
+            .files
+            .record
+            .as_deref()
+            .map(|path| OutputFile::open(path, force, &others))
+            .transpose()?;
+        others.extend(course.execute.files.record.as_deref());
+        let report = course
+            .execute
+            .files
+            .report
+            .as_deref()
+            .map(|path| OutputFile::open(path, force, &others))
+            .transpose()?;
         Ok(Self { record, report })
     }
 

@@ -4,6 +4,9 @@ pub use jtc_bus::GRIPPER;
 use jtc_bus::{NODES, NodeState, warning};
 use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, can_flag, error};
 
+/// Velocities of a joint that is at rest, rad/s (J-36).
+const AT_REST_RAD_S: std::ops::RangeInclusive<f64> = -0.02..=0.02;
+
 /// Name of a node on the joint bus.
 pub fn node(n: usize) -> String {
     Joint::from_index(n).map_or_else(|| "gripper".into(), |joint| joint.to_string())
@@ -122,6 +125,12 @@ pub fn absent(s: &Status) -> Vec<Joint> {
 pub fn is_held(s: &Status) -> bool {
     let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;
     Joint::ALL.iter().all(|joint| enabled(joint) || is_absent(s, joint.index()))
+}
+
+/// The joint that moves fastest, where one moves faster than an arm at rest does, with its velocity, rad/s.
+pub fn moving_joint(s: &Status) -> Option<(Joint, f64)> {
+    let fastest = Joint::ALL.into_iter().map(|joint| (joint, f64::from(s.joints[joint.index()].velocity)));
+    fastest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|(_, speed)| !AT_REST_RAD_S.contains(speed))
 }
 
 /// Whether the controller still waits for a node to be ready.

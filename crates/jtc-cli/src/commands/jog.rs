@@ -227,7 +227,7 @@ fn rest(session: &mut Session<SerialPort>) -> Result<Status, Failure> {
     let end = session.now() + REST;
     loop {
         let status = session.next_status()?;
-        if status.joints.iter().all(|joint| joint.velocity.abs() < 0.02) {
+        if words::moving_joint(&status).is_none() {
             return Ok(status);
         }
         if session.now() > end {

@@ -14,8 +14,6 @@ use super::arm::poses_table;
 use super::job::typed;
 use crate::args::{LinkArgs, PoseCommand};
 
-/// Faster than this, rad/s, an arm is on its way: a pose is where it stands.
-const STANDS: f64 = 0.02;
 /// What moves by less than this within [`WATCHED`] stands, rad: the slowest jog moves twice as far.
 const STILL: f64 = 1.2e-3;
 /// So long the arm is watched: a slow jog is in no status.
@@ -91,10 +89,12 @@ fn stands(begin: &Status, now: &Status) -> Result<(), Failure> {
             return Err(Failure::new(ErrorKind::Device, "not-measured", message)
                 .hint("`jtc status` shows the joints, `jtc recover` brings them up"));
         }
-        let speed = f64::from(now.joints[j].velocity);
-        if speed.abs() > STANDS {
-            return moving(format!("{joint} moves at {speed:.2} rad/s"));
-        }
+    }
+    if let Some((joint, speed)) = words::moving_joint(now) {
+        return moving(format!("{joint} moves at {speed:.2} rad/s"));
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
         let way = now.positions()[j] - begin.positions()[j];
         if way.abs() > STILL {
             return moving(format!("{joint} moves slowly, by {:.1} mrad since a moment ago", way * 1e3));

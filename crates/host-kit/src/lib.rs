@@ -4,6 +4,7 @@
 mod diagnosis;
 mod finding;
 mod kind;
+mod likeness;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 mod whole;
@@ -11,4 +12,5 @@ mod whole;
 pub use diagnosis::{Diagnose, Diagnosis};
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;
+pub use likeness::{likeness, nearest};
 pub use whole::write_whole;

@@ -43,12 +43,7 @@ fn known() -> String {
 }
 
 fn unknown(key: &str) -> ProfileFileError {
-    let likeness = |name: &str| strsim::jaro_winkler(name, key);
-    let nearest = KEYS
-        .iter()
-        .map(|known| known.name)
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
-        .filter(|name| likeness(name) > 0.75);
+    let nearest = host_kit::nearest(key, KEYS.iter().map(|known| known.name), 0.75);
     ProfileFileError::UnknownKey { key: key.to_string(), nearest }
 }
 

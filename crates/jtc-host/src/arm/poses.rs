@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, nearest, write_whole};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
@@ -125,7 +125,7 @@ impl Arm {
             return Err(PoseError::Unknown {
                 name: short(name),
                 arm: self.name.clone(),
-                like: alike(name, &known),
+                like: nearest(name, known.iter().map(String::as_str), ALIKE).map(str::to_owned),
                 known,
             });
         };
@@ -145,14 +145,6 @@ impl Arm {
             (!(min..=max).contains(&position[joint.index()])).then_some((joint, min, max))
         })
     }
-}
-
-/// The name that looks most like `name`, where one does.
-fn alike(name: &str, known: &[String]) -> Option<String> {
-    let name = name.to_lowercase();
-    let likeness = known.iter().map(|known| (strsim::jaro_winkler(&known.to_lowercase(), &name), known));
-    let most = likeness.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (most.0 >= ALIKE).then(|| most.1.clone())
 }
 
 /// Whether a pose may have this name: it fits into an option beside lists of numbers, and into a cell of a waypoint file.

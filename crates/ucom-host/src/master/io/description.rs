@@ -1,4 +1,5 @@
 //! Names of a board's inputs, outputs and parameters (D-36).
+use host_kit::likeness;
 use serde::{Deserialize, Serialize};
 
 use crate::master::error::SignalError;
@@ -90,7 +91,7 @@ impl IoDescription {
             return Ok(index);
         }
         // A unit in brackets makes no name less like another.
-        let like = |n: &str| strsim::jaro_winkler(n, name).max(strsim::jaro_winkler(short(n), name));
+        let like = |n: &str| likeness(n, name).max(likeness(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(likeness, _)| *likeness > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -135,6 +135,24 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// The waypoint that it is about, counted from 1, where its message names one: of two, the one where it is wrong.
+    pub fn waypoint(&self) -> Option<usize> {
+        match self {
+            Self::NotFinite { waypoint, .. }
+            | Self::Position { waypoint, .. }
+            | Self::Time { waypoint, .. }
+            | Self::TooEarly { waypoint, .. }
+            | Self::Torque { waypoint, .. } => Some(*waypoint),
+            Self::Flange(error) => error.waypoint(),
+            Self::TooFew { .. }
+            | Self::Limit { .. }
+            | Self::Range { .. }
+            | Self::Blend { .. }
+            | Self::Path { .. }
+            | Self::NoTimeLaw { .. } => None,
+        }
+    }
+
     /// What helps.
     pub fn hint(&self) -> &'static str {
         match self {

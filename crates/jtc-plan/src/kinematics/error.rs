@@ -139,6 +139,15 @@ impl PoseError {
         Self::Waypoint { waypoint, source: Box::new(self) }
     }
 
+    /// The waypoint that it is about, counted from 1, where its message names one: of a leg the one that it leads to.
+    pub fn waypoint(&self) -> Option<usize> {
+        match self {
+            Self::Waypoint { waypoint, .. } => Some(*waypoint),
+            Self::Leg { leg, .. } => Some(leg + 1),
+            _ => None,
+        }
+    }
+
     /// What helps.
     pub fn hint(&self) -> &'static str {
         match self {

@@ -79,17 +79,8 @@ fn coldest(status: &jtc_wire::Status) -> f64 {
     measured.fold(COLD, f64::min)
 }
 
-/// There is no such move. Its waypoints are where the arm stands and where it is to go.
+/// There is no such move.
 fn refused(error: &PlanError, name: &str) -> Failure {
-    let failure = Failure::of(error);
-    let message = failure.message.replacen("waypoint 1, ", "where the arm stands, ", 1).replacen(
-        "waypoint 2, ",
-        &format!("{name}, "),
-        1,
-    );
-    let message = message
-        .replacen("waypoint 1: ", "where the arm stands: ", 1)
-        .replacen("waypoint 2: ", "", 1)
-        .replacen("leg 1 (to waypoint 2), ", "", 1);
-    Failure::nothing_sent(Failure { message: format!("no move to {name}: {message}"), ..failure })
+    let message = format!("no move to {name}: {}", error.of_move(name));
+    Failure::nothing_sent(Failure { message, ..Failure::of(error) })
 }

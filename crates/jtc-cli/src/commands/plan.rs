@@ -55,7 +55,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         jerk: !args.no_jerk_limit,
         ..Planner::new(&config)
     };
-    let mut planned = way.planned(&planner).map_err(|e| located(e, &file))?;
+    let mut planned = way.planned(&planner).map_err(|e| located(&e, &file))?;
     planned.notes.extend(off_the_line(&planned, &file, &arm, args));
     if args.blend_m > 0.0 && matches!(way, Way::Joints(_)) {
         planned.notes.push(NO_LINES.to_owned());
@@ -87,7 +87,7 @@ impl Way {
             return Ok(Self::Joints(file.positions(arm)?));
         }
         let route = |blend_m: f64| match file.route(arm, args.line, (args.blend, blend_m)) {
-            Err(WaypointError::Route(e)) => Err(located(e, file)),
+            Err(WaypointError::Route(e)) => Err(located(&e, file)),
             other => Ok(other?),
         };
         let (rounded, times) = route(args.blend_m)?;
@@ -147,17 +147,12 @@ fn readable(out: &Path) -> Result<(), Failure> {
 }
 
 /// With the lines of the file that waypoints stand in.
-fn located(error: PlanError, file: &WaypointFile) -> Failure {
-    let failure = Failure::of(&error);
-    let mut message = failure.message.clone();
-    // "waypoint 3, joint 2: …": the first one that is named is where it is wrong.
-    let number = message.split_once("waypoint ").and_then(|(_, rest)| {
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
-        rest[..digits].parse().ok()
-    });
-    if let (PlanError::Plan(_), Some(place)) = (&error, number.and_then(|n| file.place_of(n))) {
-        message = format!("{place}: {message}");
-    }
+fn located(error: &PlanError, file: &WaypointFile) -> Failure {
+    let failure = Failure::of(error);
+    let message = match error.waypoint().and_then(|waypoint| file.place_of(waypoint)) {
+        Some(place) => format!("{place}: {}", failure.message),
+        None => failure.message,
+    };
     Failure { message, ..failure }
 }
 

@@ -58,6 +58,41 @@ pub enum PlanError {
     },
 }
 
+impl PlanError {
+    /// The waypoint that it is about, counted from 1, where its message names one.
+    pub fn waypoint(&self) -> Option<usize> {
+        match self {
+            Self::Plan(error) => error.waypoint(),
+            _ => None,
+        }
+    }
+
+    /// The message of a move, whose two waypoints are known as where the arm stands and as the `target`.
+    pub fn of_move(&self, target: &str) -> String {
+        use jtc_plan::PlanError as Of;
+        use kinematics::PoseError as Pose;
+        let Self::Plan(error) = self else { return self.to_string() };
+        let place = if error.waypoint() == Some(1) { "where the arm stands" } else { target };
+        match error {
+            Of::NotFinite { joint, value, .. } => format!("{place}, {joint}: {value} is no position"),
+            Of::Position { joint, value, min, max, .. } => {
+                format!("{place}, {joint}: {value} rad is outside {min}..{max} rad")
+            }
+            Of::Torque { joint, torque, limit, whole, holding, .. } => format!(
+                "{place}, {joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
+                if *holding { "holding the arm there" } else { "the slowest motion from there" },
+                100.0 * limit / whole
+            ),
+            Of::Flange(Pose::Waypoint { waypoint: 1, source }) => format!("{place}: {source}"),
+            Of::Flange(Pose::Waypoint { source, .. }) => source.to_string(),
+            Of::Flange(Pose::Leg { distance, length, source, .. }) => {
+                format!("{distance:.4} m of {length:.4} m along the line: {source}")
+            }
+            other => other.to_string(),
+        }
+    }
+}
+
 impl Diagnose for PlanError {
     fn diagnosis(&self) -> Diagnosis {
         use jtc_plan::PlanError as Of;
@@ -90,5 +125,43 @@ impl Diagnose for PlanError {
                 Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_plan::PlanError as Of;
+    use jtc_wire::Joint;
+    use kinematics::PoseError;
+
+    use super::*;
+
+    /// The words of a move are those of its waypoints, with the places that people know.
+    #[test]
+    fn a_move_is_refused_with_the_words_of_its_waypoint() {
+        let joint = Joint::ALL[2];
+        for (waypoint, place) in [(1, "where the arm stands"), (2, "home")] {
+            let torque =
+                |holding| Of::Torque { waypoint, joint, torque: 90.0, limit: 77.6, whole: 80.0, holding };
+            let position = Of::Position { waypoint, joint, value: 5.0, min: -1.0, max: 1.0 };
+            let not_finite = Of::NotFinite { waypoint, joint, value: f64::NAN };
+            for error in [not_finite, position, torque(true), torque(false)] {
+                let (text, error) = (error.to_string(), PlanError::from(error));
+                assert_eq!(error.waypoint(), Some(waypoint), "{text}");
+                assert_eq!(error.of_move("home"), text.replace(&format!("waypoint {waypoint}"), place));
+            }
+        }
+        let source = || Box::new(PoseError::NoMotion);
+        let of = |error: PoseError| PlanError::from(Of::from(error)).of_move("home");
+        let start = of(PoseError::Waypoint { waypoint: 1, source: source() });
+        assert_eq!(start, format!("where the arm stands: {}", PoseError::NoMotion));
+        assert_eq!(
+            of(PoseError::Waypoint { waypoint: 2, source: source() }),
+            PoseError::NoMotion.to_string()
+        );
+        let leg = of(PoseError::Leg { leg: 1, distance: 0.1, length: 0.4, source: source() });
+        assert_eq!(leg, format!("0.1000 m of 0.4000 m along the line: {}", PoseError::NoMotion));
+        let none = PlanError::Nowhere { count: 2 };
+        assert_eq!((none.waypoint(), none.of_move("home")), (None, none.to_string()));
     }
 }

@@ -1,0 +1,98 @@
+//! Why a pose cannot be used or saved.
+
+use std::path::PathBuf;
+
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use jtc_wire::Joint;
+
+use super::NAME_MAX;
+use crate::file::FileError;
+
+/// Why a pose cannot be used or saved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// A name that no waypoint file or option could hold.
+    #[error(
+        "\"{name}\" is no name of a pose: it begins with a letter, has letters, digits, _, - and . only, {NAME_MAX} at most, and is no number \
+         (nan, inf)"
+    )]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// No pose of this name.
+    #[error("the arm {arm} has no pose \"{name}\"{}", known_words(known))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Name of the arm.
+        arm: String,
+        /// The poses that it has.
+        known: Vec<String>,
+        /// That one of them which looks most like it.
+        like: Option<String>,
+    },
+    /// The arm cannot be there.
+    #[error("pose \"{name}\", {joint}: {value} rad is outside {min}..{max} rad")]
+    Outside {
+        /// Name of the pose.
+        name: String,
+        /// Of this joint.
+        joint: Joint,
+        /// rad.
+        value: f64,
+        /// rad.
+        min: f64,
+        /// rad.
+        max: f64,
+    },
+    /// A pose of this name is there already.
+    #[error("{}: pose \"{name}\" is there already", path.display())]
+    Exists {
+        /// The arm file.
+        path: PathBuf,
+        /// Name of the pose.
+        name: String,
+    },
+    /// A robot description, which has no place for poses.
+    #[error("{} is a robot description, which has no place for poses", path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The arm file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+fn known_words(known: &[String]) -> String {
+    if known.is_empty() { "; it has none".into() } else { format!("; it has {}", known.join(", ")) }
+}
+
+impl Diagnose for PoseError {
+    fn diagnosis(&self) -> Diagnosis {
+        let (kind, code, next) = match self {
+            Self::Name { .. } => (ErrorKind::Usage, "pose-name", "give it another name, as above-table".into()),
+            Self::Unknown { like: Some(like), .. } => {
+                (ErrorKind::Usage, "unknown-pose", format!("is \"{like}\" meant? `jtc pose list` shows all poses of an arm file"))
+            }
+            Self::Unknown { .. } => (
+                ErrorKind::Usage,
+                "unknown-pose",
+                "`jtc pose save NAME --arm FILE` saves where the arm is, --arm FILE names the file with the pose".into(),
+            ),
+            Self::Outside { .. } => (
+                ErrorKind::Refused,
+                "outside-limits",
+                "a pose from another arm, or limits that were changed since: save it again, or correct it in the file".into(),
+            ),
+            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --force writes over it".into()),
+            Self::Description { .. } => {
+                (ErrorKind::Usage, "no-arm-file", "`jtc arm import URDF -o arm.toml` makes an arm file of it".into())
+            }
+            Self::File(e) => return e.diagnosis(),
+        };
+        Diagnosis::new(kind, code, next)
+    }
+}

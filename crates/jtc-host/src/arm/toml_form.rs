@@ -3,11 +3,16 @@
 use std::collections::BTreeMap;
 
 use jtc_core::settings;
-use jtc_core::{Config, JOINTS, JointConfig, PidGains, TableOf};
+use jtc_core::{Config, JOINTS, JointConfig, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{Joint, SettingValue};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
+
+mod joint;
+
+use joint::JointForm;
+pub(super) use joint::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
 
 use super::parameters::check_table;
 use super::source::{ARM_KEYS, JOINT_KEYS};
@@ -16,11 +21,6 @@ use crate::file::{FileError, Place, short};
 
 /// Format of the arm files that are read. Files without it are older and mean the same.
 pub(super) const FORMAT: i64 = 2;
-
-/// What counts where a file does not give a limit, rad/s, rad/s² and rad.
-pub(super) const VELOCITY_DEFAULT: f64 = 1.5;
-pub(super) const ACCELERATION_DEFAULT: f64 = 12.56637;
-pub(super) const POSITION_ERROR_DEFAULT: f64 = 0.09;
 
 /// The keys that decide how the rest is read.
 #[derive(Deserialize)]
@@ -45,39 +45,6 @@ struct ArmForm {
     settings: BTreeMap<String, toml::Value>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     poses: BTreeMap<String, Vec<f64>>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JointForm {
-    name: String,
-    #[serde(deserialize_with = "exactly")]
-    origin_xyz_m: [f64; 3],
-    #[serde(deserialize_with = "exactly")]
-    origin_rpy_rad: [f64; 3],
-    position_min_rad: Option<f64>,
-    position_max_rad: Option<f64>,
-    velocity_max_rad_s: Option<f64>,
-    acceleration_max_rad_s2: Option<f64>,
-    torque_max_nm: Option<f64>,
-    position_error_max_rad: Option<f64>,
-    rotor_inertia_kg_m2: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    torque_gain: Option<f64>,
-    pid: Option<PidForm>,
-    friction_polynomial: Option<Vec<f64>>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    proposed: Vec<String>,
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PidForm {
-    kp: f64,
-    ki: f64,
-    kd: f64,
-    int_min_rad_s: f64,
-    int_max_rad_s: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -190,7 +157,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     };
     Ok(Arm {
         joint_names: std::array::from_fn(|i| joints[i].name.clone()),
-        pid: all_or_none(joints, "pid", |j| Ok(j.pid.map(PidForm::gains)))?,
+        pid: all_or_none(joints, "pid", |j| Ok(j.pid.map(joint::PidForm::gains)))?,
         polynomial: all_or_none(joints, "friction_polynomial", JointForm::polynomial)?,
         table: tables(&form.friction_table)?,
         poses: super::poses::read(&form.poses)?,
@@ -298,82 +265,6 @@ fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]
         sources.propose((number, key));
     }
     Ok(())
-}
-
-impl JointForm {
-    /// Whether it has a number that no default stands for.
-    fn has(&self, key: &str) -> bool {
-        match key {
-            "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),
-            "pid" => self.pid.is_some(),
-            "friction_polynomial" => self.friction_polynomial.is_some(),
-            _ => true,
-        }
-    }
-
-    fn limits(
-        &self,
-        number: Joint,
-        warnings: &mut Vec<Warning>,
-        sources: &mut Sources,
-    ) -> Result<JointConfig, FileError> {
-        let need = |key: &str, v: Option<f64>| {
-            v.ok_or_else(|| FileError::at(Place::name(format!("joint {}, {key}", self.name)), "missing"))
-        };
-        if self.torque_gain.is_none() {
-            sources.fill_in((Some(number), "torque_gain"));
-        }
-        let mut or = |key: &'static str, v: Option<f64>, default: f64| {
-            v.unwrap_or_else(|| {
-                let problem = format!("{key} not given: {default} is used");
-                warnings.push(Warning::new(Change::LimitAssumed, format!("joint {}", self.name), problem));
-                sources.fill_in((Some(number), key));
-                default
-            })
-        };
-        Ok(JointConfig {
-            position_min: need("position_min_rad", self.position_min_rad)?,
-            position_max: need("position_max_rad", self.position_max_rad)?,
-            velocity_max: or("velocity_max_rad_s", self.velocity_max_rad_s, VELOCITY_DEFAULT),
-            acceleration_max: or(
-                "acceleration_max_rad_s2",
-                self.acceleration_max_rad_s2,
-                ACCELERATION_DEFAULT,
-            ),
-            torque_max: need("torque_max_nm", self.torque_max_nm)?,
-            position_error_max: or(
-                "position_error_max_rad",
-                self.position_error_max_rad,
-                POSITION_ERROR_DEFAULT,
-            ),
-            rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
-            torque_gain: self.torque_gain.unwrap_or(1.0),
-        })
-    }
-
-    fn polynomial(&self) -> Result<Option<[f64; 6]>, FileError> {
-        let Some(c) = &self.friction_polynomial else { return Ok(None) };
-        match c.len() {
-            4 => Ok(Some([c[0], c[1], c[2], c[3], 0.0, 0.0])),
-            6 => Ok(Some([c[0], c[1], c[2], c[3], c[4], c[5]])),
-            n => Err(FileError::at(
-                Place::name(format!("joint {}, friction_polynomial", self.name)),
-                format!("{n} coefficients, not 4 or 6"),
-            )),
-        }
-    }
-}
-
-impl PidForm {
-    fn gains(self) -> PidGains {
-        PidGains {
-            kp: self.kp,
-            ki: self.ki,
-            kd: self.kd,
-            int_min: self.int_min_rad_s,
-            int_max: self.int_max_rad_s,
-        }
-    }
 }
 
 impl LinkForm {

@@ -1,0 +1,123 @@
+//! A joint in the TOML form of an arm.
+
+use jtc_core::{JointConfig, PidGains};
+use jtc_wire::Joint;
+use serde::{Deserialize, Serialize};
+
+use super::exactly;
+use crate::arm::{Change, Sources, Warning};
+use crate::file::{FileError, Place};
+
+/// What counts where a file does not give a limit, rad/s, rad/s² and rad.
+pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
+pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
+pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JointForm {
+    pub(super) name: String,
+    #[serde(deserialize_with = "exactly")]
+    pub(super) origin_xyz_m: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
+    pub(super) origin_rpy_rad: [f64; 3],
+    pub(super) position_min_rad: Option<f64>,
+    pub(super) position_max_rad: Option<f64>,
+    pub(super) velocity_max_rad_s: Option<f64>,
+    pub(super) acceleration_max_rad_s2: Option<f64>,
+    pub(super) torque_max_nm: Option<f64>,
+    pub(super) position_error_max_rad: Option<f64>,
+    pub(super) rotor_inertia_kg_m2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) torque_gain: Option<f64>,
+    pub(super) pid: Option<PidForm>,
+    pub(super) friction_polynomial: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) proposed: Vec<String>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PidForm {
+    pub(super) kp: f64,
+    pub(super) ki: f64,
+    pub(super) kd: f64,
+    pub(super) int_min_rad_s: f64,
+    pub(super) int_max_rad_s: f64,
+}
+
+impl JointForm {
+    /// Whether it has a number that no default stands for.
+    pub(super) fn has(&self, key: &str) -> bool {
+        match key {
+            "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),
+            "pid" => self.pid.is_some(),
+            "friction_polynomial" => self.friction_polynomial.is_some(),
+            _ => true,
+        }
+    }
+
+    pub(super) fn limits(
+        &self,
+        number: Joint,
+        warnings: &mut Vec<Warning>,
+        sources: &mut Sources,
+    ) -> Result<JointConfig, FileError> {
+        let need = |key: &str, v: Option<f64>| {
+            v.ok_or_else(|| FileError::at(Place::name(format!("joint {}, {key}", self.name)), "missing"))
+        };
+        if self.torque_gain.is_none() {
+            sources.fill_in((Some(number), "torque_gain"));
+        }
+        let mut or = |key: &'static str, v: Option<f64>, default: f64| {
+            v.unwrap_or_else(|| {
+                let problem = format!("{key} not given: {default} is used");
+                warnings.push(Warning::new(Change::LimitAssumed, format!("joint {}", self.name), problem));
+                sources.fill_in((Some(number), key));
+                default
+            })
+        };
+        Ok(JointConfig {
+            position_min: need("position_min_rad", self.position_min_rad)?,
+            position_max: need("position_max_rad", self.position_max_rad)?,
+            velocity_max: or("velocity_max_rad_s", self.velocity_max_rad_s, VELOCITY_DEFAULT),
+            acceleration_max: or(
+                "acceleration_max_rad_s2",
+                self.acceleration_max_rad_s2,
+                ACCELERATION_DEFAULT,
+            ),
+            torque_max: need("torque_max_nm", self.torque_max_nm)?,
+            position_error_max: or(
+                "position_error_max_rad",
+                self.position_error_max_rad,
+                POSITION_ERROR_DEFAULT,
+            ),
+            rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
+            torque_gain: self.torque_gain.unwrap_or(1.0),
+        })
+    }
+
+    pub(super) fn polynomial(&self) -> Result<Option<[f64; 6]>, FileError> {
+        let Some(c) = &self.friction_polynomial else { return Ok(None) };
+        match c.len() {
+            4 => Ok(Some([c[0], c[1], c[2], c[3], 0.0, 0.0])),
+            6 => Ok(Some([c[0], c[1], c[2], c[3], c[4], c[5]])),
+            n => Err(FileError::at(
+                Place::name(format!("joint {}, friction_polynomial", self.name)),
+                format!("{n} coefficients, not 4 or 6"),
+            )),
+        }
+    }
+}
+
+impl PidForm {
+    pub(super) fn gains(self) -> PidGains {
+        PidGains {
+            kp: self.kp,
+            ki: self.ki,
+            kd: self.kd,
+            int_min: self.int_min_rad_s,
+            int_max: self.int_max_rad_s,
+        }
+    }
+}

@@ -1,93 +1,20 @@
 //! The whole way back to HoldPos, whatever the state is, with each step reported.
 
+mod source;
+mod step;
+
 use std::time::Duration;
 
 use jtc_bus::NODES;
 use jtc_wire::{ControllerState, Status, error};
 
+pub use source::ParameterSource;
+pub use step::RecoverStep;
+
 use super::Session;
-use crate::arm::ParameterSet;
-use crate::error::{Error, LinkError, ParametersError, StateError};
+use crate::error::{Error, LinkError, StateError};
 use crate::port::Port;
 use crate::words;
-
-/// Whose friction, gains and arm model a controller is given that misses some (J-55).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum ParameterSource<'a> {
-    /// Nobody's: a controller that misses some is refused.
-    #[default]
-    None,
-    /// The defaults that are built into the controller, by name.
-    ControllerDefaults,
-    /// Those of an arm, all of them: a controller without torque is given them whatever it has.
-    Arm {
-        /// Name of the arm or its file.
-        name: &'a str,
-        /// All three parts.
-        set: &'a ParameterSet,
-    },
-}
-
-/// One step of the way back.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum RecoverStep {
-    /// Where the controller is.
-    Found(String),
-    /// A person has to act: the safety input is low.
-    SafetyInput,
-    /// The motion is stopped.
-    Stop,
-    /// Teaching is switched off.
-    TeachOff,
-    /// Errors are cleared: the controller's, and those of these nodes.
-    Clear(Vec<String>),
-    /// Nodes are reset.
-    Reset(Vec<String>),
-    /// Friction, gains and arm model are given, all three: those of the controller's own defaults, or of the arm of this name.
-    Give(Option<String>),
-    /// Nothing is given: the controller goes on with the parameters that it has.
-    Keep,
-    /// Nothing is given although an arm is named: the controller holds an arm with the parameters that it has.
-    KeepHolding(String),
-    /// Nodes come up.
-    WaitNodes(Vec<String>),
-    /// Done: HoldPos without errors.
-    HoldPos,
-}
-
-impl std::fmt::Display for RecoverStep {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            RecoverStep::Found(line) => write!(f, "found: {line}"),
-            RecoverStep::SafetyInput => {
-                write!(f, "the safety input is low: release the emergency stop (waiting)")
-            }
-            RecoverStep::Stop => write!(f, "stopping the motion"),
-            RecoverStep::TeachOff => write!(f, "switching teaching off"),
-            RecoverStep::Clear(nodes) if nodes.is_empty() => write!(f, "clearing the controller's errors"),
-            RecoverStep::Clear(nodes) => {
-                write!(f, "clearing the errors of the controller and of {}", nodes.join(", "))
-            }
-            RecoverStep::Reset(nodes) => write!(f, "resetting {}", nodes.join(", ")),
-            RecoverStep::Give(None) => write!(
-                f,
-                "friction, gains and arm model: the controller's own defaults, those of its built-in arm"
-            ),
-            RecoverStep::Give(Some(arm)) => write!(f, "friction, gains and arm model: those of {arm}"),
-            RecoverStep::Keep => {
-                write!(f, "friction, gains and arm model: those that the controller was given before")
-            }
-            RecoverStep::KeepHolding(arm) => write!(
-                f,
-                "the arm is held with the friction, gains and arm model that the controller was given before, not with those of \
-                 {arm}: `jtc params push` gives them"
-            ),
-            RecoverStep::WaitNodes(nodes) => write!(f, "waiting for {}", nodes.join(", ")),
-            RecoverStep::HoldPos => write!(f, "HoldPos, no errors"),
-        }
-    }
-}
 
 /// First enable of a drive takes 4 s, after a reset some more.
 const NODE_TIME: Duration = Duration::from_secs(15);
@@ -332,61 +259,6 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         (self.report)(&RecoverStep::Reset(words::node_names(nodes)));
         self.session.reset(nodes)?;
         self.session.pause_for(BOOT, &self.ended)
-    }
-}
-
-impl ParameterSource<'_> {
-    /// An arm must be whole: friction, gains and arm model.
-    ///
-    /// # Errors
-    ///
-    /// [`ParametersError::IncompleteArm`] for a set that cannot be given whole.
-    pub fn check(&self) -> Result<(), ParametersError> {
-        match self {
-            ParameterSource::Arm { name, set } if !set.missing().is_empty() => {
-                Err(ParametersError::IncompleteArm { arm: (*name).to_owned(), missing: set.missing() })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// A controller that misses parameters needs a source.
-    fn enough_for(&self, status: &Status) -> Result<(), ParametersError> {
-        match self {
-            ParameterSource::None if status.jtc_init != 0 => {
-                Err(ParametersError::NoSource { missing: words::missing_parameters(status.jtc_init) })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// An arm's parameters are given once to any controller, the defaults to one that misses some; always all three, so that those
-    /// of two arms are never mixed.
-    fn due(&self, status: &Status, given: bool) -> bool {
-        match self {
-            ParameterSource::None => false,
-            ParameterSource::ControllerDefaults => status.jtc_init != 0,
-            ParameterSource::Arm { .. } => status.jtc_init != 0 || !given,
-        }
-    }
-
-    /// The step to report when nothing will be given.
-    fn kept(&self, status: &Status) -> Option<RecoverStep> {
-        match self {
-            _ if status.jtc_init != 0 => None,
-            ParameterSource::Arm { name, .. } => {
-                let held = [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
-                status.state.is_in(&held).then(|| RecoverStep::KeepHolding((*name).to_owned()))
-            }
-            ParameterSource::None | ParameterSource::ControllerDefaults => Some(RecoverStep::Keep),
-        }
-    }
-
-    fn arm_name(&self) -> Option<String> {
-        match self {
-            ParameterSource::Arm { name, .. } => Some((*name).to_owned()),
-            _ => None,
-        }
     }
 }
 

@@ -1,0 +1,62 @@
+//! The steps of the way back, in words.
+
+/// One step of the way back.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RecoverStep {
+    /// Where the controller is.
+    Found(String),
+    /// A person has to act: the safety input is low.
+    SafetyInput,
+    /// The motion is stopped.
+    Stop,
+    /// Teaching is switched off.
+    TeachOff,
+    /// Errors are cleared: the controller's, and those of these nodes.
+    Clear(Vec<String>),
+    /// Nodes are reset.
+    Reset(Vec<String>),
+    /// Friction, gains and arm model are given, all three: those of the controller's own defaults, or of the arm of this name.
+    Give(Option<String>),
+    /// Nothing is given: the controller goes on with the parameters that it has.
+    Keep,
+    /// Nothing is given although an arm is named: the controller holds an arm with the parameters that it has.
+    KeepHolding(String),
+    /// Nodes come up.
+    WaitNodes(Vec<String>),
+    /// Done: HoldPos without errors.
+    HoldPos,
+}
+
+impl std::fmt::Display for RecoverStep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            RecoverStep::Found(line) => write!(f, "found: {line}"),
+            RecoverStep::SafetyInput => {
+                write!(f, "the safety input is low: release the emergency stop (waiting)")
+            }
+            RecoverStep::Stop => write!(f, "stopping the motion"),
+            RecoverStep::TeachOff => write!(f, "switching teaching off"),
+            RecoverStep::Clear(nodes) if nodes.is_empty() => write!(f, "clearing the controller's errors"),
+            RecoverStep::Clear(nodes) => {
+                write!(f, "clearing the errors of the controller and of {}", nodes.join(", "))
+            }
+            RecoverStep::Reset(nodes) => write!(f, "resetting {}", nodes.join(", ")),
+            RecoverStep::Give(None) => write!(
+                f,
+                "friction, gains and arm model: the controller's own defaults, those of its built-in arm"
+            ),
+            RecoverStep::Give(Some(arm)) => write!(f, "friction, gains and arm model: those of {arm}"),
+            RecoverStep::Keep => {
+                write!(f, "friction, gains and arm model: those that the controller was given before")
+            }
+            RecoverStep::KeepHolding(arm) => write!(
+                f,
+                "the arm is held with the friction, gains and arm model that the controller was given before, not with those of \
+                 {arm}: `jtc params push` gives them"
+            ),
+            RecoverStep::WaitNodes(nodes) => write!(f, "waiting for {}", nodes.join(", ")),
+            RecoverStep::HoldPos => write!(f, "HoldPos, no errors"),
+        }
+    }
+}

@@ -1,19 +1,20 @@
 //! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors
 //! and bus-off.
+
+mod nodes;
+
 use std::collections::VecDeque;
 
-use jtc_bus::{Answer, Frame, JOINTS, NODES, NodeState, Scale};
+use jtc_bus::{Frame, JOINTS, NODES, Scale};
 use jtc_core::BusState;
 
-use crate::drive::Drive;
-use crate::gripper::Gripper;
+pub use nodes::Nodes;
+
 use crate::jitter::Jitter;
 use crate::request::NodeRequest;
 
 /// A tick, µs.
 const TICK_US: u32 = 1000;
-/// Time from the end of a request to the first answer that is ready, µs; the others follow by this much each.
-const ANSWER_US: (u32, u32) = (38, 6);
 /// An error frame and the pause before the repetition, µs.
 const ERROR_FRAME_US: u32 = 23;
 /// Transmit error counter above which a controller leaves the bus (ISO 11898-1).
@@ -23,8 +24,6 @@ const RECOVERY_US: u32 = 1408;
 
 /// Bit of an answer's id.
 const RESPONSE: u16 = 0x200;
-/// Bytes of the gripper's answer to Move.
-const GRIPPER_ANSWER: usize = 20;
 /// Frames of others that may wait.
 const FOREIGN_MAX: usize = 64;
 
@@ -90,55 +89,6 @@ pub struct TimedFrame {
     pub end_us: u32,
     /// The frame.
     pub frame: Frame,
-}
-
-/// The seven nodes.
-#[derive(Clone, Debug)]
-pub struct Nodes {
-    /// Base to wrist.
-    pub drives: [Drive; JOINTS],
-    /// Node 6; `None`: not there at all.
-    pub gripper: Option<Gripper>,
-}
-
-impl Nodes {
-    /// Any node acknowledges frames.
-    pub fn any_on_bus(&self) -> bool {
-        self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
-    }
-
-    /// States of the nodes; Fault where there is no gripper.
-    pub fn states(&self) -> [NodeState; NODES] {
-        let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
-        core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
-    }
-
-    /// What a node answers to a request that ended at `now_us`, and how long after that it is ready, µs.
-    pub fn answer(
-        &mut self,
-        node: usize,
-        now_us: u64,
-        request: &NodeRequest,
-        scales: &[Scale; JOINTS],
-    ) -> Option<(u32, Frame)> {
-        let answer = self.receive(node, now_us, request)?;
-        let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
-        if matches!(answer, Answer::Gripper(_)) {
-            // Real ones send 20 bytes, of which the last mean nothing.
-            let mut data = [0; GRIPPER_ANSWER];
-            let len = frame.data().len().min(GRIPPER_ANSWER);
-            data[..len].copy_from_slice(&frame.data()[..len]);
-            frame = Frame::new(frame.id, &data).unwrap_or(frame);
-        }
-        Some((ANSWER_US.0 + ANSWER_US.1 * node as u32, frame))
-    }
-
-    fn receive(&mut self, node: usize, now_us: u64, request: &NodeRequest) -> Option<Answer> {
-        match self.drives.get_mut(node) {
-            Some(drive) => drive.receive(now_us, request),
-            None => self.gripper.as_mut()?.receive(now_us, request),
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -399,6 +349,7 @@ impl Bus {
 
 #[cfg(test)]
 mod tests {
+    use super::nodes::ANSWER_US;
     use super::*;
 
     #[test]

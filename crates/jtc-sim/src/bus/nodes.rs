@@ -1,0 +1,61 @@
+//! The nodes of the joint bus, and what they answer.
+
+use jtc_bus::{Answer, Frame, JOINTS, NODES, NodeState, Scale};
+
+use crate::drive::Drive;
+use crate::gripper::Gripper;
+use crate::request::NodeRequest;
+
+/// Time from the end of a request to the first answer that is ready, µs; the others follow by this much each.
+pub(super) const ANSWER_US: (u32, u32) = (38, 6);
+/// Bytes of the gripper's answer to Move.
+const GRIPPER_ANSWER: usize = 20;
+
+/// The seven nodes.
+#[derive(Clone, Debug)]
+pub struct Nodes {
+    /// Base to wrist.
+    pub drives: [Drive; JOINTS],
+    /// Node 6; `None`: not there at all.
+    pub gripper: Option<Gripper>,
+}
+
+impl Nodes {
+    /// Any node acknowledges frames.
+    pub fn any_on_bus(&self) -> bool {
+        self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
+    }
+
+    /// States of the nodes; Fault where there is no gripper.
+    pub fn states(&self) -> [NodeState; NODES] {
+        let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
+        core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
+    }
+
+    /// What a node answers to a request that ended at `now_us`, and how long after that it is ready, µs.
+    pub fn answer(
+        &mut self,
+        node: usize,
+        now_us: u64,
+        request: &NodeRequest,
+        scales: &[Scale; JOINTS],
+    ) -> Option<(u32, Frame)> {
+        let answer = self.receive(node, now_us, request)?;
+        let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
+        if matches!(answer, Answer::Gripper(_)) {
+            // Real ones send 20 bytes, of which the last mean nothing.
+            let mut data = [0; GRIPPER_ANSWER];
+            let len = frame.data().len().min(GRIPPER_ANSWER);
+            data[..len].copy_from_slice(&frame.data()[..len]);
+            frame = Frame::new(frame.id, &data).unwrap_or(frame);
+        }
+        Some((ANSWER_US.0 + ANSWER_US.1 * node as u32, frame))
+    }
+
+    fn receive(&mut self, node: usize, now_us: u64, request: &NodeRequest) -> Option<Answer> {
+        match self.drives.get_mut(node) {
+            Some(drive) => drive.receive(now_us, request),
+            None => self.gripper.as_mut()?.receive(now_us, request),
+        }
+    }
+}

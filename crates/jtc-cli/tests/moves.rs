@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Sim, jtc, moving_while, slow_motion};
+use common::{Sim, at, jtc, moving_while, place, slow_motion};
 use serde_json::Value;
 
 const FAST: [&str; 3] = ["--speed", "max", "--no-throttle"];
@@ -16,18 +16,6 @@ fn ready() -> Sim {
 
 fn arm(sim: &Sim) -> String {
     sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
-}
-
-/// Where the simulated arm is, rad.
-fn place(sim: &Sim) -> Vec<f64> {
-    let status = sim.json(&["status"], 0);
-    status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
-}
-
-fn at(sim: &Sim, q: [f64; 6]) {
-    for (joint, (is, should)) in place(sim).into_iter().zip(q).enumerate() {
-        assert!((is - should).abs() < 3e-3, "joint {}: {is} instead of {should}", joint + 1);
-    }
 }
 
 /// To a pose of the flange in joint space, and from there on a straight line; what cannot be is refused before anything moves.
@@ -333,79 +321,4 @@ fn lead() -> String {
         format!("{:.2},{q},0,0,0,0,0\n", f64::from(i) * 0.01)
     };
     "t,q1,q2,q3,q4,q5,q6\n".to_owned() + &(0..=300).map(row).collect::<String>()
-}
-
-/// Starts a recorded run in real time and waits until the arm has moved for a second.
-fn moving(sim: &Sim, file: &str, record: &str) -> std::process::Child {
-    moving_with(sim, &[file, "--record", record])
-}
-
-fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
-    moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
-}
-
-/// Stopped by a person, or broken off with its program: the rest is run from the last place that is proved.
-#[test]
-fn a_run_that_was_broken_off_goes_on_where_it_was() {
-    let sim = Sim::start(&["--no-throttle"]).held();
-    let file = sim.file("motion.csv", &slow_motion(60));
-    for (record, signal) in [("stopped.mcap", "-INT"), ("killed.mcap", "-KILL")] {
-        let record = sim.path(record);
-        let mut child = moving(&sim, &file, &record);
-        cli_kit::trial::signal(&child, signal);
-        child.wait().unwrap();
-        if signal == "-KILL" {
-            sim.jtc(&["traj", "stop"]).ends(0);
-            std::thread::sleep(std::time::Duration::from_millis(800));
-        }
-        let before = place(&sim);
-        assert!(before[0] > 0.01, "{before:?}");
-        let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A stop that was recorded shows where the arm came to rest; of one that was not, nothing is proved.
-        let stands = output.err.contains("and the arm stands there: it goes on from there");
-        assert!(stands || signal == "-KILL" && output.err.contains("no later place of it"), "{}", output.err);
-        let value = output.json();
-        assert_eq!(value["outcome"], "finished");
-        let executed = value["executed_s"].as_f64().unwrap();
-        assert!((3.0..6.0).contains(&executed), "{executed} s of the 6 s are left");
-        at(&sim, [0.0; 6]);
-    }
-    // A run at another speed has other points.
-    let half = sim.path("half.csv");
-    let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
-    cli_kit::trial::signal(&child, "-INT");
-    child.wait().unwrap();
-    let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
-    assert!(output.err.contains("at another speed"), "{}", output.err);
-    // Nothing is left of a run that was finished, and a CSV file does not hold the path.
-    let (other, whole, rest) =
-        (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
-    sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
-    let output = sim.jtc(&["traj", "continue", &whole]).ends(2);
-    assert!(output.err.contains("does not hold the whole trajectory"), "{}", output.err);
-    let output = sim.jtc(&["traj", "continue", &whole, "--trajectory", &other, "--record", &rest]).ends(4);
-    assert!(output.err.contains("nothing is left of it"), "{}", output.err);
-    assert!(!std::path::Path::new(&rest).exists());
-}
-
-/// After an error the arm is brought back first; where it was moved meanwhile, an approach leads to the place.
-#[test]
-fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
-    let faults =
-        "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
-    // In real time, so that the recording knows each 40 ms of the path.
-    let sim = Sim::with_faults(&["--no-throttle"], faults).held();
-    let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
-    sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
-    let refused = sim.jtc(&["traj", "continue", &record]).ends(1);
-    assert!(refused.err.contains("jtc recover"), "{}", refused.err);
-    sim.jtc(&["recover"]).ends(0);
-    sim.jtc(&["move", "--to", "0,0,0,0,0,0"]).ends(0);
-    let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-    assert!(output.err.contains("an approach leads there"), "{}", output.err);
-    let value = output.json();
-    let phases: Vec<&str> =
-        value["runs"].as_array().unwrap().iter().map(|r| r["phase"].as_str().unwrap()).collect();
-    assert_eq!((phases, &value["outcome"]), (vec!["approach", "motion"], &"finished".into()));
-    at(&sim, [0.0; 6]);
 }

@@ -165,6 +165,19 @@ impl Drop for Sim {
     }
 }
 
+/// Where the simulated arm is, rad.
+pub fn place(sim: &Sim) -> Vec<f64> {
+    let status = sim.json(&["status"], 0);
+    status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
+}
+
+/// It is there.
+pub fn at(sim: &Sim, q: [f64; 6]) {
+    for (joint, (is, should)) in place(sim).into_iter().zip(q).enumerate() {
+        assert!((is - should).abs() < 3e-3, "joint {}: {is} instead of {should}", joint + 1);
+    }
+}
+
 /// Starts a command that moves the arm, and waits until it has moved for so many seconds.
 pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
     let mut child = sim

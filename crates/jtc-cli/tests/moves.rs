@@ -171,6 +171,24 @@ fn waypoints_are_run_several_times() {
     assert_eq!(again["outcome"], "finished");
 }
 
+/// The example of lines is planned as it says, and run.
+#[test]
+fn the_example_of_lines_is_run() {
+    let sim = ready();
+    let dir = sim.dir.path().to_str().unwrap();
+    let written = jtc(&["--json", "example", "lines", "-o", dir]).ends(0).json();
+    let next =
+        written["next"].as_str().unwrap().replace("lines.csv --", &format!("{} --", sim.path("lines.csv")));
+    let words: Vec<&str> = next.split_whitespace().skip(1).collect();
+    let planned = jtc(&[&["--json"], &words[..]].concat()).ends(0).json();
+    assert_eq!((&planned["waypoints"], &planned["notes"]), (&8.into(), &Value::Array(vec![])), "{planned}");
+    let value = sim.json(&["traj", "run", &sim.path("lines.csv")], 0);
+    assert_eq!(value["outcome"], "finished");
+    for joint in value["joints"].as_array().unwrap() {
+        assert!(joint["max_error_mrad"].as_f64().unwrap() < 5.0, "{joint}");
+    }
+}
+
 /// A path that does not end where it begins is repeated with a way back only.
 #[test]
 fn an_open_path_is_repeated_with_approaches() {

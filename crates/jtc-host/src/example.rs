@@ -23,6 +23,9 @@ const FAULTS: &str = include_str!("example/faults.toml");
 /// Waypoints of a cycle.
 const CYCLE: &str = include_str!("example/cycle.csv");
 
+/// Waypoints with the flange on lines and an arc.
+const LINES: &str = include_str!("example/lines.csv");
+
 /// Furthest bend of each joint of the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
 /// Duration, s, and time between points, ms, of the example motion.
@@ -58,7 +61,7 @@ impl Example {
 }
 
 /// All of them.
-pub const EXAMPLES: [Example; 8] = [
+pub const EXAMPLES: [Example; 9] = [
     Example {
         name: "motion",
         file: "motion.csv",
@@ -79,6 +82,13 @@ pub const EXAMPLES: [Example; 8] = [
         what: "waypoints in degrees without times, for `jtc plan`: from the zero pose around and back to it",
         next: "jtc plan {} -o cycle.csv --blend 0.05",
         text: || CYCLE.to_owned(),
+    },
+    Example {
+        name: "lines",
+        file: "line-waypoints.csv",
+        what: "poses of the flange, for `jtc plan`: along lines and an arc, from the zero pose and back to it",
+        next: "jtc plan {} -o lines.csv --blend-m 0.02",
+        text: || LINES.to_owned(),
     },
     Example {
         name: "json",
@@ -190,7 +200,9 @@ mod tests {
     #[test]
     fn the_trajectories_pass_the_check_from_the_zero_pose() {
         let arm = Arm::avena();
-        for example in EXAMPLES.iter().filter(|e| !e.file.ends_with(".toml") && e.name != "cycle") {
+        for example in
+            EXAMPLES.iter().filter(|e| !e.file.ends_with(".toml") && !e.file.ends_with("-waypoints.csv"))
+        {
             let read = Loaded::parse(&example.text(), Some(&arm.joint_names)).unwrap();
             let config = Config::avena();
             let friction = arm.friction();

@@ -173,6 +173,9 @@ fn column_of(name: &str) -> Option<(usize, f64)> {
     (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| (c + 1, unit))
 }
 
+/// Columns that waypoint files have, and trajectories have not.
+const OF_WAYPOINTS: [&str; 9] = ["pose", "leg", "x", "y", "z", "qx", "qy", "qz", "qw"];
+
 fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded, FileError> {
     let mut place_of = [None; COLUMNS];
     for (i, name) in header.iter().enumerate() {
@@ -183,7 +186,11 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
             )
         };
         let (column, unit) = column_of(name).ok_or_else(|| {
-            at("unknown column; known: t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)")
+            at(if OF_WAYPOINTS.contains(&name.trim()) {
+                "a column of waypoints, which are no trajectory yet: `jtc plan` makes one of them"
+            } else {
+                "unknown column; known: t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)"
+            })
         })?;
         if place_of[column].replace((i, unit)).is_some() {
             return Err(at("this column is there twice"));

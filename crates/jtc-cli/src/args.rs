@@ -140,16 +140,10 @@ pub enum Command {
         after_help = "A waypoint file is CSV with the columns q1..q6 (rad) or q1_deg..q6_deg, `pose` (a name from the arm file), or\n\
                             x,y,z (m) with qx,qy,qz,qw or roll,pitch,yaw of the flange, and `t` (s) where times are given; or JSON with\n\
                             the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
-                            the corners where that is faster than a stop. Legs are straight in joint space; with --line, or where the column
-\
-                            `leg` asks for it, the flange keeps to straight lines and arcs, and --blend-m rounds their corners.
-\
-                            Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and
-\
-                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.
-
-Examples:
-  \
+                            the corners where that is faster than a stop. Legs are straight in joint space; with --line, or where the column\n\
+                            `leg` asks for it, the flange keeps to straight lines and arcs, and --blend-m rounds their corners.\n\
+                            Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and\n\
+                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
                             jtc plan waypoints.csv -o cycle.csv\n  jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
                             jtc plan poses-of-flange.csv -o lines.csv --line --blend-m 0.02\n  \
                             jtc plan cycle.json --arm my-arm.toml -o cycle.csv --payload 2,0,0,0.08"

@@ -217,8 +217,8 @@ fn the_report_names_what_binds_when() {
     let text = std::fs::read_to_string(&page).unwrap();
     assert!(text.contains("What binds when") && text.contains("planned, not run"));
     let bound = &value["binding"][0];
-    let words = format!("joint {}: {}", bound["joint"], bound["limit"].as_str().unwrap());
-    assert!(text.contains(&words), "{words}");
+    assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
+    assert!(text.contains("What binds for how long") && text.contains("[\"joint 6\","));
     assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
     // A page that is there already: nothing is written.
     let other = dir.path("other.csv");

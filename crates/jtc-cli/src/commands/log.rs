@@ -195,6 +195,7 @@ impl Read {
                 samples: &samples,
                 facts: &facts,
                 failure: self.failure.as_ref(),
+                plan: None,
             };
             page.write(html(&input)).map_err(output_lost)?;
         }

@@ -3,23 +3,18 @@
 use std::path::Path;
 
 use cli_kit::{Failure, Output, OutputFile, figure, table};
-use jtc_core::{Config, JOINTS};
-use jtc_dynamics::Dynamics;
+use jtc_core::Config;
 use jtc_host::arm::Arm;
 use jtc_host::plan::kinematics::Route;
 use jtc_host::plan::{Bound, PlanError, Planned, Planner, Waypoint, furthest_aside};
 use jtc_host::report::{Facts, ReportInput, html};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
-use jtc_host::{JointSample, Point, Sample};
-use jtc_wire::{ControllerState, Joint, TrajectoryState};
+use jtc_wire::Joint;
 use serde_json::json;
 
 use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
-
-/// Rows of the page that list what binds.
-const ROWS_MAX: usize = 200;
 
 /// How far the flange may leave a straight line without a word, m.
 const ASIDE_M: f64 = 5e-4;
@@ -68,7 +63,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     }
     trajectory.write(planned.trajectory.to_exact_csv())?;
     if let Some(page) = page {
-        page.write(report(&planned, &arm, &config, args))?;
+        page.write(report(&planned, &arm, &planner, args))?;
     }
     print(&planned, file.waypoints.len(), args, out);
     Ok(())
@@ -212,56 +207,26 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
-/// The page of a run, with what is commanded alone.
-fn report(planned: &Planned, arm: &Arm, config: &Config, args: &PlanArgs) -> String {
+/// The page of a run, with what is commanded alone, and what binds it.
+fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> String {
     let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
-    let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
-    let h = f64::from(planned.trajectory.step_ms) * 1e-3;
-    let samples: Vec<Sample> = planned
-        .trajectory
-        .points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| sample(i as f64 * h, p, &dynamics, config))
-        .collect();
-    let row =
-        |b: &Bound| (format!("{:.3} to {:.3} s", b.from_s, b.to_s), format!("{}: {}", b.joint, b.limit));
-    let mut rows: Vec<(String, String)> = planned.binding.iter().take(ROWS_MAX).map(row).collect();
-    if let Some(more) = planned.binding.len().checked_sub(ROWS_MAX).filter(|more| *more > 0) {
-        rows.push(("and".into(), format!("{more} more")));
-    }
+    let trajectory = &planned.trajectory;
     let of_plan = [
-        ("Duration".to_owned(), format!("{:.3} s", planned.trajectory.duration_s())),
-        (
-            "Points".to_owned(),
-            format!("{} every {} ms", planned.trajectory.points.len(), planned.trajectory.step_ms),
-        ),
-        ("Blend".to_owned(), format!("{} rad, lines {} m", args.blend, args.blend_m)),
-        ("Speed".to_owned(), format!("{} % of what the limits allow", args.speed)),
+        ("Duration", format!("{:.3} s", trajectory.duration_s())),
+        ("Points", format!("{} every {} ms", trajectory.points.len(), trajectory.step_ms)),
+        ("Blend", format!("{} rad, lines {} m", args.blend, args.blend_m)),
+        ("Speed", format!("{} % of what the limits allow", args.speed)),
+        ("Payload", super::payload::words(&planner.config.payload)),
+        ("Torque", format!("by the model, with the friction at {} °C", args.temperature)),
     ];
-    let notes = planned.notes.iter().map(|note| ("Note".to_owned(), note.clone()));
+    let notes = planned.notes.iter().map(|note| ("Note", note.clone()));
+    let rows = of_plan.into_iter().chain(notes).map(|(name, value)| (name.to_owned(), value));
+    let of_joint = |joint: Joint| (joint.to_string(), binds(&planned.binding, joint));
     let facts = [
-        Facts { title: "Plan".into(), rows: of_plan.into_iter().chain(notes).collect() },
-        Facts { title: "What binds when".into(), rows },
+        Facts { title: "Plan".into(), rows: rows.collect() },
+        Facts { title: "What binds for how long".into(), rows: Joint::ALL.map(of_joint).into() },
     ];
-    html(&ReportInput { info: &info, samples: &samples, facts: &facts, failure: None })
-}
-
-fn sample(time_s: f64, p: &Point, dynamics: &Dynamics, config: &Config) -> Sample {
-    let torque = dynamics.inverse(&p.position, &p.velocity, &p.acceleration);
-    let joint = |j: usize| JointSample {
-        set_position: p.position[j],
-        set_velocity: p.velocity[j],
-        set_acceleration: p.acceleration[j],
-        torque_model: torque[j] + config.joints[j].rotor_inertia * p.acceleration[j],
-        ..JointSample::UNKNOWN
-    };
-    Sample {
-        time_s,
-        state: ControllerState::Operate.into(),
-        trajectory: TrajectoryState::Execute.into(),
-        point: (time_s * 1e3).round() as u32,
-        joints: std::array::from_fn::<_, JOINTS, _>(joint),
-        ..Sample::default()
-    }
+    let samples = planner.samples(trajectory);
+    let plan = Some(&planned.binding[..]);
+    html(&ReportInput { info: &info, samples: &samples, facts: &facts, failure: None, plan })
 }

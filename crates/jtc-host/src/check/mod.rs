@@ -262,7 +262,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn friction_torque(&self, j: usize, v: f64) -> f64 {
+    pub(crate) fn friction_torque(&self, j: usize, v: f64) -> f64 {
         match self.friction {
             Some(Friction::Polynomial(c)) => {
                 jtc_core::friction::polynomial(&c[j], v, self.temperature, self.config.friction_sign_width)

@@ -21,6 +21,7 @@ mod error;
 mod lines;
 mod rest_of;
 mod sampled;
+mod samples;
 mod speed;
 #[cfg(test)]
 mod tests;

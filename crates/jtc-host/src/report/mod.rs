@@ -16,6 +16,7 @@ pub use page::html;
 pub use picture::picture_svg;
 pub use summary::{JointSummary, Summary};
 
+use crate::plan::Bound;
 use crate::recording::RecordingInfo;
 use crate::sample::Sample;
 
@@ -39,6 +40,8 @@ pub struct ReportInput<'a> {
     pub facts: &'a [Facts],
     /// What broke first, where the run failed: it leads the page.
     pub failure: Option<&'a RunFailure>,
+    /// Of a motion that was planned and not run: what binds when. `None`: of a run.
+    pub plan: Option<&'a [Bound]>,
 }
 
 /// Text inside of markup.

@@ -20,7 +20,7 @@ pub struct JointSummary {
     pub torque_limit_nm: Option<f64>,
     /// Peak torque as a share of the limit, 0..1.
     pub torque_share: Option<f64>,
-    /// Largest absolute measured speed, rad/s.
+    /// Largest absolute speed, rad/s: measured, or commanded where nothing was measured.
     pub peak_velocity_rad_s: Option<f64>,
     /// Highest bearing temperature, °C.
     pub peak_temperature_c: Option<f64>,
@@ -87,7 +87,8 @@ impl JointSummary {
             peak_torque_nm,
             torque_limit_nm,
             torque_share: peak_torque_nm.zip(torque_limit_nm).map(|(t, l)| t / l),
-            peak_velocity_rad_s: peak(|s, j| s.joints[j].velocity.abs()),
+            peak_velocity_rad_s: peak(|s, j| s.joints[j].velocity.abs())
+                .or_else(|| peak(|s, j| s.joints[j].set_velocity.abs())),
             peak_temperature_c: peak(|s, j| s.joints[j].temperature),
         }
     }

@@ -1,6 +1,8 @@
 //! The page is whole, offline and of bounded size; the figures are right.
 
 use super::*;
+use crate::Arm;
+use crate::plan::Planner;
 use crate::sample::JointSample;
 use jtc_wire::{ControllerState, Joint, NodeState, TrajectoryState};
 
@@ -78,7 +80,7 @@ fn what_is_not_known_is_none() {
 #[test]
 fn the_page_is_whole_and_needs_no_network() {
     let (info, samples) = run(10_530);
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
     assert!(!page.contains("{{"), "a mark was left");
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     assert!(!page.contains("</script> & Co"), "a name ends the script");
@@ -91,7 +93,7 @@ fn the_page_is_whole_and_needs_no_network() {
 fn an_hour_is_thinned_without_losing_its_peak() {
     let (info, mut samples) = run(400_000);
     samples[123_457].joints[2].position -= 0.05;
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     let error = |s: &Sample| s.joints[2].position_error();
     let peak = pack::Thinner::new(&samples).values(error).into_iter().fold(0.0, f64::max);
@@ -101,9 +103,12 @@ fn an_hour_is_thinned_without_losing_its_peak() {
 #[test]
 fn a_run_without_samples_is_still_a_page() {
     let info = RecordingInfo::default();
-    assert!(html(&ReportInput { info: &info, samples: &[], facts: &[], failure: None }).contains("</html>"));
     assert!(
-        picture_svg(&ReportInput { info: &info, samples: &[], facts: &[], failure: None })
+        html(&ReportInput { info: &info, samples: &[], facts: &[], failure: None, plan: None })
+            .contains("</html>")
+    );
+    assert!(
+        picture_svg(&ReportInput { info: &info, samples: &[], facts: &[], failure: None, plan: None })
             .ends_with("</svg>\n")
     );
 }
@@ -111,7 +116,8 @@ fn a_run_without_samples_is_still_a_page() {
 #[test]
 fn the_picture_is_small() {
     let (info, samples) = run(10_530);
-    let picture = picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
+    let picture =
+        picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
     assert!(picture.len() < 150_000, "{} bytes", picture.len());
     assert!(!picture.contains("NaN"));
 }
@@ -140,13 +146,24 @@ fn a_failed_run_leads_with_what_broke_first() {
     assert!(before.position_rad.is_finite() && before.torque_limit_nm == 50.0 && before.errors.is_empty());
     assert!(first.first && first.position_rad.is_nan() && first.errors == ["does not answer"]);
 
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    let page = html(&ReportInput {
+        info: &info,
+        samples: &samples,
+        facts: &[],
+        failure: Some(&failure),
+        plan: None,
+    });
     let headline = page.find("FAILED 600 ms into the run: joint 3: does not answer").expect("the headline");
     assert!(headline < page.find("class=\"hero\"").unwrap(), "it leads the page");
     assert!(page.contains("<title>FAILED: "), "the title reports it");
     assert!(page.contains("<td>–</td>"), "what is not measured is no number");
-    let picture =
-        picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    let picture = picture_svg(&ReportInput {
+        info: &info,
+        samples: &samples,
+        facts: &[],
+        failure: Some(&failure),
+        plan: None,
+    });
     assert!(picture.contains("FAILED") && !picture.contains("tracking error at most"), "{picture}");
     assert!(!picture.contains("NaN"));
 
@@ -196,7 +213,13 @@ fn an_encoder_that_jumps_is_named_by_its_step() {
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
     assert_eq!((failure.joint.map(Joint::number), failure.moments[0].time_ms.round()), (None, 597.0));
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    let page = html(&ReportInput {
+        info: &info,
+        samples: &samples,
+        facts: &[],
+        failure: Some(&failure),
+        plan: None,
+    });
     assert!(!page.contains("marked line") && !page.contains("<tr class=\"first\">"));
 }
 
@@ -215,4 +238,30 @@ fn a_recording_without_its_end_is_no_success() {
     samples[last].trajectory = TrajectoryState::Stop.into();
     assert_eq!(of(&samples, "", ""), None);
     assert_eq!(of(&samples, "stopped", ""), None);
+}
+
+/// A page of a plan shows what binds when, and figures of what is commanded: nothing of it was measured.
+#[test]
+fn the_page_of_a_plan_has_its_torques_and_what_binds() {
+    let arm = Arm::avena();
+    let (config, friction) = (arm.config(), arm.friction());
+    let planner = Planner { model: Some(&arm.model), friction: friction.as_ref(), ..Planner::new(&config) };
+    let planned = planner.to(&[0.0; 6], &[0.5, 0.3, -0.4, 0.2, 0.6, -0.5]).unwrap();
+    let (info, samples) = (RecordingInfo::of(&arm), planner.samples(&planned.trajectory));
+    let summary = Summary::of(&info, &samples);
+    for (of_page, of_check) in summary.joints.iter().zip(&planned.verdict.joints) {
+        let (speed, torque) = (of_page.peak_velocity_rad_s.unwrap(), of_page.peak_torque_nm.unwrap());
+        // At the points alone, and colder than in the check before a run.
+        assert!((speed / of_check.velocity_peak_rad_s - 1.0).abs() < 0.05, "{of_page:?} {of_check:?}");
+        let peak = of_check.torque_peak_nm.unwrap();
+        assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");
+        assert_eq!((of_page.rms_error_mrad, of_page.peak_temperature_c), (None, None));
+    }
+    let page = |plan| html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan });
+    let of_plan = page(Some(&planned.binding[..]));
+    let first = serde_json::to_value(planned.binding[0]).unwrap().to_string();
+    assert!(of_plan.contains(&format!("\"plan\":[{first}")), "{first}");
+    assert!(of_plan.contains("\"set_acceleration_rad_s2\":[{"));
+    let of_run = page(None);
+    assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }

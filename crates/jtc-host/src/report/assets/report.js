@@ -32,12 +32,14 @@
   time = unpack(data.time_s) || [];
   const column = {};
   for (const [k, v] of Object.entries(data)) {
-    if (Array.isArray(v) && v.length === 6 && /_(rad|rad_s|nm|c|mrad)$/.test(k)) column[k] = v.map(unpack);
+    if (Array.isArray(v) && v.length === 6 && /_(rad|rad_s|rad_s2|nm|c|mrad)$/.test(k)) column[k] = v.map(unpack);
   }
   const last = time.length ? time[time.length - 1] : 1;
   const has = (name) => column[name] && column[name].some(Boolean);
   const names = data.joints.map((j, i) => j.name.replace(/^joint_(\d)$/, "Joint $1") || `Joint ${i + 1}`);
   const shown = J.map(() => true);
+  // Planned and not run: nothing is measured, and what binds when is known.
+  const plan = data.plan;
 
   // --- heading -------------------------------------------------------------------------------------------------------
   const summary = data.summary;
@@ -45,7 +47,7 @@
   $("eyebrow").textContent = [data.arm, data.source].filter(Boolean).join(" · ");
   $("title").textContent = data.trajectory || "Recorded run";
   const when = data.start_unix_ms ? new Date(data.start_unix_ms).toLocaleString() + " · " : "";
-  $("lede").textContent = `${when}${round(last, 2)} s recorded, ${data.samples.toLocaleString("en")} samples` +
+  $("lede").textContent = `${when}${round(last, 2)} s ${plan ? "planned" : "recorded"}, ${data.samples.toLocaleString("en")} ${plan ? "points" : "samples"}` +
     (data.thinned > 1 ? `; the plots show the extremes of every ${data.thinned}.` : ".");
   const tile = (value, unit, text) => $("tiles").append(make("div", { class: "tile" }, make("b", {}, value, make("small", {}, unit)), make("span", {}, text)));
   const [rms, rmsJoint] = best("rms_error_mrad");
@@ -56,6 +58,11 @@
   if (!failed && known(rms)) tile(round(rms, 2), "mrad", `worst RMS error, ${names[rmsJoint].toLowerCase()}`);
   if (!failed && known(max)) tile(round(max, 2), "mrad", `largest error, ${names[maxJoint].toLowerCase()}`);
   if (known(share)) tile(round(share * 100, 0), "%", `peak torque of limit, ${names[shareJoint].toLowerCase()}`);
+  if (plan) {
+    const seconds = J.map((j) => plan.filter((b) => b.joint === j + 1).reduce((all, b) => all + b.to_s - b.from_s, 0));
+    const most = Math.max(...seconds);
+    if (most > 0) tile(round(most / last * 100, 0), "%", `of the time ${names[seconds.indexOf(most)].toLowerCase()} is at a limit`);
+  }
   tile(round(summary.executed_s || last, 2), "s", failed ? "executed before it failed" : summary.executed_s ? "of motion" : "recorded");
 
   // --- plots ---------------------------------------------------------------------------------------------------------
@@ -153,8 +160,78 @@
   const stateNames = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
   const tesNames = ["no trajectory", "Stop", "Pause", "Execute", "Finish"];
 
+  // A band with its name on it, where that fits.
+  const band = (u, from, to, y, h, fill, alpha, text, ink) => {
+    const { ctx } = u;
+    const { left, width } = u.bbox;
+    const ratio = devicePixelRatio || 1;
+    const a = Math.max(u.valToPos(from, "x", true), left - 20);
+    const b = Math.min(u.valToPos(to, "x", true), left + width + 20);
+    if (b < left || a > left + width || b <= a) return;
+    ctx.fillStyle = fill;
+    ctx.globalAlpha = alpha;
+    ctx.beginPath();
+    ctx.roundRect(a, y, Math.max(b - a - ratio, ratio), h, 3 * ratio);
+    ctx.fill();
+    ctx.globalAlpha = 1;
+    ctx.font = `600 ${11.5 * ratio}px system-ui, sans-serif`;
+    const x = Math.max(a, left) + 8 * ratio;
+    if (text && x + ctx.measureText(text).width + 8 * ratio < Math.min(b, left + width)) {
+      ctx.fillStyle = ink;
+      ctx.textBaseline = "middle";
+      ctx.textAlign = "left";
+      ctx.fillText(text, x, y + h / 2 + ratio);
+    }
+  };
+
+  // What binds a plan: a row a joint on the same time axis.
+  const limitColours = { velocity: "--st3", acceleration: "--st2", jerk: "--st4", torque: "--st5", stop: "--friction", friction: "--friction", "given time": "--st1" };
+  if (plan && time.length) {
+    const c = card(main, "What binds when", "the joint that is at a limit, and at which");
+    const rows = (u) => {
+      const { ctx } = u;
+      const ratio = devicePixelRatio || 1;
+      const { left, top, width, height } = u.bbox;
+      const h = height / 6;
+      ctx.save();
+      J.forEach((j) => {
+        ctx.fillStyle = colour(`--j${j}`);
+        ctx.globalAlpha = shown[j] ? 1 : 0.25;
+        ctx.font = `600 ${12 * ratio}px system-ui, sans-serif`;
+        ctx.textBaseline = "middle";
+        ctx.textAlign = "right";
+        ctx.fillText(String(j + 1), left - 10 * ratio, top + (j + 0.5) * h);
+        ctx.globalAlpha = 1;
+      });
+      ctx.beginPath();
+      ctx.rect(left, top, width, height);
+      ctx.clip();
+      J.forEach((j) => {
+        ctx.fillStyle = colour("--grid");
+        ctx.fillRect(left, top + (j + 1) * h - ratio, width, ratio);
+      });
+      for (const b of plan) {
+        const j = b.joint - 1;
+        if (shown[j]) band(u, b.from_s, b.to_s, top + j * h + 2 * ratio, h - 4 * ratio, colour(limitColours[b.limit] || "--st0"), 1, b.limit, "#fff");
+      }
+      ctx.restore();
+    };
+    const at = (idx) => {
+      const t = idx === null ? null : time[idx];
+      const now = t === null ? [] : plan.filter((b) => shown[b.joint - 1] && b.from_s <= t && t <= b.to_s);
+      c.readout.replaceChildren(...now.map((b) => make("span", {}, make("i", { style: `--c: var(--j${b.joint - 1})` }), b.limit)));
+    };
+    const item = plot(c.body, [{ y: time.map(() => null), stroke: "--ink" }], { height: 6 * 24 + 40, draw: rows, range: [0, 1], onCursor: at });
+    item.u.axes[1].values = () => [];
+    item.u.axes[1].grid.show = false;
+    for (const limit of [...new Set(plan.map((b) => b.limit))].sort()) {
+      c.keys.append(make("span", { class: "key block", style: `--c: var(${limitColours[limit] || "--st0"})` }, make("i"), limit));
+    }
+    if (!plan.length) c.keys.append(make("span", { class: "key" }, "no limit binds"));
+  }
+
   // Timeline of states: two rows of bands on the same time axis.
-  if (time.length) {
+  if (time.length && !plan) {
     const c = card(main, "States", "controller, trajectory");
     const start = data.time_start_s;
     const bands = (u) => {
@@ -169,24 +246,7 @@
         const h = height / 2 - 3 * ratio;
         const y = top + row * (height / 2) + 1.5 * ratio;
         for (const [from, to, value] of runs) {
-          const a = Math.max(u.valToPos(from - start, "x", true), left - 20);
-          const b = Math.min(u.valToPos(to - start, "x", true), left + width + 20);
-          if (b < left || a > left + width || b <= a) continue;
-          ctx.fillStyle = colour(style(value));
-          ctx.globalAlpha = row ? 0.55 : 1;
-          ctx.beginPath();
-          ctx.roundRect(a, y, Math.max(b - a - ratio, ratio), h, 3 * ratio);
-          ctx.fill();
-          ctx.globalAlpha = 1;
-          const text = words[value] ?? `state ${value}`;
-          ctx.font = `600 ${11.5 * ratio}px system-ui, sans-serif`;
-          const x = Math.max(a, left) + 8 * ratio;
-          if (x + ctx.measureText(text).width + 8 * ratio < Math.min(b, left + width)) {
-            ctx.fillStyle = row ? colour("--ink") : "#fff";
-            ctx.textBaseline = "middle";
-            ctx.textAlign = "left";
-            ctx.fillText(text, x, y + h / 2 + ratio);
-          }
+          band(u, from - start, to - start, y, h, colour(style(value)), row ? 0.55 : 1, words[value] ?? `state ${value}`, row ? colour("--ink") : "#fff");
         }
       });
       ctx.restore();
@@ -197,28 +257,54 @@
     c.readout.textContent = data.errors.some((r) => r[2]) ? "errors occurred" : "";
   }
 
+  // The limits of the joints that are shown, where the plot reaches them; a limit of several is drawn once, in a colour of its own.
+  const limits = (of) => (u) => {
+    if (!of) return;
+    const { ctx, bbox } = u;
+    const all = new Map();
+    J.filter((j) => shown[j]).forEach((j) => of(data.joints[j]).filter(known).forEach((v) => all.set(v, all.has(v) ? "--warn" : `--j${j}`)));
+    ctx.save();
+    ctx.lineWidth = devicePixelRatio || 1;
+    ctx.setLineDash([6, 5]);
+    for (const [v, stroke] of all) {
+      if (v > u.scales.y.max || v < u.scales.y.min) continue;
+      const y = u.valToPos(v, "y", true);
+      ctx.strokeStyle = colour(stroke);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      ctx.stroke();
+    }
+    ctx.restore();
+  };
   const jointPlot = (heading, small, measured, set, options) => {
     if (!has(measured) && !(set && has(set))) return;
     const c = card(main, heading, small);
+    const both = has(measured) && set && has(set);
     // Commanded as a broad pale band, measured as a fine line on it: both are seen where they agree.
-    const lines = set && has(set) ? J.map((j) => ({ y: column[set][j], joint: j, kind: "set", stroke: `--j${j}`, width: 5, alpha: 0.26 })) : [];
-    lines.push(...J.map((j) => ({ y: column[measured][j], joint: j, kind: "measured", stroke: `--j${j}`, width: 1.4 })));
-    const item = plot(c.body, lines, { ...options, onCursor: readouts(c.readout, column[measured], options.digits) });
-    if (set && has(set)) {
+    const lines = set && has(set) ? J.map((j) => ({ y: column[set][j], joint: j, kind: "set", stroke: `--j${j}`, ...(both ? { width: 5, alpha: 0.26 } : { width: 1.6 }) })) : [];
+    if (has(measured)) lines.push(...J.map((j) => ({ y: column[measured][j], joint: j, kind: "measured", stroke: `--j${j}`, width: 1.4 })));
+    const item = plot(c.body, lines, { ...options, draw: limits(options.limits), onCursor: readouts(c.readout, column[has(measured) ? measured : set], options.digits) });
+    const { min, max } = item.u.scales.y;
+    if (options.limits && data.joints.some((j) => options.limits(j).some((v) => known(v) && v >= min && v <= max))) {
+      c.e.querySelector("small").append("; dashed: limits");
+    }
+    if (both) {
       key(c.keys, "measured", "--soft", "", (on) => { item.kinds.measured = on; });
       key(c.keys, "commanded", "--soft", "broad", (on) => { item.kinds.set = on; });
     }
   };
-  jointPlot("Position", "rad", "position_rad", "set_position_rad", { digits: 4, height: 300 });
+  jointPlot("Position", "rad", "position_rad", "set_position_rad", { digits: 4, height: 300, limits: (j) => [j.position_min_rad, j.position_max_rad] });
   jointPlot("Tracking error", "mrad, commanded − measured", "error_mrad", null, { digits: 3, height: 240 });
-  jointPlot("Velocity", "rad/s", "velocity_rad_s", "set_velocity_rad_s", { digits: 3, height: 260 });
+  jointPlot("Velocity", "rad/s", "velocity_rad_s", "set_velocity_rad_s", { digits: 3, height: 260, limits: (j) => [j.velocity_max_rad_s, -j.velocity_max_rad_s] });
+  jointPlot("Acceleration", "rad/s²", "acceleration_rad_s2", "set_acceleration_rad_s2", { digits: 2, height: 240 });
 
   // Torque split: one small plot a joint.
   if (has("torque_nm")) {
     const split = has("torque_model_nm");
     const parts = [
       // The total, with the feedback's noise on it, lies below its parts.
-      [split ? "total" : "torque", "torque_nm", "--total", 1, split ? 0.4 : 1], ["feedback (PID)", "torque_pid_nm", "--pid", 1, 0.8],
+      [split ? "total" : "torque", "torque_nm", "--total", 1, split && !plan ? 0.4 : 1], ["feedback (PID)", "torque_pid_nm", "--pid", 1, 0.8],
       ["friction", "torque_friction_nm", "--friction", 1.5, 1], ["model", "torque_model_nm", "--model", 1.5, 1],
     ].filter(([, name]) => has(name));
     const keys = make("div", { class: "keys" });
@@ -255,7 +341,7 @@
       };
       const item = plot(body, parts.map(([kind, name, stroke, width, alpha]) => ({ y: column[name][j], kind, stroke, width, alpha })), {
         height: 190, draw: limits,
-        range: (u, min, max) => (toLimit && known(limit) ? [-limit * 1.08, limit * 1.08] : uPlot.rangeNum(min ?? -1, max ?? 1, 0.1, true)),
+        range: (u, min, max) => (toLimit && known(limit) ? [-limit * 1.08, limit * 1.08] : max - min < 0.1 ? [min - 1, max + 1] : uPlot.rangeNum(min ?? -1, max ?? 1, 0.1, true)),
         onCursor: (idx) => { text.textContent = idx === null ? atRest : `${round(column.torque_nm[j][idx], 2)} N·m`; },
       });
       item.card = e;
@@ -279,13 +365,16 @@
   const table = (heading, head, rows) => make("section", { class: "card" }, make("header", {}, make("h2", {}, heading)),
     make("div", { class: "scroll" }, make("table", {}, ...(head ? [make("tr", {}, ...head.map((h) => make("th", {}, h)))] : []),
       ...rows.map((r) => make("tr", {}, ...r.map((cell) => (cell instanceof Node ? cell : make("td", {}, cell))))))));
-  main.append(table(failed ? "Figures up to the failure" : "Figures", ["Joint", "RMS error, mrad", "max error, mrad", "peak speed, rad/s", "peak torque, N·m", "limit, N·m", "share of limit", "hottest, °C"],
+  // What no joint has has no column.
+  const figures = [
+    ["RMS error, mrad", "rms_error_mrad", 3], ["max error, mrad", "max_error_mrad", 3], ["peak speed, rad/s", "peak_velocity_rad_s", 3],
+    ["peak torque, N·m", "peak_torque_nm", 2], ["limit, N·m", "torque_limit_nm", 1], ["share of limit", "torque_share"], ["hottest, °C", "peak_temperature_c", 0],
+  ].filter(([, name]) => summary.joints.some((s) => known(s[name])));
+  main.append(table(failed ? "Figures up to the failure" : "Figures", ["Joint", ...figures.map(([head]) => head)],
     summary.joints.map((s, j) => [
       make("td", {}, make("i", { class: "dot", style: `--c: var(--j${j})` }), names[j]),
-      round(s.rms_error_mrad, 3), round(s.max_error_mrad, 3), round(s.peak_velocity_rad_s, 3), round(s.peak_torque_nm, 2), round(s.torque_limit_nm, 1),
-      known(s.torque_share) ? make("td", s.torque_share > 1 ? { class: "over" } : {}, `${round(s.torque_share * 100, 0)} %`,
-        make("span", { class: "gauge" }, make("i", { style: `--c: var(--j${j}); width: ${Math.min(100, s.torque_share * 100)}%` }))) : "–",
-      round(s.peak_temperature_c, 0),
+      ...figures.map(([, name, digits]) => name !== "torque_share" ? round(s[name], digits) : known(s.torque_share) ? make("td", s.torque_share > 1 ? { class: "over" } : {}, `${round(s.torque_share * 100, 0)} %`,
+        make("span", { class: "gauge" }, make("i", { style: `--c: var(--j${j}); width: ${Math.min(100, s.torque_share * 100)}%` }))) : "–"),
     ])));
   const tables = make("div", { class: "tables" });
   for (const f of data.facts) tables.append(table(f.title, null, f.rows));

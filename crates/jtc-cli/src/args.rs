@@ -21,7 +21,7 @@ pub use arm::{ArmCommand, ImportArgs};
 pub use bench::BenchCommand;
 pub use log::LogCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
-pub use motion::{CheckArgs, ContinueArgs, ExecuteArgs, RunArgs, TeachCommand, TrajCommand};
+pub use motion::{CheckArgs, ContinueArgs, ExecuteArgs, ResumeArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use payload::PayloadCommand;

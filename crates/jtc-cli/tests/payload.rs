@@ -2,11 +2,16 @@
 
 mod common;
 
-use common::{Sim, jtc};
+use common::{Sim, jtc, moving_while};
 use serde_json::Value;
 
 /// Bent, so that the shoulder and the elbow carry what is at the flange.
 const BENT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1.5,0,0.35,0.3,0,0.3,0\n3,0,0.7,0.6,0,0.6,0\n";
+
+/// Stretched out in the end.
+fn stretched() -> String {
+    BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05")
+}
 
 fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
@@ -98,9 +103,7 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
 fn j60_a_run_is_checked_with_the_payload() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
     let file = sim.file("bent.csv", BENT);
-    let stretched =
-        BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05");
-    let far = sim.file("far.csv", &stretched);
+    let far = sim.file("far.csv", &stretched());
     sim.json(&["traj", "run", &far], 0);
     sim.json(&["traj", "run", &file, "--approach"], 0);
     jtc(&["traj", "check", &far]).ends(0);
@@ -118,4 +121,35 @@ fn j60_a_run_is_checked_with_the_payload() {
     let text = sim.jtc(&["payload", "show"]).ends(0).out;
     assert!(text.contains("payload: none"), "{text}");
     sim.json(&["traj", "run", &far, "--approach"], 0);
+}
+
+/// What remains of a motion is checked with a payload that came while it was paused; a motion that is not known is not, and that is
+/// reported.
+#[cfg(unix)]
+#[test]
+fn j60_a_paused_motion_goes_on_with_another_payload_only_if_it_can() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let (far, other) = (sim.file("far.csv", &stretched()), sim.file("bent.csv", BENT));
+    let mut run = moving_while(&sim, &["traj", "run", &far], 0.4);
+    cli_kit::trial::signal(&run, "-KILL");
+    run.wait().unwrap();
+    sim.jtc(&["traj", "pause"]).ends(0);
+    std::thread::sleep(std::time::Duration::from_millis(1000));
+    sim.jtc(&["payload", "set", "--mass", "6", "--com", "0,0,0.1"]).ends(0);
+    let refused = sim.jtc(&["traj", "resume", "--trajectory", &far]).ends(4);
+    assert!(refused.err.contains("torque over its limit: joint 2"), "{}", refused.err);
+    assert!(refused.err.contains("nothing was sent"), "{}", refused.err);
+    let refused = sim.jtc(&["traj", "resume", "--trajectory", &other]).ends(4);
+    assert!(refused.err.contains("the arm is not where"), "{}", refused.err);
+    let slower = sim.jtc(&["traj", "resume", "--trajectory", &far, "--speed", "50"]).ends(4);
+    assert!(slower.err.contains("the arm is not where"), "{}", slower.err);
+    assert_eq!(sim.json(&["status"], 0)["trajectory"], "Pause");
+    sim.jtc(&["payload", "set", "--mass", "0.2", "--com", "0,0,0.1"]).ends(0);
+    let resumed = sim.json(&["traj", "resume", "--trajectory", &far], 0);
+    assert_eq!(resumed["checked"], true);
+    sim.jtc(&["traj", "pause"]).ends(0);
+    std::thread::sleep(std::time::Duration::from_millis(1000));
+    let resumed = sim.jtc(&["--json", "traj", "resume"]).ends(0);
+    assert!(resumed.err.contains("not checked") && resumed.err.contains("0.2 kg"), "{}", resumed.err);
+    assert_eq!(resumed.json()["checked"], false);
 }

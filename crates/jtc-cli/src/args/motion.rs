@@ -91,8 +91,13 @@ pub enum TrajCommand {
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),
     /// Go on after a pause; refused when nothing is paused
-    #[command(after_help = "Examples:\n  jtc traj resume")]
-    Resume(LinkArgs),
+    #[command(
+        after_help = "Where settings or payload were changed during the pause, what remains of the motion may not be possible any more.\n\
+                            --trajectory names what is being run, and it is checked with them before anything is sent. Without it a note\n\
+                            reports what is not checked.\n\nExamples:\n  jtc traj resume\n  jtc traj resume --trajectory motion.csv\n  \
+                            jtc traj resume --trajectory run.mcap"
+    )]
+    Resume(ResumeArgs),
     /// Stop on the path and end the execution
     #[command(after_help = "Examples:\n  jtc traj stop")]
     Stop(LinkArgs),
@@ -128,6 +133,18 @@ pub struct RunArgs {
     pub repeat: u32,
     #[command(flatten)]
     pub execute: ExecuteArgs,
+}
+
+/// Options of `jtc traj resume`.
+#[derive(Args, Debug)]
+pub struct ResumeArgs {
+    /// The trajectory that is paused, as it was run, or a recording of its run that holds it (MCAP)
+    #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    #[command(flatten)]
+    pub check: CheckArgs,
+    #[command(flatten)]
+    pub link: LinkArgs,
 }
 
 /// Options of `jtc traj continue`.

@@ -25,6 +25,7 @@ mod ports;
 mod pose;
 mod report;
 mod reset;
+mod resume;
 mod run;
 mod run_report;
 mod sim;

@@ -13,7 +13,7 @@ use jtc_wire::Joint;
 use serde_json::json;
 
 use super::job::{Job, typed};
-use super::{continued, run};
+use super::{continued, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 use crate::progress::Progress;
 
@@ -34,7 +34,7 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
             "pausing on the path",
             out,
         ),
-        TrajCommand::Resume(link) => send(|| link.session(), Session::resume, "resume", "going on", out),
+        TrajCommand::Resume(args) => resume::resume(args, out),
         TrajCommand::Stop(link) => {
             send(|| link.session().map_err(may_be_moving), Session::stop, "stop", "stopping on the path", out)
         }

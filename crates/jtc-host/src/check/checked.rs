@@ -10,6 +10,7 @@ use jtc_wire::RawPoint;
 use super::{Checker, Verdict};
 use crate::arm::Arm;
 use crate::error::CheckError;
+use crate::plan::{PlanError, Planner};
 use crate::trajectory::{Trajectory, UploadOptions};
 
 /// Counts the checks that were passed, so that two trajectories are never taken for one another.
@@ -65,6 +66,8 @@ pub struct CheckedTrajectory {
     verdict: Verdict,
     delay_ticks: u8,
     number: u64,
+    /// What it was checked with.
+    basis: Arc<(Arm, Config)>,
 }
 
 impl fmt::Debug for CheckedTrajectory {
@@ -120,10 +123,30 @@ impl CheckedTrajectory {
                 verdict,
                 delay_ticks: config.delay_ticks,
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
+                basis: Arc::new((arm.clone(), config)),
             }),
             // A number that no frame carries is among the problems of the verdict.
             _ => Err(CheckError::Refused(Box::new(verdict))),
         }
+    }
+
+    /// Checks what remains of it from `from_ms` of its path on, at rest there, where the controller's settings or the payload are not
+    /// those any more that it was checked with (J-36, J-60).
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError::Refused`] with the verdict of the rest.
+    pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
+        let (arm, checked_with) = &*self.basis;
+        // The speed on the path changes with no check: it can only be lower.
+        let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
+        if config == *checked_with {
+            return Ok(());
+        }
+        let friction = arm.friction();
+        let planner =
+            Planner { model: Some(&arm.model), friction: friction.as_ref(), ..Planner::new(&config) };
+        planner.rest(&self.trajectory, from_ms, None).map(drop)
     }
 
     /// What was checked.

@@ -4,6 +4,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 
 use super::LinkError;
+use crate::plan::PlanError;
 use crate::words;
 
 /// Why a motion did not begin, or did not end as asked for.
@@ -23,6 +24,14 @@ pub enum MotionError {
         state: Code<ControllerState>,
         /// Trajectory execution state.
         trajectory: Code<TrajectoryState>,
+    },
+    /// What remains of a paused motion does not pass the check any more; nothing was sent.
+    #[error("what remains of the motion from {:.3} s on is refused with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
+    RestRefused {
+        /// Index of the 1 ms point where it is paused.
+        point: u32,
+        /// What the check found.
+        why: Box<PlanError>,
     },
     /// The motion did not end as asked for.
     #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
@@ -101,6 +110,11 @@ impl Diagnose for MotionError {
                 } else {
                     "`jtc traj run FILE` checks a trajectory and starts it"
                 },
+            ),
+            Self::RestRefused { .. } => (
+                ErrorKind::Refused,
+                "rest-refused",
+                "`jtc payload show` shows what the controller computes with, `jtc payload set` corrects it; `jtc traj stop` ends the motion",
             ),
             Self::RunFault { .. } => (
                 ErrorKind::Fault,

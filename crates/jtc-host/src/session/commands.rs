@@ -131,7 +131,7 @@ impl<P: Port> Session<P> {
     /// [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
-        if self.uploaded != Some(checked.number()) {
+        if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
             return Err(MotionError::NotUploaded.into());
         }
         self.go()
@@ -142,19 +142,28 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
-    /// Goes on after a pause.
+    /// Goes on after a pause. What remains of a trajectory that this session uploaded is checked again where settings or payload were
+    /// changed since its check; of another one the session knows nothing to check.
     ///
     /// # Errors
     ///
+    /// [`MotionError::RestRefused`], and nothing is sent, when what remains does not pass any more.
     /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
     /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         let status = self.fresh_status()?;
-        if status.trajectory == TrajectoryState::Pause {
-            self.go()
-        } else {
-            Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into())
+        if status.trajectory != TrajectoryState::Pause {
+            return Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into());
         }
+        if let Some(checked) = self.uploaded.clone()
+            && self.has_extensions()
+        {
+            let device = self.device_config()?;
+            checked
+                .check_rest(&device, status.point)
+                .map_err(|why| MotionError::RestRefused { point: status.point, why: Box::new(why) })?;
+        }
+        self.go()
     }
 
     /// Pauses on the path.

@@ -34,6 +34,7 @@ pub use upload::{Progress, UploadReport};
 
 pub use crate::trajectory::UploadOptions;
 
+use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, StateError, accepted};
 use crate::port::{Port, line_time};
 
@@ -71,8 +72,8 @@ pub struct Session<P> {
     start: Duration,
     last_heard: Duration,
     observer: Option<Observer>,
-    /// The check of the trajectory that the controller holds from this session.
-    uploaded: Option<u64>,
+    /// The trajectory that the controller holds from this session.
+    uploaded: Option<CheckedTrajectory>,
     /// Time limits.
     pub timeouts: Timeouts,
 }

@@ -191,7 +191,7 @@ impl<P: Port> Session<P> {
         self.introduce()?;
         let step_ms = checked.trajectory().step_ms;
         let report = self.send(checked.raw(), step_ms, checked.upload_options(), progress)?;
-        self.uploaded = Some(checked.number());
+        self.uploaded = Some(checked.clone());
         Ok(report)
     }
 

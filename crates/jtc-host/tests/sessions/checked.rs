@@ -1,6 +1,7 @@
 //! Only what passed the check runs, and only what was uploaded.
 
-use jtc_wire::NodeState;
+use jtc_core::{Config, Payload};
+use jtc_wire::{NodeState, Status, TrajectoryState};
 use std::time::Duration;
 
 use jtc_host::session::{Flow, Outcome};
@@ -143,4 +144,37 @@ fn a_run_has_an_outcome_and_its_figures() {
     // A second run from the end of the first: the controller refuses it (J-34), and the run reports it.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
+}
+
+/// J-60: a payload that comes while a motion is paused may be too much for what remains of it.
+#[test]
+fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
+    let mut session = ready();
+    // Upright at first, stretched out in the end.
+    let stretched = [0.0, 1.5, 0.1, 0.0, 0.1, 0.0];
+    let motion = plan::joint_move(&[0.0; 6], &stretched, &Config::avena(), 30.0).unwrap();
+    let checked = check(&motion).unwrap();
+    session.upload(&checked, |_| Flow::Continue).unwrap();
+    session.execute(&checked).unwrap();
+    session.wait_for("a second", Duration::from_secs(5), |s| s.point > 1000).unwrap();
+    session.pause().unwrap();
+    let paused = |s: &Status| s.trajectory == TrajectoryState::Pause;
+    session.wait_for("pause", Duration::from_secs(5), paused).unwrap();
+    // What it can carry to the end, and back.
+    for (mass, goes_on) in [(6.0, false), (0.1, true)] {
+        session.set_payload(&Payload { mass, com: [0.0, 0.0, 0.1], ..Payload::NONE }).unwrap();
+        match session.resume() {
+            Ok(()) => assert!(goes_on, "{mass} kg"),
+            Err(error) => {
+                assert!(!goes_on, "{mass} kg: {error}");
+                let text = error.to_string();
+                assert!(text.contains("torque over its limit: joint 2"), "{text}");
+                assert!(text.ends_with("nothing was sent"), "{text}");
+                assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
+                assert!(paused(&session.fresh_status().unwrap()));
+            }
+        }
+    }
+    let finished = |s: &Status| s.trajectory == TrajectoryState::Finish;
+    session.wait_for("the end", Duration::from_secs(30), finished).unwrap();
 }

@@ -1,0 +1,80 @@
+//! `jtc traj resume`: on after a pause, with a check of what remains where it is known.
+
+use cli_kit::{ErrorKind, Failure, Output};
+use jtc_host::error::MotionError;
+use jtc_host::port::SerialPort;
+use jtc_host::{Error, Session};
+use jtc_wire::{Joint, Status, TrajectoryState};
+use serde_json::json;
+
+use super::job::Job;
+use crate::args::ResumeArgs;
+use crate::progress::Progress;
+
+/// Goes on, unless what remains of the trajectory that was named does not pass the check any more (J-36, J-60).
+pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
+    let job = args.trajectory.as_deref().map(|file| Job::load(file, &args.check, out)).transpose();
+    let mut job = job.map_err(Failure::nothing_sent)?;
+    let mut session = args.link.session()?;
+    progress.watch(&mut session);
+    let status = session.fresh_status()?;
+    // Else the session names what is wrong.
+    if status.trajectory == TrajectoryState::Pause {
+        match &mut job {
+            Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
+            None => note_what_is_not_checked(&mut session, out)?,
+        }
+    }
+    session.resume()?;
+    let value = json!({ "command": "resume", "accepted": true, "checked": job.is_some() });
+    out.result(&value, || "going on".to_owned());
+    Ok(())
+}
+
+/// The rest of the trajectory, from where it is paused, within the limits of the controller with its payload.
+fn check_rest(
+    job: &mut Job,
+    arm_of_device: bool,
+    session: &mut Session<SerialPort>,
+    status: &Status,
+) -> Result<(), Failure> {
+    job.device = session.device_config()?;
+    if arm_of_device && session.has_extensions() {
+        job.arm = session.device_arm()?;
+    }
+    job.config = job.arm.config_on_device(&job.device);
+    let paused_s = f64::from(status.point) * 1e-3;
+    let place = job.trajectory.at_ms(status.point).unwrap_or_default().position;
+    let here = status.positions();
+    let away = |joint: &Joint| (here[joint.index()] - place[joint.index()]).abs();
+    let beyond = paused_s > job.trajectory.duration_s();
+    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
+    if let Some(joint) = furthest.filter(|joint| beyond || away(joint) > job.config.start_tolerance_rad) {
+        let message = format!(
+            "the motion is paused at {paused_s:.3} s of its path, and the arm is not where {} is then ({joint} is {:.3} rad away); \
+             nothing was sent",
+            job.words,
+            away(&joint)
+        );
+        return Err(Failure::new(ErrorKind::Refused, "other-trajectory", message)
+            .hint("name the trajectory that is paused, with the --speed that it was run at; `jtc traj stop` ends it"));
+    }
+    let friction = job.arm.friction();
+    job.planner(friction.as_ref()).rest(&job.trajectory, status.point, None).map(drop).map_err(|why| {
+        Failure::of(&Error::from(MotionError::RestRefused { point: status.point, why: Box::new(why) }))
+    })
+}
+
+/// This program did not load the motion, and a controller does not give it back.
+fn note_what_is_not_checked(session: &mut Session<SerialPort>, out: &Output) -> Result<(), Failure> {
+    let payload = session.payload()?;
+    if session.has_extensions() {
+        out.note(format!(
+            "note: not checked: whether what remains of the motion is within the limits with the present settings and payload ({}); \
+             --trajectory FILE names the motion and checks that",
+            super::payload::words(&payload)
+        ));
+    }
+    Ok(())
+}

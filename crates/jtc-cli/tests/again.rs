@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Sim, at, jtc, moving_while, place, slow_motion};
+use common::{Sim, at, jtc, moving_after, moving_while, place, slow_motion};
 use serde_json::Value;
 
 const FAST: [&str; 3] = ["--speed", "max", "--no-throttle"];
@@ -209,4 +209,44 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
         value["runs"].as_array().unwrap().iter().map(|r| r["phase"].as_str().unwrap()).collect();
     assert_eq!((phases, &value["outcome"]), (vec!["approach", "motion"], &"finished".into()));
     at(&sim, [0.0; 6]);
+}
+
+/// Of three runs one was finished: the rest of the second and the third are run, also where the recording is that of a rest, and where the
+/// controller finished the run by itself.
+#[test]
+fn the_runs_that_are_left_are_run() {
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let path = |name: &str| sim.path(name);
+    let (file, run, rest) = (sim.file("motion.csv", &slow_motion(20)), path("run.mcap"), path("rest.mcap"));
+    let words = ["traj", "run", &file, "--repeat", "3", "--record", &run];
+    let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
+    cli_kit::trial::signal(&child, "-INT");
+    child.wait_with_output().unwrap();
+    // Broken off again, in the last run.
+    let words = ["traj", "continue", &run, "--record", &rest];
+    let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
+    cli_kit::trial::signal(&child, "-KILL");
+    child.wait_with_output().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
+    assert!(output.err.contains("nothing is left of it"), "{}", output.err);
+    // One more was asked for, as a person knows.
+    let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
+    assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
+    // The first recording again, when the controller shows another motion: the rest of its second run, and the third.
+    sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
+    let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
+    assert!(output.err.contains("then the whole trajectory is run once"), "{}", output.err);
+    let value = output.json();
+    assert_eq!(value["runs_finished"], 2, "{value}");
+    assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
+    // What a recording does not hold is reported.
+    let csv = path("run.csv");
+    let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
+    let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
+    cli_kit::trial::signal(&child, "-INT");
+    child.wait_with_output().unwrap();
+    let output = sim.jtc(&["--json", "traj", "continue", &csv, "--trajectory", &file]).ends(0);
+    assert!(output.err.contains("does not hold how often"), "{}", output.err);
+    assert_eq!(output.json()["runs_finished"], 1);
 }

@@ -82,7 +82,7 @@ pub enum TrajCommand {
                             --trajectory names it. The rest begins at the last place that is proved: that at which the recording shows the arm, or a\n\
                             later one only where the controller shows that it went on by itself. Where the arm stands elsewhere (after an error,\n\
                             or a controller that was started anew) an approach leads there. The rest speeds up from standstill and follows the\n\
-                            same path.\n\n\
+                            same path. Of a run with --repeat those that were not finished are run behind it.\n\n\
                             Examples:\n  jtc traj run cycle.csv --record run.mcap\n  jtc traj continue run.mcap\n  \
                             jtc traj continue run.csv --trajectory cycle.csv --record rest.mcap"
     )]
@@ -156,6 +156,9 @@ pub struct ContinueArgs {
     /// The trajectory that was run, as it was run; default: the one in the recording
     #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
+    /// How often the motion was to be run, those that were finished included; default: as the recording has it (MCAP)
+    #[arg(long, env = "JTC_REPEAT", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub repeat: Option<u32>,
     /// Arm whose limits and masses count, TOML or URDF; default: that of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,

@@ -3,6 +3,7 @@
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
 use jtc_host::recording::{BrokenOff, NothingLeft, Recording, Resumption};
+use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Loaded, Trajectory};
 use jtc_wire::Status;
 
@@ -18,8 +19,7 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
         out.note(format!("note: {}: {cut}", args.run.display()));
     }
     let arm = named_arm::load(args.arm.as_deref()).map_err(Failure::nothing_sent)?;
-    let whole = whole(args, &recording, &arm)?;
-    let broken = recording.broken_off(&whole).map_err(Failure::nothing_sent)?;
+    let left = Left::of(args, &recording, &arm, out)?;
     let inputs = [Some(&args.run), args.trajectory.as_ref(), args.arm.as_ref()];
     let course = Course {
         execute: args.execute.clone(),
@@ -34,15 +34,73 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     };
     let arm_words = named_arm::typed_option(args.arm.as_deref());
     let words = format!("traj continue {}{arm_words}", typed(&args.run));
-    let mut make = |job: &mut Job, status: &Status| {
-        let from_ms = place(job, &whole, broken, status, out).map_err(Failure::nothing_sent)?;
-        let friction = job.arm.friction();
-        let rest =
-            job.planner(friction.as_ref()).rest(&whole, from_ms, None).map_err(Failure::nothing_sent)?;
-        job.take(rest);
-        Ok(())
-    };
+    let mut make =
+        |job: &mut Job, status: &Status| left.make(job, status, out).map_err(Failure::nothing_sent);
     perform(&course, |out| Ok(Job::made(arm, words, out)), Some(&mut make), out)
+}
+
+/// What is left of a run, and of the runs that were to follow it.
+struct Left {
+    /// The trajectory that was broken off, and where; `None` where only whole runs are left.
+    current: Option<(Trajectory, BrokenOff)>,
+    /// What the runs behind it are of.
+    then: Trajectory,
+    /// How many these are.
+    runs: u32,
+}
+
+impl Left {
+    fn of(args: &ContinueArgs, recording: &Recording, arm: &Arm, out: &Output) -> Result<Self, Failure> {
+        let info = recording.info.as_ref();
+        let first = whole(args, recording, arm)?;
+        let then = info.and_then(|info| info.then.as_deref()).unwrap_or(&first).clone();
+        let asked = args.repeat.or(info.and_then(|info| info.runs));
+        if asked.is_none() {
+            out.note(
+                "note: the recording does not hold how often the motion was to be run: the rest of one run is run. \
+                 --repeat N names how often it was to be run",
+            );
+        }
+        let finished = recording.runs_finished(&first, &then);
+        let behind = asked.unwrap_or(1).saturating_sub(finished);
+        let current = if finished == 0 { first } else { then.clone() };
+        match recording.broken_off(&current) {
+            Ok(broken) => Ok(Self { current: Some((current, broken)), then, runs: behind.saturating_sub(1) }),
+            Err(NothingLeft::Finished) if behind > 0 => Ok(Self { current: None, then, runs: behind }),
+            Err(error) => Err(Failure::nothing_sent(error)),
+        }
+    }
+
+    /// Gives a job the rest, and what is run behind it.
+    fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
+        let rest = match &self.current {
+            None => None,
+            Some((current, broken)) => match place(job, current, *broken, status, out) {
+                Err(NothingLeft::Finished) if self.runs > 0 => None,
+                Err(error) => return Err(Failure::of(&error)),
+                Ok(from_ms) => {
+                    let friction = job.arm.friction();
+                    Some(job.planner(friction.as_ref()).rest(current, from_ms, None)?)
+                }
+            },
+        };
+        if self.runs > 0 {
+            let times = if self.runs == 1 { "once".to_owned() } else { format!("{} times", self.runs) };
+            out.note(match rest {
+                Some(_) => format!("then the whole trajectory is run {times}, as was asked for"),
+                None => format!("the run that was broken off came to its end; the whole trajectory is run {times}, as was asked for"),
+            });
+            // Before anything moves.
+            let verdict = job.verdict(&self.then, None, UploadOptions::default());
+            if !verdict.is_ok() {
+                return Err(job.refuse(&verdict, out));
+            }
+        }
+        let behind = self.runs - u32::from(rest.is_none());
+        job.take(rest.unwrap_or_else(|| self.then.clone()));
+        job.later = (behind > 0).then(|| (self.then.clone(), behind));
+        Ok(())
+    }
 }
 
 /// The trajectory that was run.

@@ -54,6 +54,8 @@ pub struct Job {
     pub device: Config,
     /// File and arm, as they are typed.
     pub words: String,
+    /// What is run after it, and how often.
+    pub later: Option<(Trajectory, u32)>,
     /// Percent of the file's own speed.
     speed: f64,
     /// It is of no file: its motion is made once the arm's place is known.
@@ -88,7 +90,17 @@ impl Job {
         let arm_words = named_arm::typed_option(args.arm.as_deref());
         let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
         let device = Config::avena();
-        Ok(Self { loaded, trajectory, arm, config, device, words, speed: args.speed, made: false })
+        Ok(Self {
+            loaded,
+            trajectory,
+            arm,
+            config,
+            device,
+            words,
+            later: None,
+            speed: args.speed,
+            made: false,
+        })
     }
 
     /// Of no file: the motion comes by [`Job::take`]. `words` is the command as it is typed.
@@ -102,7 +114,7 @@ impl Job {
             units_named: true,
         };
         let (trajectory, config, device) = (Trajectory::default(), arm.config(), Config::avena());
-        Self { loaded, trajectory, arm, config, device, words, speed: 100.0, made: true }
+        Self { loaded, trajectory, arm, config, device, words, later: None, speed: 100.0, made: true }
     }
 
     /// The motion of this job.

@@ -208,7 +208,7 @@ fn drive(
 /// A run in the making.
 struct Stage<'a> {
     course: &'a Course,
-    job: &'a Job,
+    job: &'a mut Job,
     outputs: Outputs,
     out: &'a Output,
     reel: Option<Reel>,
@@ -223,7 +223,7 @@ impl Stage<'_> {
         mut status: Status,
     ) -> Result<Legs, Failure> {
         let mut done = Finished::default();
-        let repeat = self.course.repeat.max(1);
+        let repeat = self.repeat();
         for n in 1..=repeat {
             let (checked, phase) = self.next(&status)?;
             let mut leg = self.leg(session, &checked, phase, operator)?;
@@ -243,14 +243,23 @@ impl Stage<'_> {
             }
             self.out.note(format!("run {n} of {repeat} finished"));
             self.take(&leg, &mut done);
+            if let Some((later, _)) = &self.job.later {
+                let later = later.clone();
+                self.job.take(later);
+            }
             status = session.fresh_status()?;
         }
         Err(cancelled("run"))
     }
 
+    /// How many runs there are, the first one included.
+    fn repeat(&self) -> u32 {
+        self.course.repeat.max(1) + self.job.later.as_ref().map_or(0, |(_, often)| *often)
+    }
+
     /// The motion from where the arm stands, or the way to its first point where that is asked for and needed.
     fn next(&self, status: &Status) -> Result<(CheckedTrajectory, &'static str), Failure> {
-        let (job, course) = (self.job, self.course);
+        let (job, course) = (&*self.job, self.course);
         let refused = match job.checked(&job.trajectory, status, course) {
             Ok(checked) => return Ok((checked, "motion")),
             Err(error) => error,
@@ -272,7 +281,8 @@ impl Stage<'_> {
         phase: &'static str,
         operator: &mut Operator,
     ) -> Result<Leg, Failure> {
-        let (job, course, out) = (self.job, self.course, self.out);
+        let repeat = self.repeat();
+        let (job, course, out) = (&*self.job, self.course, self.out);
         let source = session.port().name();
         let (outputs, reel) = (&mut self.outputs, &mut self.reel);
         let mut record = |phase: &str, start_unix_ns, now: Duration| {
@@ -281,6 +291,8 @@ impl Stage<'_> {
                 let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
                 let mut info = run_report::info(&job.arm, &source, &name, start_unix_ns);
                 info.commanded = Some(Arc::new(job.trajectory.clone()));
+                info.runs = Some(repeat);
+                info.then = job.later.as_ref().map(|(later, _)| Arc::new(later.clone()));
                 let tape = outputs.begin(&info, out)?;
                 *reel = Some(Reel { info, tape, start: now });
             }

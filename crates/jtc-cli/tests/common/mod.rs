@@ -180,6 +180,11 @@ pub fn at(sim: &Sim, q: [f64; 6]) {
 
 /// Starts a command that moves the arm, and waits until it has moved for so many seconds.
 pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
+    moving_after(sim, words, "", seconds)
+}
+
+/// The same of the motion behind a line with this text.
+pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
     let mut child = sim
         .command(&[&["--json"], words].concat())
         .stdout(Stdio::piped())
@@ -187,10 +192,14 @@ pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Ch
         .spawn()
         .unwrap();
     let mut err = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
+    let (mut line, mut behind) = (String::new(), false);
     loop {
         line.clear();
         assert!(err.read_line(&mut line).unwrap() > 0, "it ended early");
+        behind |= line.contains(text);
+        if !behind {
+            continue;
+        }
         let event: Value = serde_json::from_str(&line).unwrap_or_default();
         if event["path_s"].as_f64().is_some_and(|s| s > seconds) {
             break;

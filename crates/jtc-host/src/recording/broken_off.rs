@@ -1,5 +1,7 @@
 //! Where a run was broken off, as its recording shows it.
 
+use std::sync::Arc;
+
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
 use jtc_wire::{ControllerState, Status, TrajectoryState};
@@ -120,7 +122,10 @@ impl Recording {
         }
         let is_end = self.samples.last().is_some_and(|s| s.trajectory == TrajectoryState::Finish);
         if !is_on(last, trajectory) {
-            let own = self.info.as_ref().and_then(|info| info.commanded.as_deref()) == Some(trajectory);
+            let info = self.info.as_ref();
+            let own = |of: Option<&Arc<Trajectory>>| of.is_some_and(|own| **own == *trajectory);
+            let own = own(info.and_then(|info| info.commanded.as_ref()))
+                || own(info.and_then(|info| info.then.as_ref()));
             // The way to the first point of its own trajectory: nothing of that was run.
             return if own { Ok(BrokenOff { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
@@ -128,6 +133,44 @@ impl Recording {
             return Err(NothingLeft::Finished);
         }
         Ok(BrokenOff { last_ms: at_rest(last.point, behind, trajectory).unwrap_or(last.point) })
+    }
+}
+
+impl Recording {
+    /// How many runs of a motion that was repeated came to their end: the first of `first`, the others of `then`. Approaches between them
+    /// are none.
+    pub fn runs_finished(&self, first: &Trajectory, then: &Trajectory) -> u32 {
+        let mut finished = 0;
+        for (leg, ended) in self.executions() {
+            let of = if finished == 0 { first } else { then };
+            finished += u32::from(ended && leg.iter().all(|sample| is_on(sample, of)));
+        }
+        finished
+    }
+
+    /// The samples of each execution, and whether it came to its end: there is another one behind it, or the controller shows it.
+    fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
+        let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
+        let mut all: Vec<(Vec<&Sample>, bool)> = Vec::new();
+        for sample in &self.samples {
+            match all.last_mut() {
+                Some((leg, ended)) if moving(sample) && !*ended => match leg.last() {
+                    // Its points begin anew.
+                    Some(before) if sample.point < before.point => {
+                        *ended = true;
+                        all.push((vec![sample], false));
+                    }
+                    _ => leg.push(sample),
+                },
+                _ if moving(sample) => all.push((vec![sample], false)),
+                Some((_, ended)) => *ended |= sample.trajectory == TrajectoryState::Finish,
+                None => {}
+            }
+        }
+        if let Some((_, ended)) = all.last_mut() {
+            *ended |= self.ending.outcome == "finished";
+        }
+        all
     }
 }
 
@@ -168,8 +211,6 @@ fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::super::{Ending, RecordingInfo, write_all};
     use super::*;
     use crate::example::demo_motion;
@@ -218,6 +259,47 @@ mod tests {
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
         assert_eq!(approach.broken_off(&demo_motion()), at(0));
+    }
+
+    /// Runs are counted by their ends, approaches between them left out; the first one may be the rest of a run.
+    #[test]
+    fn runs_of_a_repeated_motion_are_counted() {
+        use TrajectoryState::{Execute, Finish, Stop};
+        let (demo, other) = (demo_motion(), back_and_forth());
+        let whole = [(0, Execute), (5_000, Execute), (9_990, Execute), (10_000, Finish)];
+        let joined = |parts: &[Recording], outcome: &str| {
+            let samples = parts.iter().flat_map(|part| part.samples.clone()).collect();
+            Recording::new(None, Ending { outcome: outcome.into(), reason: String::new() }, samples, None)
+        };
+        let run = || recording(&whole, "");
+        // Statuses come every 40 ms, and the end of a run may be in none of them.
+        let unseen = || recording(&whole[..3], "");
+        let part = || recording(&whole[..2], "");
+        let approach = || recording_of(&other, &[(0, Execute), (9_960, Execute), (10_000, Finish)], "");
+        for (parts, outcome, finished) in [
+            (vec![], "", 0),
+            (vec![part()], "stopped", 0),
+            (vec![run()], "", 1),
+            (vec![unseen()], "finished", 1),
+            (vec![unseen()], "", 0),
+            (vec![run(), part()], "stopped", 1),
+            (vec![unseen(), run(), unseen(), part()], "", 3),
+            (vec![run(), approach(), run(), approach(), part()], "", 2),
+            (vec![run(), approach()], "", 1),
+            (vec![approach()], "", 0),
+            (vec![run(), recording(&[(0, Stop)], "")], "stopped", 1),
+        ] {
+            assert_eq!(
+                joined(&parts, outcome).runs_finished(&demo, &demo),
+                finished,
+                "{} parts",
+                parts.len()
+            );
+        }
+        // The rest of a run, then two whole ones.
+        let rest = joined(&[approach(), run(), part()], "stopped");
+        assert_eq!(rest.runs_finished(&other, &demo), 2);
+        assert_eq!(rest.broken_off(&demo), Ok(BrokenOff { last_ms: 5_000 }));
     }
 
     /// A controller that was stopped is at its start again (point 0); where the arm came to rest shows its place.
@@ -298,11 +380,21 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("run.mcap");
         let whole = demo_motion();
-        let info = RecordingInfo { commanded: Some(Arc::new(whole.clone())), ..RecordingInfo::default() };
+        let then = Some(Arc::new(back_and_forth()));
+        let info = RecordingInfo {
+            commanded: Some(Arc::new(whole.clone())),
+            then,
+            runs: Some(3),
+            ..RecordingInfo::default()
+        };
         write_all(&path, &info, &recording(&[(0, TrajectoryState::Execute)], "").samples).unwrap();
         let read = Recording::read(&path).unwrap();
         assert_eq!(read.samples.len(), 1);
-        let back = read.info.unwrap().commanded.unwrap();
-        assert_eq!((back.step_ms, back.raw().unwrap()), (whole.step_ms, whole.raw().unwrap()));
+        let info = read.info.unwrap();
+        assert_eq!(info.runs, Some(3));
+        for (back, given) in [(info.commanded, whole), (info.then, back_and_forth())] {
+            let back = back.unwrap();
+            assert_eq!((back.step_ms, back.raw().unwrap()), (given.step_ms, given.raw().unwrap()));
+        }
     }
 }

@@ -72,6 +72,10 @@ pub struct RecordingInfo {
     pub ending: Ending,
     /// The whole trajectory that the run is of, in MCAP files: what is needed to go on where it was broken off.
     pub commanded: Option<Arc<Trajectory>>,
+    /// How often a motion was to be run, the first one included, in MCAP files; `None` where nobody wrote it down.
+    pub runs: Option<u32>,
+    /// What all but the first are runs of, where that is not `commanded`: the first one was the rest of a run.
+    pub then: Option<Arc<Trajectory>>,
 }
 
 impl RecordingInfo {

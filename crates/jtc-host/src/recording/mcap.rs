@@ -27,6 +27,8 @@ const STATE_TOPIC: &str = "/jtc/state";
 const LOG_TOPIC: &str = "/jtc/log";
 /// The trajectory that is run, in the header-less form of 19 columns of integers.
 const TRAJECTORY_TOPIC: &str = "/jtc/trajectory";
+/// That of later runs, in the same form.
+const THEN_TOPIC: &str = "/jtc/trajectory_then";
 
 impl From<McapError> for RecordingError {
     fn from(e: McapError) -> Self {
@@ -62,8 +64,9 @@ impl<W: Write + Seek> McapWriter<W> {
         let joint = out.add_schema(schema::JOINT_STATE, "ros2msg", schema::JOINT_STATE_TEXT.as_bytes())?;
         let control = out.add_schema(schema::CONTROL, "ros2msg", schema::CONTROL_TEXT.as_bytes())?;
         let state = out.add_schema(schema::STATE, "ros2msg", schema::STATE_TEXT.as_bytes())?;
-        if let Some(text) = info.commanded.as_ref().and_then(|t| t.to_int16_csv().ok()) {
-            let channel = out.add_channel(0, TRAJECTORY_TOPIC, "openjtc", &none)?;
+        for (topic, trajectory) in [(TRAJECTORY_TOPIC, &info.commanded), (THEN_TOPIC, &info.then)] {
+            let Some(text) = trajectory.as_ref().and_then(|t| t.to_int16_csv().ok()) else { continue };
+            let channel = out.add_channel(0, topic, "openjtc", &none)?;
             let time = info.start_unix_ns;
             let header =
                 MessageHeader { channel_id: channel, sequence: 0, log_time: time, publish_time: time };
@@ -200,7 +203,7 @@ type Gathered = (Sample, BTreeSet<u16>);
 pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let mut info: Option<RecordingInfo> = None;
     let mut ending: Option<Ending> = None;
-    let mut commanded = None;
+    let (mut commanded, mut then) = (None, None);
     let mut topics = BTreeMap::new();
     let mut samples: BTreeMap<u64, Gathered> = BTreeMap::new();
     let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
@@ -223,10 +226,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
                 if topic == LOG_TOPIC {
                     return Ok(());
                 }
-                if topic == TRAJECTORY_TOPIC {
+                if topic == TRAJECTORY_TOPIC || topic == THEN_TOPIC {
                     let read =
                         std::str::from_utf8(&data).ok().and_then(|text| Loaded::parse(text, None).ok());
-                    commanded = read.map(|read| Arc::new(read.trajectory));
+                    let of = if topic == THEN_TOPIC { &mut then } else { &mut commanded };
+                    *of = read.map(|read| Arc::new(read.trajectory));
                     return Ok(());
                 }
                 let (sample, came) = samples.entry(header.log_time).or_default();
@@ -260,7 +264,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         .map(|(time_ns, (sample, _))| Sample { time_s: seconds(&info, time_ns), ..sample })
         .collect();
     if let Some(info) = &mut info {
-        info.commanded = commanded;
+        (info.commanded, info.then) = (commanded, then);
         if let Some(ending) = &ending {
             info.ending = ending.clone();
         }

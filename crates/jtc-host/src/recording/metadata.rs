@@ -19,6 +19,9 @@ impl RecordingInfo {
                 put(key.into(), value.clone());
             }
         }
+        if let Some(runs) = self.runs {
+            put("runs".into(), runs.to_string());
+        }
         for (i, joint) in self.joints.iter().enumerate() {
             let n = i + 1;
             put(format!("joint{n}_name"), self.joint_name(i));
@@ -61,6 +64,8 @@ impl RecordingInfo {
             flange: split(&text("flange_origin")),
             ending: Ending { outcome: text("outcome"), reason: text("reason") },
             commanded: None,
+            runs: text("runs").parse().ok(),
+            then: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::jtc;
+use common::{Dir, jtc};
 
 /// Degrees, a missing header, a move that is too fast: named, with what helps, which does.
 #[test]
@@ -62,4 +62,31 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     assert!(output["overshoot"][0]["beyond_rad"].as_f64().unwrap() > 0.05, "{output}");
     let output = jtc(&["traj", "info", file]).ends(0);
     assert!(output.err.contains("the curve goes beyond them: joint 1 by"), "{}", output.err);
+}
+
+/// What was typed is taken for what it was meant as, and what is wrong with it is said in the words of the command.
+#[test]
+fn mistakes_in_options_are_named_with_what_helps() {
+    let dir = Dir::new();
+    let waypoints = dir.file("w.csv", "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0,0,0,0,0\n");
+    let degrees =
+        dir.file("deg.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n9,0,0,0,0,0\n");
+    std::fs::write(dir.path("bytes.csv"), [0x71, 0xff, 0xfe, 0x0a]).unwrap();
+    let (bytes, out) = (dir.path("bytes.csv"), dir.path("out.csv"));
+    for (words, code, message) in [
+        (&["move"][..], 2, "--to-flange <"),
+        (&["move", "--to", ""], 2, "neither six numbers nor the name of a pose"),
+        (&["move", "--to", "0,0,0,0,0,0", "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
+        (&["plan", &waypoints, "-o", &out, "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
+        (&["plan", &bytes, "-o", &out], 2, "no text (its bytes are no UTF-8)"),
+        (&["plan", &degrees, "-o", &out, "--deg"], 2, "leave --deg out"),
+        (&["traj", "speed", "-3"], 2, "a speed override of -3 % is outside 5..100"),
+        (&["traj", "check", &waypoints, "--speed", "300"], 2, "column t (time in s) is missing"),
+        (&["traj", "continue", "none.mcap"], 2, "check the name"),
+        (&["traj", "continue", &waypoints], 2, "jtc traj run FILE --record"),
+    ] {
+        let output = jtc(words).ends(code);
+        assert!(output.err.contains(message), "{words:?}: {}", output.err);
+    }
+    assert!(!dir.has("out.csv"));
 }

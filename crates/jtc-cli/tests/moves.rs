@@ -121,7 +121,8 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
             4,
             "joint 2: 1.6 rad is outside -1.57..1.57 rad; nothing was sent",
         ),
-        (vec!["move", "--to", "90,0,0,0,0,0"], 4, "90 rad is outside"),
+        (vec!["move", "--to", "90,0,0,0,0,0"], 4, "no move to 90,0,0,0,0,0: joint 1: 90 rad is outside"),
+        (vec!["move", "--to", "90,0,0,0,0,0"], 4, "in degrees with --deg"),
         (
             vec!["move", "--to", "0,0,0,0,0,0", "--speed", "0"],
             2,

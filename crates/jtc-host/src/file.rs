@@ -182,7 +182,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     if bytes > FILE_MAX {
         return Err(FileError::TooLarge { path: path.to_owned(), bytes });
     }
-    std::fs::read_to_string(path).map_err(io)
+    let bytes = std::fs::read(path).map_err(io)?;
+    String::from_utf8(bytes).map_err(|_| FileError::form("no text (its bytes are no UTF-8)").in_file(path))
 }
 
 /// A number as these files write it (`20.`, `-9.e-6`, ` 1`); never NaN or infinite.

@@ -14,7 +14,13 @@ pub struct CheckArgs {
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
-    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
+    #[arg(
+        long,
+        env = "JTC_SPEED_PERCENT",
+        value_name = "PCT",
+        default_value_t = 100.0,
+        allow_hyphen_values = true
+    )]
     pub speed: f64,
     /// The numbers of the file are degrees, for files that do not name their unit; a CSV header does with q1_deg..q6_deg
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
@@ -108,7 +114,7 @@ pub enum TrajCommand {
     )]
     Speed {
         /// 5 to 100
-        #[arg(value_name = "PCT")]
+        #[arg(value_name = "PCT", allow_negative_numbers = true)]
         percent: Option<f64>,
         #[command(flatten)]
         link: LinkArgs,

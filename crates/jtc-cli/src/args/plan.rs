@@ -26,7 +26,13 @@ pub struct PlanArgs {
     #[arg(long, env = "JTC_BLEND_M", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
+    #[arg(
+        long,
+        env = "JTC_SPEED_PERCENT",
+        value_name = "PCT",
+        default_value_t = 100.0,
+        allow_hyphen_values = true
+    )]
     pub speed: f64,
     /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load
     #[arg(long, env = "JTC_NO_JERK_LIMIT", value_parser = FalseyValueParser::new())]
@@ -58,6 +64,7 @@ pub struct PlanArgs {
 
 /// Options of `jtc move`.
 #[derive(Args, Debug)]
+#[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct MoveArgs {
     /// Joint positions, rad, or the name of a pose of the arm file
     #[arg(
@@ -66,7 +73,7 @@ pub struct MoveArgs {
         value_name = "Q1,…,Q6|NAME",
         value_parser = target,
         allow_hyphen_values = true,
-        required_unless_present = "to_flange"
+        group = "target"
     )]
     pub to: Option<Target>,
     /// A pose of the flange in the base frame instead: m, and roll, pitch and yaw in rad
@@ -76,7 +83,7 @@ pub struct MoveArgs {
         value_name = "X,Y,Z,ROLL,PITCH,YAW",
         value_parser = flange_pose,
         allow_hyphen_values = true,
-        conflicts_with = "to"
+        group = "target"
     )]
     pub to_flange: Option<[f64; 6]>,
     /// The flange keeps to a straight line
@@ -86,7 +93,13 @@ pub struct MoveArgs {
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
     pub deg: bool,
     /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 50.0)]
+    #[arg(
+        long,
+        env = "JTC_SPEED_PERCENT",
+        value_name = "PCT",
+        default_value_t = 50.0,
+        allow_hyphen_values = true
+    )]
     pub speed: f64,
     /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
@@ -107,7 +120,10 @@ pub enum Target {
 /// Six numbers with commas between them, or a name.
 fn target(text: &str) -> Result<Target, String> {
     let text = text.trim();
-    if !text.contains(',') && text.parse::<f64>().is_err() && !text.is_empty() {
+    if text.is_empty() {
+        return Err("neither six numbers nor the name of a pose".into());
+    }
+    if !text.contains(',') && text.parse::<f64>().is_err() {
         return Ok(Target::Pose(text.to_owned()));
     }
     let joints = numbers(text)?.try_into().map_err(|all: Vec<f64>| {

@@ -81,6 +81,8 @@ fn coldest(status: &jtc_wire::Status) -> f64 {
 
 /// There is no such move.
 fn refused(error: &PlanError, name: &str) -> Failure {
-    let message = format!("no move to {name}: {}", error.of_move(name));
-    Failure::nothing_sent(Failure { message, ..Failure::of(error) })
+    let message = format!("no move to {name}: {}", error.of_move());
+    let failure = Failure { message, ..Failure::of(error) };
+    let next = error.next_of_move().map_or(failure.hint.clone(), str::to_owned);
+    Failure::nothing_sent(failure.hint(next))
 }

@@ -28,6 +28,9 @@ fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> 
     let mut value = as_json(payload);
     value["before"] = as_json(&before);
     out.result(&value, || {
+        if before == *payload {
+            return format!("{}\nas it was before", as_text(payload));
+        }
         format!("{}\nbefore: {}\nit comes into the torque over 0.5 s", as_text(payload), words(&before))
     });
     Ok(())

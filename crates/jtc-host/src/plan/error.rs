@@ -67,23 +67,36 @@ impl PlanError {
         }
     }
 
-    /// The message of a move, whose two waypoints are known as where the arm stands and as the `target`.
-    pub fn of_move(&self, target: &str) -> String {
+    /// What helps a move whose end, or where the arm stands, is outside the limits; `None` where [`Diagnose`] has it.
+    pub fn next_of_move(&self) -> Option<&'static str> {
+        match self {
+            Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
+                Some("`jtc jog` brings the joint back inside its limits")
+            }
+            Self::Plan(jtc_plan::PlanError::Position { .. }) => Some(
+                "choose a place inside the limits, which `jtc arm show` lists; positions are in rad, and in degrees with --deg",
+            ),
+            _ => None,
+        }
+    }
+
+    /// The message of a move, whose first waypoint is where the arm stands, and whose second one is what was asked for.
+    pub fn of_move(&self) -> String {
         use jtc_plan::PlanError as Of;
         use kinematics::PoseError as Pose;
         let Self::Plan(error) = self else { return self.to_string() };
-        let place = if error.waypoint() == Some(1) { "where the arm stands" } else { target };
+        let place = if error.waypoint() == Some(1) { "where the arm stands, " } else { "" };
         match error {
-            Of::NotFinite { joint, value, .. } => format!("{place}, {joint}: {value} is no position"),
+            Of::NotFinite { joint, value, .. } => format!("{place}{joint}: {value} is no position"),
             Of::Position { joint, value, min, max, .. } => {
-                format!("{place}, {joint}: {value} rad is outside {min}..{max} rad")
+                format!("{place}{joint}: {value} rad is outside {min}..{max} rad")
             }
             Of::Torque { joint, torque, limit, whole, holding, .. } => format!(
-                "{place}, {joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
+                "{place}{joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
                 if *holding { "holding the arm there" } else { "the slowest motion from there" },
                 100.0 * limit / whole
             ),
-            Of::Flange(Pose::Waypoint { waypoint: 1, source }) => format!("{place}: {source}"),
+            Of::Flange(Pose::Waypoint { waypoint: 1, source }) => format!("where the arm stands: {source}"),
             Of::Flange(Pose::Waypoint { source, .. }) => source.to_string(),
             Of::Flange(Pose::Leg { distance, length, source, .. }) => {
                 format!("{distance:.4} m of {length:.4} m along the line: {source}")
@@ -113,9 +126,15 @@ impl Diagnose for PlanError {
             Self::Nowhere { .. } => {
                 Diagnosis::new(ErrorKind::Refused, "waypoints", "give a waypoint that is elsewhere")
             }
-            Self::Speed { .. } => {
-                Diagnosis::new(ErrorKind::Usage, "speed", "100 is as fast as the limits allow")
-            }
+            Self::Speed { most, .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "speed",
+                if *most > 100.0 {
+                    "100 is the speed of the file itself"
+                } else {
+                    "100 is as fast as the limits allow"
+                },
+            ),
             Self::TooManyCorners { .. } | Self::TooFine { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-long",
@@ -140,7 +159,7 @@ mod tests {
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];
-        for (waypoint, place) in [(1, "where the arm stands"), (2, "home")] {
+        for (waypoint, place) in [(1, "where the arm stands, "), (2, "")] {
             let torque =
                 |holding| Of::Torque { waypoint, joint, torque: 90.0, limit: 77.6, whole: 80.0, holding };
             let position = Of::Position { waypoint, joint, value: 5.0, min: -1.0, max: 1.0 };
@@ -148,11 +167,11 @@ mod tests {
             for error in [not_finite, position, torque(true), torque(false)] {
                 let (text, error) = (error.to_string(), PlanError::from(error));
                 assert_eq!(error.waypoint(), Some(waypoint), "{text}");
-                assert_eq!(error.of_move("home"), text.replace(&format!("waypoint {waypoint}"), place));
+                assert_eq!(error.of_move(), text.replace(&format!("waypoint {waypoint}, "), place));
             }
         }
         let source = || Box::new(PoseError::NoMotion);
-        let of = |error: PoseError| PlanError::from(Of::from(error)).of_move("home");
+        let of = |error: PoseError| PlanError::from(Of::from(error)).of_move();
         let start = of(PoseError::Waypoint { waypoint: 1, source: source() });
         assert_eq!(start, format!("where the arm stands: {}", PoseError::NoMotion));
         assert_eq!(
@@ -162,6 +181,6 @@ mod tests {
         let leg = of(PoseError::Leg { leg: 1, distance: 0.1, length: 0.4, source: source() });
         assert_eq!(leg, format!("0.1000 m of 0.4000 m along the line: {}", PoseError::NoMotion));
         let none = PlanError::Nowhere { count: 2 };
-        assert_eq!((none.waypoint(), none.of_move("home")), (None, none.to_string()));
+        assert_eq!((none.waypoint(), none.of_move()), (None, none.to_string()));
     }
 }

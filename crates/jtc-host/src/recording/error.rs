@@ -129,7 +129,14 @@ impl std::error::Error for RecordingError {
 
 impl Diagnose for RecordingError {
     fn diagnosis(&self) -> Diagnosis {
-        Diagnosis::new(ErrorKind::Usage, "recording", "")
+        let next = match self {
+            Self::UnknownFormat { .. } | Self::BuiltWithout { .. } => "",
+            Self::Io { .. } => "check the name and the rights of the file",
+            Self::Empty { .. } | Self::Line { .. } | Self::Mcap { .. } | Self::Message { .. } => {
+                "recordings are written by `jtc traj run FILE --record run.mcap`, `jtc move --record` and `jtc sim --record`"
+            }
+        };
+        Diagnosis::new(ErrorKind::Usage, "recording", next)
     }
 }
 

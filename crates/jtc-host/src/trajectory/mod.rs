@@ -117,7 +117,7 @@ impl Loaded {
     /// The same numbers as degrees, degrees/s and degrees/s²; an error where the file names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
-            let form = "the units of this file are known: its numbers are not taken as degrees";
+            let form = "the units of this file are known: its numbers are not taken as degrees; leave --deg out (and JTC_DEG, where it is set)";
             return Err(FileError::form(form));
         }
         for point in &mut self.trajectory.points {

@@ -195,7 +195,7 @@ impl WaypointFile {
     /// A file that names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
-            let problem = "the units of this file are known: its numbers are not taken as degrees";
+            let problem = "the units of this file are known: its numbers are not taken as degrees; leave --deg out (and JTC_DEG, where it is set)";
             return Err(FileError::form(problem).in_file(&self.path));
         }
         for waypoint in &mut self.waypoints {

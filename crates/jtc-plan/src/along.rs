@@ -37,7 +37,7 @@ pub(crate) fn along_at(
     let limits_of_motion = verify::with_table(limits, arm);
     let rests = std::iter::once(0.0).chain(path.stops()).chain([path.end()]);
     for s in rests.filter(|s| s.is_finite()) {
-        verify::holds(&path.at(s).position, path.waypoint(s).unwrap_or(1), limits, arm)?;
+        verify::holds(&path.at(s).position, first_waypoint(path, s), limits, arm)?;
     }
     let mut motion: Option<Motion> = None;
     for (i, section) in sections(path)?.iter().enumerate() {
@@ -53,6 +53,12 @@ pub(crate) fn along_at(
     }
     let motion = motion.ok_or(PlanError::Path { leg: 1, parameter: 0.0 })?;
     verify::finished(motion, limits, arm)
+}
+
+/// The first of the waypoints at `s`, from 1: one may be given several times in a row. Where there is none, the one that was passed last.
+fn first_waypoint(path: &dyn Path, s: f64) -> usize {
+    let passed = |s: f64| if s < 0.0 { 0 } else { path.waypoint(s).unwrap_or(1) };
+    passed(s).min(passed(s.next_down()) + 1)
 }
 
 /// The sections between the stops.

@@ -166,6 +166,12 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");
         assert!(error.to_string().contains("holding the arm there"), "{error}");
     }
+    // Given twice, it is the first one.
+    for blend in [0.0, 0.05] {
+        let waypoints = [[0.0; 6], stretched, stretched, [0.0; 6]].map(Waypoint::from);
+        let error = through(&waypoints, blend, &limits, Some(&arm)).unwrap_err();
+        assert_eq!(error.waypoint(), Some(2), "{error}");
+    }
     // Without the payload it can be held.
     config.payload = Payload::NONE;
     let arm = ArmDynamics::new(&config, &parameters.model, None);

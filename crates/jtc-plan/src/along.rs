@@ -18,14 +18,23 @@ use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 /// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and [`PlanError::Path`] where the
 /// path leads outside or has no direction, [`PlanError::Torque`] where the torque does not suffice at any speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
-    along_at(path, limits, arm, &|_| 1.0, &mut Choices::default()).map(reasons::completed)
+    unexplained(path, limits, arm).map(|motion| reasons::explained(motion, limits, arm))
+}
+
+/// The same without what binds it.
+pub(crate) fn unexplained(
+    path: &dyn Path,
+    limits: &Limits,
+    arm: Option<&ArmDynamics>,
+) -> Result<Motion, PlanError> {
+    along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
 /// What was chosen for each section of a path, so that it can be planned again alike: a law that depends on it without jumps.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<jerk::Shares>>);
 
-/// The same, where the waypoint (from 1) that was passed last decides at which share of the speed.
+/// The same without what binds it, where the waypoint (from 1) that was passed last decides at which share of the speed.
 pub(crate) fn along_at(
     path: &dyn Path,
     limits: &Limits,

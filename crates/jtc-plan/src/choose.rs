@@ -1,7 +1,7 @@
 //! Which corners are rounded, and which waypoints are corners at all.
 //!
 //! A stop lies within every blend, and so does a line close to waypoints that are dense: whatever is the fastest is taken.
-use crate::along::along;
+use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
@@ -14,7 +14,7 @@ const ROUNDS: usize = 5;
 /// How much faster a stop has to be than a rounded corner.
 const WORTH: f64 = 0.99;
 
-/// The fastest motion that was found, and its path.
+/// The fastest motion that was found, without what binds it, and its path.
 pub(crate) struct Chosen {
     pub path: BlendedPath,
     pub motion: Motion,
@@ -90,7 +90,7 @@ struct Timed {
 impl Timed {
     fn new(path: BlendedPath, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Self, PlanError> {
         let with_middles = WithMiddles::new(&path);
-        let mut motion = along(&with_middles, limits, arm)?;
+        let mut motion = unexplained(&with_middles, limits, arm)?;
         let mut middles = Vec::new();
         let mut is_middle = with_middles.places.iter().map(|place| place.1);
         motion.waypoint_times.retain(|time| {

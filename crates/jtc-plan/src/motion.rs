@@ -89,15 +89,15 @@ pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) end: State,
     pub(crate) binding: Vec<Binding>,
-    /// What binds where nothing of that does.
-    pub(crate) else_binding: Vec<Binding>,
+    /// All of it was slowed down for this joint's torque.
+    pub(crate) slowed: Option<Joint>,
     pub(crate) waypoint_times: Vec<f64>,
 }
 
 impl Motion {
     /// Of the pieces, which follow each other without a gap, and rest at `end`.
     pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
-        Self { pieces, end: State::rest(end), binding: Vec::new(), else_binding: Vec::new(), waypoint_times }
+        Self { pieces, end: State::rest(end), binding: Vec::new(), slowed: None, waypoint_times }
     }
 
     /// Seconds from rest to rest, above 0.
@@ -152,7 +152,7 @@ impl Motion {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
             end: self.end,
             binding: Vec::new(),
-            else_binding: Vec::new(),
+            slowed: None,
             waypoint_times: self.waypoint_times.iter().map(|t| t * factor).collect(),
         }
     }

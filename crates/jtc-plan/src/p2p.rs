@@ -31,7 +31,7 @@ pub fn point_to_point(
     verify::holds(from, 1, limits, arm)?;
     verify::holds(to, 2, limits, arm)?;
     let motion = fastest(from, to, &verify::with_table(limits, arm))?;
-    Ok(reasons::completed(verify::finished(motion, limits, arm)?))
+    Ok(reasons::explained(verify::finished(motion, limits, arm)?, limits, arm))
 }
 
 /// The same without torque.

@@ -3,7 +3,7 @@ use jtc_wire::Joint;
 
 use crate::binding::{Binding, LimitKind};
 use crate::motion::Motion;
-use crate::{ArmDynamics, Limits};
+use crate::{ArmDynamics, Limits, verify};
 
 /// From this share of it on a limit binds.
 const BINDS: f64 = 0.985;
@@ -21,28 +21,37 @@ const SHORT: f64 = 0.004;
 /// A limit and how much of it is used, as a share of the speed at which it is used up.
 type Use = (f64, Joint, LimitKind);
 
-/// Finds what binds a motion: where a limit is used up, that; else what it was `slowed` down for as a whole, or the limit that comes
-/// closest around there.
-pub(crate) fn find(
-    motion: &mut Motion,
-    limits: &Limits,
-    arm: Option<&ArmDynamics>,
-    slowed: Option<(Joint, LimitKind)>,
-) {
+/// What binds a motion.
+pub(crate) struct Reasons {
+    /// Where a limit is used up, that.
+    pub used_up: Vec<Binding>,
+    /// Everywhere, what the motion was slowed down for as a whole, or else the limit that comes closest around there.
+    otherwise: Vec<Binding>,
+}
+
+/// The motion with what binds it.
+pub(crate) fn explained(mut motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Motion {
+    motion.binding = find(&motion, limits, arm).joined(motion.duration());
+    motion
+}
+
+/// Finds what binds a motion.
+pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Reasons {
+    let limits = &verify::with_table(limits, arm);
     let duration = motion.duration();
     let count = (duration / (duration / SAMPLES_MAX).max(STEP)).ceil().max(1.0) as usize;
     let step = duration / count as f64;
     let uses: Vec<(Use, Option<Use>)> =
         (0..count).map(|i| uses(motion, (i as f64 + 0.5) * step, limits, arm)).collect();
     let used_up = uses.iter().map(|u| u.1.map(|(_, joint, limit)| (joint, limit)));
-    motion.binding = runs(used_up, step);
-    motion.else_binding = match slowed {
-        Some((joint, limit)) => vec![Binding { from: 0.0, to: duration, joint, limit }],
+    let otherwise = match motion.slowed {
+        Some(joint) => vec![Binding { from: 0.0, to: duration, joint, limit: LimitKind::Torque }],
         None => {
             let reach = (NEAR / step).ceil() as usize;
             runs(highest(&uses, reach).into_iter().map(|(_, joint, limit)| Some((joint, limit))), step)
         }
     };
+    Reasons { used_up: runs(used_up, step), otherwise }
 }
 
 /// The limit that is used most at `time`, and the one that is used up.
@@ -111,30 +120,32 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
     runs
 }
 
-/// Fills what is left open in the binding of a motion.
-pub(crate) fn completed(mut motion: Motion) -> Motion {
-    let duration = motion.duration();
-    let mut all: Vec<Binding> = Vec::new();
-    let mut take = |next: Binding| match all.last_mut() {
-        _ if next.to <= next.from => {}
-        Some(last) if next.to - next.from < SHORT || (last.joint, last.limit) == (next.joint, next.limit) => {
-            last.to = next.to;
-        }
-        _ => all.push(next),
-    };
-    let (mut time, mut other) = (0.0, 0);
-    let end = Binding { from: duration, to: duration, joint: Joint::ALL[0], limit: LimitKind::Velocity };
-    for b in motion.binding.iter().chain([&end]) {
-        while let Some(o) = motion.else_binding.get(other).filter(|o| o.from < b.from) {
-            take(Binding { from: o.from.max(time), to: o.to.min(b.from), ..*o });
-            if o.to > b.from {
-                break;
+impl Reasons {
+    /// One for all of a motion that takes `duration` s: what is used up, and between that what binds otherwise.
+    pub fn joined(&self, duration: f64) -> Vec<Binding> {
+        let mut all: Vec<Binding> = Vec::new();
+        let mut take = |next: Binding| match all.last_mut() {
+            _ if next.to <= next.from => {}
+            Some(last)
+                if next.to - next.from < SHORT || (last.joint, last.limit) == (next.joint, next.limit) =>
+            {
+                last.to = next.to;
             }
-            other += 1;
+            _ => all.push(next),
+        };
+        let (mut time, mut other) = (0.0, 0);
+        let end = Binding { from: duration, to: duration, joint: Joint::ALL[0], limit: LimitKind::Velocity };
+        for b in self.used_up.iter().chain([&end]) {
+            while let Some(o) = self.otherwise.get(other).filter(|o| o.from < b.from) {
+                take(Binding { from: o.from.max(time), to: o.to.min(b.from), ..*o });
+                if o.to > b.from {
+                    break;
+                }
+                other += 1;
+            }
+            take(Binding { from: b.from.max(time), ..*b });
+            time = b.to.max(time);
         }
-        take(Binding { from: b.from.max(time), ..*b });
-        time = b.to.max(time);
+        all
     }
-    motion.binding = all;
-    motion
 }

@@ -76,7 +76,8 @@ pub fn through(
     let path = BlendedPath::new(&positions, blend)?;
     let keep = |i: usize| waypoints[i].time.is_some();
     if given.len() < 2 {
-        return Ok(choose::fastest(path, blend, &keep, limits, arm)?.motion);
+        let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
+        return Ok(reasons::explained(chosen.motion, limits, arm));
     }
     match on_time(&path, &given, limits, arm) {
         // Another path may be faster.
@@ -178,7 +179,10 @@ fn on_time(
     let (rests, mut stretches): (Vec<Stretch>, Vec<Stretch>) =
         given.windows(2).map(between).partition(|s| path.is_one_place(s.from, s.to));
     let motion = moving_on_time(path, &mut stretches, limits, arm)?;
-    let mut motion = reasons::completed(with_given_times(motion, &stretches));
+    let mut reasons = reasons::find(&motion, limits, arm);
+    with_given_times(&mut reasons.used_up, &motion, &stretches);
+    let binding = reasons.joined(motion.duration());
+    let mut motion = Motion { binding, ..motion };
     for rest in rests {
         motion.rest_at(rest.from, rest.wanted);
     }
@@ -209,7 +213,7 @@ fn moving_on_time(
         // Its neighbours may still become faster, but not those of the fastest motion.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
-            return Err(too_early(late, &motion));
+            return Err(too_early(late, motion, limits, arm));
         }
         let is_near = |s: &Stretch| (0.95..=1.0 + 1e-9).contains(&(s.takes(&motion) / s.wanted));
         let between_rests = |s: &Stretch| path.stops_at(s.from) && path.stops_at(s.to);
@@ -237,7 +241,7 @@ fn moving_on_time(
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {
-        Some(tightest) => Err(too_early(tightest, &motion)),
+        Some(tightest) => Err(too_early(tightest, motion, limits, arm)),
         None => Ok(motion),
     }
 }
@@ -261,8 +265,8 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
 }
 
 /// What limits a stretch that takes longer than it may.
-fn too_early(late: &Stretch, motion: &Motion) -> PlanError {
-    let motion = &reasons::completed(motion.clone());
+fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> PlanError {
+    let motion = reasons::explained(motion, limits, arm);
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);
     let inside = |b: &Binding| (b.to.min(to) - b.from.max(from)).max(0.0);
     let mut longest = (Joint::ALL[0], LimitKind::Velocity, 0.0);
@@ -283,26 +287,25 @@ fn too_early(late: &Stretch, motion: &Motion) -> PlanError {
     }
 }
 
-/// Where nothing else binds, the given times do.
-fn with_given_times(mut motion: Motion, stretches: &[Stretch]) -> Motion {
+/// Where no limit is used up, the given times bind.
+fn with_given_times(binding: &mut Vec<Binding>, motion: &Motion, stretches: &[Stretch]) {
     let mut all: Vec<Binding> = Vec::new();
     for s in stretches {
         let (from, to) = (motion.waypoint_times[s.from], motion.waypoint_times[s.to]);
         let mut next = from;
-        for b in motion.binding.iter().filter(|b| b.to > from && b.from < to) {
+        for b in binding.iter().filter(|b| b.to > from && b.from < to) {
             if b.from > next {
                 all.push(Binding { from: next, to: b.from, joint: b.joint, limit: LimitKind::GivenTime });
             }
             next = b.to;
         }
-        let joint = fastest_joint(&motion, 0.5 * (from + to));
+        let joint = fastest_joint(motion, 0.5 * (from + to));
         if next < to {
             all.push(Binding { from: next, to, joint, limit: LimitKind::GivenTime });
         }
     }
-    motion.binding.append(&mut all);
-    motion.binding.sort_by(|a, b| a.from.total_cmp(&b.from));
-    motion
+    binding.append(&mut all);
+    binding.sort_by(|a, b| a.from.total_cmp(&b.from));
 }
 
 /// The joint that moves most at `time`.

@@ -1,10 +1,9 @@
 //! What a motion uses of its limits, between samples too, and slowing it down until they hold.
 use jtc_wire::Joint;
 
-use crate::binding::LimitKind;
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
-use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, reasons};
+use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
 /// Of a limit that the arithmetic may exceed it by.
 const ROUNDING: f64 = 1e-9;
@@ -30,20 +29,18 @@ pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
     limits
 }
 
-/// Slows a motion down until all limits hold, and finds what binds it.
+/// Slows a motion down until all limits hold.
 pub(crate) fn finished(
     motion: Motion,
     limits: &Limits,
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let within = with_table(limits, arm);
-    let mut motion = within_kinematics(motion, &within)?;
-    let mut slowed = None;
-    if let Some(arm) = arm {
-        (motion, slowed) = within_torque(motion, &within, arm)?;
+    let motion = within_kinematics(motion, &within)?;
+    match arm {
+        Some(arm) => within_torque(motion, &within, arm),
+        None => Ok(motion),
     }
-    reasons::find(&mut motion, &within, arm, slowed.map(|joint| (joint, LimitKind::Torque)));
-    Ok(motion)
 }
 
 /// Slows a motion down until velocity, acceleration and jerk hold.
@@ -153,12 +150,8 @@ struct Load {
     velocity: JointVec,
 }
 
-/// Slows a motion down until the torque suffices; the joint for which that was much.
-fn within_torque(
-    motion: Motion,
-    limits: &Limits,
-    arm: &ArmDynamics,
-) -> Result<(Motion, Option<Joint>), PlanError> {
+/// Slows a motion down until the torque suffices.
+fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
     holds_where_it_rests(&motion, limits, arm)?;
     let loads = loads(&motion, limits, arm);
     let over = |factor: f64| {
@@ -174,7 +167,7 @@ fn within_torque(
             })
         })
     };
-    let Some((_, mut joint, ..)) = over(1.0) else { return Ok((motion, None)) };
+    let Some((_, mut joint, ..)) = over(1.0) else { return Ok(motion) };
     let (mut fast, mut slow) = (1.0, 1.25);
     while let Some((time, joint, torque, limit)) = over(slow) {
         if slow > SLOWEST {
@@ -193,7 +186,7 @@ fn within_torque(
             None => slow = middle,
         }
     }
-    Ok((motion.stretched(slow), (slow > MUCH).then_some(joint)))
+    Ok(Motion { slowed: (slow > MUCH).then_some(joint), ..motion.stretched(slow) })
 }
 
 /// Waypoint, from 1, that was passed last at `time`.

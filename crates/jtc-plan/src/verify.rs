@@ -52,7 +52,7 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// By what a piece's time has to be multiplied so that velocity, acceleration and jerk hold everywhere in it.
+/// By what a piece's time has to be multiplied so that velocity, acceleration and jerk hold everywhere in it; below 1 where they do.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
@@ -63,10 +63,12 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
         let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
         let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
         let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
+        // What is within its limit counts no further: most is, and roots take time.
+        let root = |share: f64, root: fn(f64) -> f64| if share > 1.0 { root(share) } else { share };
         most = most.max(of(&velocity, limits.velocity[j]));
-        most = most.max(of(&acceleration, limits.acceleration[j]).sqrt());
+        most = most.max(root(of(&acceleration, limits.acceleration[j]), f64::sqrt));
         if limits.jerk[j].is_finite() {
-            most = most.max(of(&jerk, limits.jerk[j]).cbrt());
+            most = most.max(root(of(&jerk, limits.jerk[j]), f64::cbrt));
         }
         if velocity.iter().chain(&jerk).any(|c| !c.is_finite()) {
             return f64::INFINITY;
@@ -79,7 +81,9 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
 /// speed goes. 1 where it suffices, and where nothing that depends on the speed helps.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
-    for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm) {
+    // Where there is a limit of jerk, no acceleration jumps from one piece to the next, and the end of the one before was looked at with it.
+    let same = usize::from(limits.has_jerk());
+    for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm).into_iter().skip(same) {
         let state = piece.at(t);
         let torque = arm.torque(&state);
         if (0..JOINTS).all(|j| torque[j].abs() <= TORQUE_SHARE * limits.torque[j]) {
@@ -154,24 +158,51 @@ struct Load {
 fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
     holds_where_it_rests(&motion, limits, arm)?;
     let loads = loads(&motion, limits, arm);
-    let over = |factor: f64| {
-        loads.iter().find_map(|load| {
-            let slow = 1.0 / factor;
-            Joint::ALL.into_iter().find_map(|joint| {
-                let j = joint.index();
-                let friction = arm.friction(j, load.velocity[j] * slow);
-                let torque = load.hold[j] + load.motion[j] * slow * slow + friction;
-                let limit = limits.torque[j];
-                (torque.abs() > TORQUE_SHARE * limit || torque.is_nan())
-                    .then_some((load.time, joint, torque, limit))
-            })
+    let over = |load: &Load, factor: f64| {
+        let slow = 1.0 / factor;
+        Joint::ALL.into_iter().find_map(|joint| {
+            let j = joint.index();
+            let friction = arm.friction(j, load.velocity[j] * slow);
+            let torque = load.hold[j] + load.motion[j] * slow * slow + friction;
+            let limit = limits.torque[j];
+            (torque.abs() > TORQUE_SHARE * limit || torque.is_nan())
+                .then_some((load.time, joint, torque, limit))
         })
     };
-    let Some((_, mut joint, ..)) = over(1.0) else { return Ok(motion) };
-    let (mut fast, mut slow) = (1.0, 1.25);
+    let mut factor = 1.0;
+    let mut slowed = None;
+    // Those that are over so far: of most there is enough at every speed.
+    let mut some: Vec<&Load> = Vec::new();
+    loop {
+        let before = some.len();
+        some.extend(loads.iter().filter(|load| over(load, factor).is_some()));
+        if some.len() == before {
+            break;
+        }
+        let (slow, joint) =
+            factor_for(&motion, factor, |factor| some.iter().find_map(|load| over(load, factor)))?;
+        (factor, slowed) = (slow, (slow > MUCH).then_some(joint).or(slowed));
+    }
+    if factor == 1.0 {
+        return Ok(motion);
+    }
+    Ok(Motion { slowed, ..motion.stretched(factor) })
+}
+
+/// Time, joint, torque and limit of a place where the torque does not suffice.
+type Over = (f64, Joint, f64, f64);
+
+/// The least factor of the time, above `least`, with which nothing is `over`, and the joint that was last.
+fn factor_for(
+    motion: &Motion,
+    least: f64,
+    over: impl Fn(f64) -> Option<Over>,
+) -> Result<(f64, Joint), PlanError> {
+    let Some((_, mut joint, ..)) = over(least) else { return Ok((least, Joint::ALL[0])) };
+    let (mut fast, mut slow) = (least, 1.25 * least);
     while let Some((time, joint, torque, limit)) = over(slow) {
         if slow > SLOWEST {
-            let waypoint = waypoint_at(&motion, time);
+            let waypoint = waypoint_at(motion, time);
             let (torque, whole) = (torque.abs(), limit);
             let limit = TORQUE_SHARE * whole;
             return Err(PlanError::Torque { waypoint, joint, torque, limit, whole, holding: false });
@@ -186,7 +217,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
             None => slow = middle,
         }
     }
-    Ok(Motion { slowed: (slow > MUCH).then_some(joint), ..motion.stretched(slow) })
+    Ok((slow, joint))
 }
 
 /// Waypoint, from 1, that was passed last at `time`.
@@ -257,8 +288,10 @@ fn bulges(piece: &Piece, limits: &Limits) -> bool {
 fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
     let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
     let mut loads = Vec::new();
-    for piece in &motion.pieces {
-        for t in moments(piece, step, limits, arm) {
+    for (i, piece) in motion.pieces.iter().enumerate() {
+        // Where there is a limit of jerk, no acceleration jumps from one piece to the next.
+        let same = usize::from(i > 0 && limits.has_jerk());
+        for t in moments(piece, step, limits, arm).into_iter().skip(same) {
             let s = piece.at(t);
             let hold = arm.holding(&s.position);
             let mut motion = arm.rigid(&s.position, &s.velocity, &s.acceleration);

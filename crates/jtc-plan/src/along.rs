@@ -9,9 +9,9 @@ use crate::path::Path;
 use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
 /// As fast along a path as velocity, acceleration and torque allow, from rest to rest: time-optimal path parameterisation by
-/// reachability analysis (Pham and Pham 2018). Where the limits have a jerk, the law of time is averaged over a window, so that the
-/// acceleration has ramps, and is slower at the corners by what that takes. What results is verified between its samples, too, and
-/// slowed down until all limits hold.
+/// reachability analysis (Pham and Pham 2018). Where the limits have a jerk, an interior-point method makes the law of time as short as
+/// velocity, acceleration, jerk and torque allow at places along the path, from one that is averaged over a window. What results is
+/// verified between its samples, too, and slowed down until all limits hold.
 ///
 /// # Errors
 ///
@@ -32,7 +32,15 @@ pub(crate) fn unexplained(
 
 /// What was chosen for each section of a path, so that it can be planned again alike: a law that depends on it without jumps.
 #[derive(Debug, Default)]
-pub(crate) struct Choices(Vec<Option<jerk::Shares>>);
+pub(crate) struct Choices(Vec<Option<Choice>>);
+
+/// How a section is planned.
+#[derive(Clone, Copy, Debug)]
+enum Choice {
+    InteriorPoint,
+    /// Without jerk, or by averaging with these shares.
+    Other(Option<jerk::Shares>),
+}
 
 /// The same without what binds it, where the waypoint (from 1) that was passed last decides at which share of the speed.
 pub(crate) fn along_at(
@@ -112,7 +120,7 @@ fn of_section(
     limits: &Limits,
     arm: Option<&ArmDynamics>,
     share: &dyn Fn(usize) -> f64,
-    chosen: &mut Option<jerk::Shares>,
+    chosen: &mut Option<Choice>,
 ) -> Result<Motion, PlanError> {
     let leg = section.path.waypoint(section.from).unwrap_or(1);
     let cells = cells(section, arm, limits, !limits.has_jerk())?;
@@ -121,18 +129,52 @@ fn of_section(
         .map(|cell| share(section.path.waypoint(section.from + 0.5 * (cell.from + cell.to)).unwrap_or(leg)))
         .collect();
     let caps = caps(section, &cells, limits, arm)?;
-    let mut plan = Plan { section, cells: &cells, caps, reached: Vec::new(), shares, limits, arm: None };
-    plan.reached.clone_from(&plan.caps);
+    let plan = Plan { section, cells: &cells, reached: caps.clone(), caps, shares, limits, arm };
+    // Along a straight line without torque nothing is faster than an average.
+    let is_straight = cells.iter().all(Cell::is_straight);
+    let found = match *chosen {
+        Some(Choice::Other(_)) => None,
+        _ if !limits.has_jerk() || (is_straight && arm.is_none()) => None,
+        _ => jerk::interior(&plan, INTERIOR_REPAIRS),
+    };
+    if let Some(motion) = &found
+        && (chosen.is_some() || (!is_straight && cells.len() > FEW))
+    {
+        *chosen = Some(Choice::InteriorPoint);
+        return Ok(motion.clone());
+    }
+    let shares = if let Some(Choice::Other(shares)) = *chosen { shares } else { None };
     let failed = |reason| PlanError::NoTimeLaw { leg, reason };
-    let mut made = plan.make(*chosen, if arm.is_none() { REPAIRS } else { 0 }).map_err(failed)?;
-    *chosen = made.shares;
-    let Some(arm) = arm else { return Ok(made.motion) };
+    let (motion, shares) = without_interior(plan, shares).map_err(failed)?;
+    match found {
+        Some(found) if found.duration() < motion.duration() => {
+            *chosen = Some(Choice::InteriorPoint);
+            Ok(found)
+        }
+        _ => {
+            *chosen = Some(Choice::Other(shares));
+            Ok(motion)
+        }
+    }
+}
+
+/// The motion of a law without jerk, or of one that is averaged over a window, with the shares that were chosen for that.
+fn without_interior(
+    mut plan: Plan,
+    shares: Option<jerk::Shares>,
+) -> Result<(Motion, Option<jerk::Shares>), String> {
+    let Some(arm) = plan.arm.take() else {
+        let made = plan.make(shares, REPAIRS)?;
+        return Ok((made.motion, made.shares));
+    };
+    let mut made = plan.make(shares, 0)?;
+    let shares = made.shares;
     // Friction counts up to the highest speed in a cell, which is known better each time.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
     for _ in 0..TORQUE_ROUNDS {
         plan.reached = plan.reached_by(&made.law);
-        made = plan.make(made.shares, REPAIRS).map_err(failed)?;
+        made = plan.make(made.shares, REPAIRS)?;
         let before = best.as_ref().map_or(f64::INFINITY, Motion::duration);
         let shorter = made.motion.duration() < (1.0 - WORTH) * before;
         if made.motion.duration() < before {
@@ -142,7 +184,7 @@ fn of_section(
             break;
         }
     }
-    best.ok_or(PlanError::NoTimeLaw { leg, reason: "its time is not finite".into() })
+    Ok((best.ok_or("its time is not finite")?, shares))
 }
 
 /// Highest squared speeds of the cells by the limits of speed, and by friction.
@@ -186,6 +228,10 @@ pub(crate) struct Made {
     pub shares: Option<jerk::Shares>,
 }
 
+/// How often the cells in which a limit does not hold between the samples are slowed down in a law by the interior-point method.
+const INTERIOR_REPAIRS: usize = 1;
+/// Up to so many cells, averages over a window are tried as well.
+const FEW: usize = 200;
 /// How often a section is planned with torque.
 const TORQUE_ROUNDS: usize = 4;
 /// By how much a round has to make it shorter for another one.

@@ -9,15 +9,14 @@ use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 /// Into how many cells the parts of a path are divided.
 struct Division {
     straight: usize,
-    straight_with_torque: usize,
     curved: usize,
     /// Of a path of few parts, in all.
     least: usize,
 }
 
-const COARSE: Division = Division { straight: 2, straight_with_torque: 10, curved: 4, least: 80 };
+const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
 /// For a law whose acceleration changes at the ends of cells only.
-const FINE: Division = Division { straight: 16, straight_with_torque: 16, curved: 9, least: 400 };
+const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
 /// Share of what the torque limit leaves over for motion that the speed may take.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
@@ -80,16 +79,21 @@ pub(crate) fn cells(
         let side = (from, to);
         let inside = [0.25, 0.5, 0.75].map(|u| section.at(from + u * (to - from), side));
         let is_straight = inside.iter().all(|p| p.second == [0.0; JOINTS]);
-        let least =
-            if is_straight && arm.is_none() && !fine { 1 } else { division.least / section.parts_of_path };
-        let count = match (is_straight, arm) {
-            (false, _) => division.curved,
-            (true, None) => division.straight,
-            (true, Some(_)) => division.straight_with_torque,
+        let count = if is_straight { division.straight } else { division.curved };
+        let count = count.max(division.least / section.parts_of_path);
+        // Near a rest the speed changes within a short way.
+        let (begins, ends) = (from == section.from && !fine, to == section.to && !fine);
+        let share = |i: usize| {
+            let u = i as f64 / count as f64;
+            match (begins, ends) {
+                (true, true) => (0.5 * std::f64::consts::PI * u).sin().powi(2),
+                (true, false) => u * u,
+                (false, true) => u * (2.0 - u),
+                (false, false) => u,
+            }
         };
-        let count = count.max(least);
         let end = |i: usize| {
-            let s = from + (to - from) * i as f64 / count as f64;
+            let s = from + (to - from) * share(i);
             let point = section.at(if i == count { to } else { s }, side);
             checked(section, &point, s, limits)?;
             Ok::<End, PlanError>(End { point, loads: arm.map(|arm| Loads::at(&point, arm)) })
@@ -97,7 +101,7 @@ pub(crate) fn cells(
         let mut before = end(0)?;
         for i in 0..count {
             let after = end(i + 1)?;
-            let place = |i: usize| from + (to - from) * i as f64 / count as f64 - section.from;
+            let place = |i: usize| from + (to - from) * share(i) - section.from;
             let (a, b) = (place(i), place(i + 1));
             let (p, q) = (&before.point.second, &after.point.second);
             let third = std::array::from_fn(|j| (q[j] - p[j]) / (b - a));
@@ -154,6 +158,11 @@ impl Room {
 }
 
 impl Cell {
+    /// Whether the path has no curvature in it.
+    pub fn is_straight(&self) -> bool {
+        self.ends.iter().all(|end| end.point.second == [0.0; JOINTS])
+    }
+
     /// Highest squared speed by the limits of speed alone.
     pub fn speed_cap(&self, limits: &Limits) -> f64 {
         let mut cap = f64::INFINITY;

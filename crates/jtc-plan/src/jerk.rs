@@ -5,6 +5,7 @@
 //! what was averaged keeps to the limits of the cells around it.
 use crate::along::{Made, Plan};
 use crate::cells::Cell;
+use crate::interior::Search;
 use crate::law::Law;
 use crate::motion::Motion;
 use crate::profile::{self, Bounds};
@@ -19,6 +20,8 @@ const ATTEMPTS: usize = 24;
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
 /// By how much all of the motion is slowed down without that.
 const LEFT_OVER: f64 = 1.002;
+/// The same for a law by the interior-point method.
+const LITTLE: f64 = 1.005;
 /// Share of the jerk limit that the window is made for.
 const JERK_SHARE: f64 = 0.995;
 
@@ -42,6 +45,33 @@ pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Re
         return Err(none());
     }
     Ok(Made { law: best.law, motion: best.motion, shares: Some(shares) })
+}
+
+/// Shares of the law from which the search for a faster one begins.
+const SEED: Shares = Shares { acceleration: LOWER * LOWER, curvature: CURVATURE_SHARES[0] };
+
+/// The motion by an interior-point method, where that finds one that is faster than the law from which it begins.
+pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
+    let bounds = bounds(plan, SEED);
+    let window = window(plan.cells, &bounds, plan.limits);
+    let seed = Law::of_vertices(&profile::fastest(&bounds, window)).averaged(window);
+    let mut slower = vec![1.0; plan.cells.len()];
+    let mut search = Search::new(plan, &seed)?;
+    let mut best: Option<Attempt> = None;
+    for repaired in 0..=repairs {
+        let Some(law) = search.fastest(&slower) else { break };
+        let motion = plan.section.motion(&law, plan.limits);
+        let next = Attempt { slower: plan.slower(&motion, &law, true), law, motion };
+        slower.iter_mut().zip(&next.slower).for_each(|(all, s)| *all *= s);
+        let done = repaired == repairs || next.slower.iter().all(|s| *s <= LITTLE);
+        if best.as_ref().is_none_or(|best| next.duration() < best.duration()) {
+            best = Some(next);
+        }
+        if done {
+            break;
+        }
+    }
+    best.filter(|best| best.duration() < seed.duration()).map(|best| best.motion)
 }
 
 /// The shares with which the motion is the shortest, torque not counted.

@@ -8,6 +8,7 @@ mod cells;
 mod choose;
 mod compose;
 mod error;
+mod interior;
 mod jerk;
 pub mod kinematics;
 mod law;

@@ -76,14 +76,43 @@ impl<'a> ArmDynamics<'a> {
         self
     }
 
-    /// Lowest and highest friction of the joint with index `j` at all speeds from 0 to `fastest` (rad/s, signed), N·m; beyond the
-    /// highest speed of the arm that of the highest.
+    /// Lowest and highest friction of the joint with index `j` at all speeds from 0 to `fastest` (rad/s, signed), N·m.
     pub(crate) fn friction_range(&self, j: usize, fastest: f64) -> (f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0);
         }
         let step = (fastest.abs() / self.ranges.step[j]).ceil() as usize;
-        self.ranges.ranges[j][usize::from(fastest > 0.0)][step.min(STEPS)]
+        let (low, high) = self.ranges.ranges[j][usize::from(fastest > 0.0)][step.min(STEPS)];
+        if step <= STEPS {
+            return (low, high);
+        }
+        // Beyond the highest speed of the arm.
+        let friction = self.friction(j, fastest);
+        (low.min(friction), high.max(friction))
+    }
+
+    /// The same without jumps: low and high, those of a step later between the steps on a straight line, and the slopes of both by the speed.
+    pub(crate) fn friction_line(&self, j: usize, fastest: f64) -> (f64, f64, f64, f64) {
+        if self.friction.is_none() {
+            return (0.0, 0.0, 0.0, 0.0);
+        }
+        let steps = fastest.abs() / self.ranges.step[j];
+        let ranges = &self.ranges.ranges[j][usize::from(fastest > 0.0)];
+        let at = steps as usize + 1;
+        let by = self.ranges.step[j].recip().copysign(fastest);
+        let (u, (low, high), (low_after, high_after)) = if at < STEPS {
+            (steps + 1.0 - at as f64, ranges[at], ranges[at + 1])
+        } else {
+            // Beyond the highest speed of the arm.
+            let (u, step) = (steps.fract(), self.ranges.step[j].copysign(fastest));
+            let with = |speed: f64| {
+                let (friction, (low, high)) = (self.friction(j, speed), ranges[STEPS]);
+                (low.min(friction), high.max(friction))
+            };
+            (u, with(fastest + (1.0 - u) * step), with(fastest + (2.0 - u) * step))
+        };
+        let (low_by, high_by) = (low_after - low, high_after - high);
+        (low + u * low_by, high + u * high_by, low_by * by, high_by * by)
     }
 
     /// Joint torques that the controller commands at `state` where the arm follows exactly, N·m.

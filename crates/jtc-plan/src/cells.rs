@@ -21,7 +21,7 @@ const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 /// Share of what the torque limit leaves over for motion that the speed may take.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the torque limit that is planned with.
-pub(crate) const TORQUE_SHARE: f64 = 0.999;
+pub(crate) const TORQUE_SHARE: f64 = 0.9975;
 /// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
 const MOTION_SHARE: f64 = 0.05;
 /// Share of it with which the arm can still creep.

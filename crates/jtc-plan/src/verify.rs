@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-9;
 /// Distance of the samples of the torque, s.
 const TORQUE_STEP: f64 = 0.004;
 /// What the torque may reach of its limit at the samples: between them it may be higher.
-const TORQUE_SHARE: f64 = 0.9995;
+const TORQUE_SHARE: f64 = 0.9985;
 /// A motion that is made slower than this, as a factor of its time, is bound by what that was done for.
 const MUCH: f64 = 1.01;
 /// Samples of the torque at most; a longer motion has them further apart.

@@ -1,0 +1,204 @@
+//! Limits at one place of a path, in the coefficients of a spline.
+use crate::along::Plan;
+use crate::{JOINTS, JointVec};
+
+/// Three neighbouring coefficients from an index on make a value.
+pub(super) type Three = [f64; 3];
+
+/// A place at which limits hold: one end of a cell.
+pub(super) struct Place {
+    /// Index of the first coefficient.
+    pub at: usize,
+    /// Squared speed, its slope and its second derivative.
+    pub b: Three,
+    pub slope: Three,
+    pub bend: Three,
+    /// By bend, slope and squared speed, as shares of the limits: jerk but for the speed as a factor, and acceleration (without bend).
+    pub jerk: [JointVec; 3],
+    pub acceleration: [JointVec; 2],
+    /// Highest squared speed, where it is asked for here, with acceleration and torque.
+    pub cap: f64,
+    /// Its reciprocal speed counts this long, and that of the middle of the cell, with the squared speed there.
+    pub weight: f64,
+    pub middle: (Three, f64),
+    pub torque: Option<Torque>,
+}
+
+pub(super) struct Torque {
+    /// Of the path's direction.
+    pub first: JointVec,
+    /// By slope.
+    pub mass: JointVec,
+    /// By squared speed.
+    pub speed: JointVec,
+    /// What is left without friction, up and down, N·m.
+    pub high: JointVec,
+    pub low: JointVec,
+}
+
+fn dot(three: &Three, c: &[f64]) -> f64 {
+    three[0] * c[0] + three[1] * c[1] + three[2] * c[2]
+}
+
+impl Place {
+    /// Shares of the jerk limits, but for the speed as a factor.
+    fn jerks(&self, b: f64, slope: f64, bend: f64) -> JointVec {
+        let [by_bend, by_slope, by_b] = &self.jerk;
+        std::array::from_fn(|j| by_bend[j] * bend + by_slope[j] * slope + by_b[j] * b)
+    }
+
+    /// Shares of the acceleration limits.
+    fn accelerations(&self, b: f64, slope: f64) -> JointVec {
+        let [by_slope, by_b] = &self.acceleration;
+        std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
+    }
+
+    /// Where the arm rests there is nothing but jerk along the path.
+    pub fn at_rest(&mut self) {
+        (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
+    }
+
+    /// Its part of the time, and of the sum of the logarithms of what is left of the limits; `None` outside of them.
+    pub fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
+        let c = &c[self.at..self.at + 3];
+        let b = dot(&self.b, c);
+        if b.is_nan() || b <= 0.0 {
+            return None;
+        }
+        let speed = b.sqrt();
+        let (slope, bend) = (dot(&self.slope, c), dot(&self.bend, c));
+        let (mut time, mut product, mut least) = (0.0, 1.0, f64::INFINITY);
+        let mut take = |left: f64| {
+            least = left.min(least);
+            product *= left;
+        };
+        for jerk in self.jerks(b, slope, bend) {
+            take(1.0 - b * jerk * jerk);
+        }
+        if self.weight > 0.0 {
+            time = self.weight / speed;
+            if self.middle.1 > 0.0 {
+                time += self.middle.1 / dot(&self.middle.0, c).sqrt();
+            }
+            take(1.0 - b / self.cap);
+            for a in self.accelerations(b, slope) {
+                take(1.0 - a * a);
+            }
+            if let (Some(torque), Some(arm)) = (&self.torque, plan.arm) {
+                for j in 0..JOINTS {
+                    let (low, high, ..) = arm.friction_line(j, torque.first[j] * speed);
+                    let moving = torque.mass[j] * slope + torque.speed[j] * b;
+                    let limit = plan.limits.torque[j];
+                    take((torque.high[j] - high - moving) / limit);
+                    take((torque.low[j] + low + moving) / limit);
+                }
+            }
+        }
+        let is_inside = least > 0.0 && product > 0.0;
+        is_inside.then(|| (time, product.ln()))
+    }
+
+    /// Adds its part of the derivatives of the time and of `barrier` times the barriers by the coefficients.
+    pub fn add_to(
+        &self,
+        gradient: &mut [f64],
+        hessian: &mut [[f64; 3]],
+        plan: &Plan,
+        c: &[f64],
+        barrier: f64,
+    ) {
+        let at = self.at;
+        let c = &c[at..at + 3];
+        let b = dot(&self.b, c);
+        let (mut g, mut h) = self.barriers(plan, b, dot(&self.slope, c), dot(&self.bend, c));
+        g.iter_mut().for_each(|x| *x *= barrier);
+        h.iter_mut().for_each(|x| *x *= barrier);
+        if self.weight > 0.0 {
+            let time = self.weight / b.sqrt();
+            g[0] -= 0.5 * time / b;
+            h[0] += 0.75 * time / (b * b);
+            if self.middle.1 > 0.0 {
+                let w = &self.middle.0;
+                let b = dot(w, c);
+                let time = self.middle.1 / b.sqrt();
+                for p in 0..3 {
+                    gradient[at + p] -= 0.5 * time / b * w[p];
+                    for q in p..3 {
+                        hessian[at + p][q - p] += 0.75 * time / (b * b) * w[p] * w[q];
+                    }
+                }
+            }
+        }
+        let v = [&self.b, &self.slope, &self.bend];
+        for p in 0..3 {
+            gradient[at + p] += g[0] * v[0][p] + g[1] * v[1][p] + g[2] * v[2][p];
+            let w = [
+                h[0] * v[0][p] + h[3] * v[1][p] + h[4] * v[2][p],
+                h[3] * v[0][p] + h[1] * v[1][p] + h[5] * v[2][p],
+                h[4] * v[0][p] + h[5] * v[1][p] + h[2] * v[2][p],
+            ];
+            for q in p..3 {
+                hessian[at + p][q - p] += w[0] * v[0][q] + w[1] * v[1][q] + w[2] * v[2][q];
+            }
+        }
+    }
+
+    /// First derivatives of the barriers by squared speed, slope and bend, and second ones (00, 11, 22, 01, 02, 12).
+    fn barriers(&self, plan: &Plan, b: f64, slope: f64, bend: f64) -> ([f64; 3], [f64; 6]) {
+        let speed = b.sqrt();
+        let (mut g, mut h) = ([0.0f64; 3], [0.0f64; 6]);
+        let inner = self.jerks(b, slope, bend);
+        let [by_bend, by_slope, by_b] = &self.jerk;
+        for j in 0..JOINTS {
+            let jerk = speed * inner[j];
+            let d = [speed * by_b[j] + 0.5 * inner[j] / speed, speed * by_slope[j], speed * by_bend[j]];
+            let left = (1.0 - jerk * jerk).recip();
+            add(&mut g, &mut h, &d, 2.0 * jerk * left, 2.0 * (1.0 + jerk * jerk) * left * left);
+        }
+        if self.weight <= 0.0 {
+            return (g, h);
+        }
+        let cap = (self.cap - b).recip();
+        g[0] += cap;
+        h[0] += cap * cap;
+        let accelerations = self.accelerations(b, slope);
+        let [by_slope, by_b] = &self.acceleration;
+        for j in 0..JOINTS {
+            let a = accelerations[j];
+            let left = (1.0 - a * a).recip();
+            let d = [by_b[j], by_slope[j]];
+            add_two(&mut g, &mut h, &d, 2.0 * a * left, 2.0 * (1.0 + a * a) * left * left);
+        }
+        let (Some(torque), Some(arm)) = (&self.torque, plan.arm) else { return (g, h) };
+        for j in 0..JOINTS {
+            let (low, high, low_by, high_by) = arm.friction_line(j, torque.first[j] * speed);
+            let by_b = 0.5 * torque.first[j] / speed;
+            let moving = torque.mass[j] * slope + torque.speed[j] * b;
+            let up = (torque.high[j] - high - moving).recip();
+            let down = (torque.low[j] + low + moving).recip();
+            add_two(&mut g, &mut h, &[torque.speed[j] + high_by * by_b, torque.mass[j]], up, up * up);
+            add_two(&mut g, &mut h, &[torque.speed[j] + low_by * by_b, torque.mass[j]], -down, down * down);
+        }
+        (g, h)
+    }
+}
+
+/// Adds a barrier whose derivatives are `one` and `two` to the gradient and the second derivatives (00, 11, 22, 01, 02, 12).
+fn add(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 3], one: f64, two: f64) {
+    for i in 0..3 {
+        g[i] += one * d[i];
+        h[i] += two * d[i] * d[i];
+    }
+    h[3] += two * d[0] * d[1];
+    h[4] += two * d[0] * d[2];
+    h[5] += two * d[1] * d[2];
+}
+
+/// The same of one that does not depend on the bend.
+fn add_two(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 2], one: f64, two: f64) {
+    g[0] += one * d[0];
+    g[1] += one * d[1];
+    h[0] += two * d[0] * d[0];
+    h[1] += two * d[1] * d[1];
+    h[3] += two * d[0] * d[1];
+}

@@ -1,0 +1,75 @@
+//! Knots of a spline, and its law of time.
+use super::Problem;
+use crate::law::{Law, Phase};
+
+/// Share by which the speed may change in two phases of a law, and into how many pairs of phases a cell is divided at most.
+const ALIKE: f64 = 0.2;
+const PARTS_MAX: f64 = 4.0;
+
+impl Problem<'_> {
+    /// The law of a spline.
+    pub fn law(&self, c: &[f64]) -> Law {
+        let cells = self.plan.cells;
+        let spans = self.knots.len() - 1;
+        // Parameter, speed, acceleration at the knots.
+        let states: Vec<(f64, f64, f64)> = (0..=spans)
+            .map(|k| {
+                let i = k as isize;
+                let at = |k: isize| knot(&self.knots, k);
+                let width = at(i + 1) - at(i - 1);
+                let b = (c[k] * (at(i + 1) - at(i)) + c[k + 1] * (at(i) - at(i - 1))) / width;
+                (at(i), b.sqrt(), (c[k + 1] - c[k]) / width)
+            })
+            .collect();
+        let mut phases: Vec<Phase> = Vec::with_capacity(2 * cells.len());
+        let (_, speed, acceleration) = states[0];
+        let mut start = 3.0 * cells[0].to / speed;
+        phases.push(Phase { length: start, jerk: acceleration / start, ..Phase::default() });
+        for pair in states.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            // The jerk of a phase is one, that of the spline grows with the speed.
+            let parts = ((to.1 - from.1).abs() / (ALIKE * from.1.min(to.1))).ceil().clamp(1.0, PARTS_MAX);
+            let mut before = from;
+            for part in 1..=parts as usize {
+                let after = if part as f64 == parts { to } else { between(from, to, part as f64 / parts) };
+                start = phases_between(&mut phases, start, before, after);
+                before = after;
+            }
+        }
+        let (s, speed, acceleration) = states[spans];
+        let length = 3.0 * (self.end - s) / speed;
+        phases.push(Phase { start, length, s, speed, acceleration, jerk: -acceleration / length });
+        Law { phases, end: self.end, rests: true }
+    }
+}
+
+/// Parameter, speed and acceleration of a spline at a share of a cell with these ends.
+fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64, f64) {
+    let way = share * (to.0 - from.0);
+    let acceleration = from.2 + share * (to.2 - from.2);
+    let square = from.1 * from.1 + way * (from.2 + acceleration);
+    (from.0 + way, square.max(0.0).sqrt(), acceleration)
+}
+
+/// Two phases of one length such that parameter, speed and acceleration are those at both ends; the time at the end.
+fn phases_between(
+    phases: &mut Vec<Phase>,
+    start: f64,
+    (s, v, a): (f64, f64, f64),
+    (to, w, b): (f64, f64, f64),
+) -> f64 {
+    let (sum, way) = (v + w, to - s);
+    let length = 2.0 * way / (sum + (sum * sum + 4.0 / 3.0 * way * (a - b)).max(0.0).sqrt());
+    let middle = (w - v) / length - 0.5 * (a + b);
+    let phase = Phase { start, length, s, speed: v, acceleration: a, jerk: (middle - a) / length };
+    let (s, speed, acceleration) = phase.at(length);
+    let start = start + length;
+    phases.push(phase);
+    phases.push(Phase { start, length, s, speed, acceleration, jerk: (b - middle) / length });
+    start + length
+}
+
+/// The knot with an index; beyond the ends, the last one there.
+pub(super) fn knot(knots: &[f64], k: isize) -> f64 {
+    knots[k.clamp(0, knots.len() as isize - 1) as usize]
+}

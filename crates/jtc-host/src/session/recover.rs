@@ -42,8 +42,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`ParametersError::NoSource`] and [`ParametersError::IncompleteArm`], before anything is sent, when there is nothing to give the
-    /// controller; [`StateError::Device`] and [`StateError::Timeout`] when an error does not go away; those of the line.
+    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm), before anything is
+    /// sent, when there is nothing to give the controller; [`StateError::Device`] and [`StateError::Timeout`] when an error does not go away; those of the line.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,

@@ -51,9 +51,9 @@ pub enum PlanError {
         step_ms: u16,
     },
     /// Longer than a trajectory can be.
-    #[error("the motion takes {seconds:.0} s, more than {POINTS_MAX} points can hold")]
+    #[error("the motion takes {seconds:.0} s or more: {POINTS_MAX} points cannot hold it")]
     TooLong {
-        /// s.
+        /// At least, s.
         seconds: f64,
     },
 }

@@ -40,7 +40,7 @@ pub use speed::at_speed;
 
 use crate::check::{Checker, HOLD_SHARE, Problem, ProblemKind, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};
-use sampled::{sampled, step_ms};
+use sampled::{least_s, sampled, step_ms};
 
 /// Step of planned moves, ms.
 const STEP_MS: u16 = 10;
@@ -145,13 +145,14 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`].
+    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`], [`PlanError::TooLong`].
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
             return Err(PlanError::Nowhere { count: positions.len() });
         }
         sampled::fits_corners(&positions, self.blend)?;
+        self.fits_time(&positions)?;
         let arm = self.dynamics();
         let motion =
             self.within(&positions, |limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
@@ -183,6 +184,20 @@ impl<'a> Planner<'a> {
                 None => return Err(PlanError::Refused(Box::new(verdict))),
             }
         }
+    }
+
+    /// Refuses what would be too long at the highest speed all the way, before it is planned. Positions outside the limits, and blends
+    /// that are none, are left to the plan.
+    fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
+        let limits = self.limits(positions)?;
+        let is_inside = |q: &[f64; JOINTS]| {
+            let mut ranges = q.iter().zip(&limits.position);
+            ranges.all(|(q, (min, max))| (*min..=*max).contains(q))
+        };
+        if positions.iter().all(is_inside) && self.blend >= 0.0 {
+            step_ms(least_s(positions, self.blend, &limits.velocity))?;
+        }
+        Ok(())
     }
 
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {

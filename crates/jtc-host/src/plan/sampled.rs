@@ -94,6 +94,15 @@ pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<()
     if corners > most { Err(PlanError::TooManyCorners { corners, most }) } else { Ok(()) }
 }
 
+/// Time that no motion through `positions` is shorter than, s: each is reached within `blend` rad, at no more than `velocity` (rad/s).
+pub(super) fn least_s(positions: &[[f64; JOINTS]], blend: f64, velocity: &[f64; JOINTS]) -> f64 {
+    let leg = |pair: &[[f64; JOINTS]]| {
+        let way = |j: usize| (pair[1][j] - pair[0][j]).abs() - 2.0 * blend;
+        (0..JOINTS).map(|j| way(j) / velocity[j]).fold(0.0, f64::max)
+    };
+    positions.windows(2).map(leg).sum()
+}
+
 fn slowed(state: &State, scale: f64) -> Point {
     Point {
         position: state.position,

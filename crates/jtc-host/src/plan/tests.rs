@@ -180,8 +180,41 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
+/// What is too long at the highest speed all the way is refused before anything is planned: the last place could not be held, which is not
+/// found out. Waypoints in degrees are refused as such.
+#[test]
+fn too_long_a_way_is_refused_at_once() {
+    let arm = Arm::avena();
+    let mut config = arm.config();
+    config.payload.mass = 8.0;
+    let planner = Planner { model: Some(&arm.model), blend: 0.05, speed_pct: 1.0, ..Planner::new(&config) };
+    let mut places: Vec<[f64; JOINTS]> =
+        (0..100).map(|i| [if i % 2 == 0 { -1.4 } else { 1.4 }, 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
+    places.push([0.0, 1.4, 0.0, 0.0, 0.0, 0.0]);
+    let error = planner.through(&waypoints(&places)).unwrap_err();
+    assert!(matches!(error, PlanError::TooLong { .. }), "{error}");
+    let held = planner.through(&waypoints(&places[98..])).unwrap_err();
+    assert!(matches!(held, PlanError::Plan(jtc_plan::PlanError::Torque { holding: true, .. })), "{held}");
+    let degrees: Vec<[f64; JOINTS]> = places.iter().map(|q| q.map(f64::to_degrees)).collect();
+    let error = planner.through(&waypoints(&degrees)).unwrap_err();
+    assert!(matches!(error, PlanError::Plan(jtc_plan::PlanError::Position { .. })), "{error}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// The least time that is known beforehand is no longer than that of the plan, also where most waypoints lie within a blend.
+    #[test]
+    fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..0.6f64, speed in 20.0..100.0f64) {
+        let config = Config::avena();
+        let planner = Planner { blend, speed_pct: speed, ..Planner::new(&config) };
+        let size = if dense { 0.1 } else { 1.0 };
+        let places: Vec<_> = places.iter().map(|q| q.map(|q| size * q)).collect();
+        let velocity = planner.limits(&places).unwrap().velocity;
+        let least = least_s(&places, blend, &velocity);
+        let planned = planner.through(&waypoints(&places)).unwrap();
+        prop_assert!(least <= planned.trajectory.duration_s(), "{least} s");
+    }
 
     /// Without a limit of jerk, too, the position that the controller computes between the points (J-32) keeps the acceleration.
     #[test]

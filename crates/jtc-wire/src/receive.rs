@@ -111,6 +111,11 @@ impl StatusReceiver {
         Some(frame)
     }
 
+    /// The bytes of the frame that [`next_frame`](Self::next_frame) returned last, for passing it on.
+    pub fn frame_bytes(&self) -> &[u8] {
+        self.held.get(..self.used).unwrap_or(&[])
+    }
+
     /// Bytes and statuses received so far.
     pub fn counters(&self) -> StatusCounters {
         self.counters
@@ -208,5 +213,32 @@ mod tests {
                 (2, 5, 0)
             );
         }
+    }
+
+    #[test]
+    fn j04_j08_a_status_that_is_passed_on_has_another_record_and_nothing_else_changed() {
+        use crate::response::{DataStatus, Response};
+        let emitted = Status { point: 77, ..Status::default() }.emit();
+        let record = Response::good(FrameType::GetInfo, DataStatus::NotAllowed, 6);
+        // As other builds send it, too: without a gripper, and with a short index.
+        for (cut, length) in [(0..0, 175), (163..173, 165), (17..19, 173)] {
+            let mut bytes: Vec<u8> =
+                emitted.iter().enumerate().filter(|(i, _)| !cut.contains(i)).map(|(_, b)| *b).collect();
+            bytes[field::LENGTH].copy_from_slice(&(length as u16).to_be_bytes());
+            let end = length - field::CRC_LEN;
+            let crc = crate::crc16(&bytes[..end]);
+            bytes[end..].copy_from_slice(&crc.to_be_bytes());
+            let before = Status::parse(&bytes).expect("it is a status");
+            let mut receiver = StatusReceiver::new();
+            assert!(receiver.next_frame(&mut &bytes[..]).is_some());
+            let mut passed = receiver.frame_bytes().to_vec();
+            assert_eq!(passed, bytes);
+            assert!(Status::replace_response(&mut passed, &record));
+            assert_eq!(Status::parse(&passed), Some(Status { response: record, ..before }));
+            passed[40] ^= 1;
+            assert!(!Status::replace_response(&mut passed, &record), "it is damaged");
+        }
+        let mut info = crate::fixed::GET_INFO;
+        assert!(!Status::replace_response(&mut info, &record));
     }
 }

@@ -301,6 +301,24 @@ impl Status {
         })
     }
 
+    /// Puts another record into the bytes of a good status, whatever its layout: for whoever passes it on to several hosts. False, and
+    /// nothing is changed, when the bytes are none.
+    pub fn replace_response(bytes: &mut [u8], response: &Response) -> bool {
+        use field::*;
+        let status = |frame: crate::FrameRef<'_>| frame.frame_type == FrameType::JtcStatus;
+        if !crate::FrameRef::new_checked(bytes).is_some_and(status) {
+            return false;
+        }
+        bytes[RESPONSE_TYPE] = response.frame_type;
+        bytes[RESPONSE_STATUS] = response.status as u8;
+        bytes[RESPONSE_DATA] = response.data as u8;
+        bytes[RESPONSE_LENGTH].copy_from_slice(&response.length.to_be_bytes());
+        let crc = crc16(&bytes[..bytes.len() - frame_field::CRC_LEN]);
+        let end = bytes.len() - frame_field::CRC_LEN;
+        bytes[end..].copy_from_slice(&crc.to_be_bytes());
+        true
+    }
+
     /// Start or Init: the controller does not hold the arm yet.
     pub fn is_coming_up(&self) -> bool {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])

@@ -41,6 +41,14 @@ pub enum LinkError {
         /// The request.
         request: FrameType,
     },
+    /// The request did not get to the controller: the line is shared with others.
+    #[error("{}: not sent: {reason}", words::request(*request))]
+    Denied {
+        /// The request.
+        request: FrameType,
+        /// Why.
+        reason: String,
+    },
     /// The controller refused a request.
     #[error("{}: {} (state {}, trajectory {})", words::request(*request), words::data_status(*code), state, trajectory)]
     Refused {
@@ -86,6 +94,11 @@ impl Diagnose for LinkError {
                 "no-extension",
                 "its firmware knows the protocol of existing devices only; `jtc info` shows what could be found out",
             ),
+            Self::Denied { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "not-sent",
+                "`jtc status` shows the state, and the agent's status who commands; a Stop and a Pause are taken from everyone",
+            ),
             Self::Refused { request, code, state, trajectory } => {
                 let next = match request {
                     FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
@@ -104,7 +117,7 @@ impl Diagnose for LinkError {
 impl LinkError {
     /// The line or the port failed: whether the controller received the request is not known.
     pub(crate) fn is_loss(&self) -> bool {
-        !matches!(self, Self::Refused { .. } | Self::NoExtension { .. })
+        !matches!(self, Self::Refused { .. } | Self::Denied { .. } | Self::NoExtension { .. })
     }
 }
 

@@ -40,6 +40,30 @@ pub enum PortError {
         /// Name given.
         path: String,
     },
+    /// No agent is there.
+    #[error("{url}: no agent answers: {what}")]
+    NoAgent {
+        /// Address given.
+        url: String,
+        /// What was found.
+        what: String,
+    },
+    /// An agent does not let this client in.
+    #[error("{url}: the agent does not let this program in: {what}")]
+    NotLetIn {
+        /// Address given.
+        url: String,
+        /// Its words.
+        what: String,
+    },
+    /// The connection to an agent is lost.
+    #[error("{url}: the connection to the agent is lost: {what}")]
+    AgentGone {
+        /// Address given.
+        url: String,
+        /// What happened.
+        what: String,
+    },
     /// The other end takes no bytes.
     #[error("{path}: no byte could be written for {seconds:.1} s")]
     Stalled {
@@ -87,6 +111,11 @@ impl Diagnose for PortError {
             PortError::Busy { .. } => "close the program that has it and try again".into(),
             PortError::Baud { .. } => "try `--baud 115200`, the rate the controller starts with".into(),
             PortError::Gone { .. } => "plug it in again, then `jtc ports`".into(),
+            PortError::NoAgent { .. } => "`jtc serve` starts an agent and prints its address".into(),
+            PortError::NotLetIn { .. } => {
+                "give the token with --token-file, the file that `jtc serve` names when it starts".into()
+            }
+            PortError::AgentGone { url, .. } => format!("`jtc status --port {url}` shows whether it is back"),
             PortError::Stalled { .. } => {
                 "check cable and power; a device with flow control holds the line: the controller uses none".into()
             }
@@ -98,7 +127,12 @@ impl Diagnose for PortError {
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
             PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
         };
-        Diagnosis::new(ErrorKind::NoLink, "port", next)
+        let (kind, code) = match self {
+            PortError::NotLetIn { .. } => (ErrorKind::Refused, "not-let-in"),
+            PortError::NoAgent { .. } | PortError::AgentGone { .. } => (ErrorKind::NoLink, "no-agent"),
+            _ => (ErrorKind::NoLink, "port"),
+        };
+        Diagnosis::new(kind, code, next)
     }
 }
 

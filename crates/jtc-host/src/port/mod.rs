@@ -32,6 +32,11 @@ pub trait Port {
     fn name(&self) -> String {
         "port".to_owned()
     }
+    /// Why the frame that was refused last did not get to the device, in words; `None` where it was the device that refused it. Only
+    /// a line that is shared with others has something to say here.
+    fn take_denial(&mut self) -> Option<String> {
+        None
+    }
 }
 
 impl<P: Port + ?Sized> Port for Box<P> {
@@ -49,6 +54,9 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
     fn name(&self) -> String {
         (**self).name()
+    }
+    fn take_denial(&mut self) -> Option<String> {
+        (**self).take_denial()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The simulated controller, drives and arm in this process, as a port in virtual time.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use jtc_sim::World;
 
@@ -78,5 +78,76 @@ impl Port for SimPort {
 
     fn name(&self) -> String {
         "simulator".to_owned()
+    }
+}
+
+/// Longest simulated time that is made up for at once; after a longer delay (a suspended computer) time goes on from there.
+const CATCH_UP: Duration = Duration::from_secs(2);
+
+/// A world as a port in the time of this computer, as a real controller would be.
+pub struct LivePort {
+    world: World,
+    start: Instant,
+    /// Real time that was left out.
+    left_out: Duration,
+    name: String,
+}
+
+impl LivePort {
+    /// A port of `world`, whose time begins now.
+    pub fn new(world: World) -> Self {
+        Self {
+            world,
+            start: Instant::now(),
+            left_out: Duration::ZERO,
+            name: "simulated controller".to_owned(),
+        }
+    }
+
+    /// Lets the world come up to now.
+    fn catch_up(&mut self) {
+        let world = Duration::from_micros(self.world.now_us());
+        let behind = self.now().saturating_sub(world);
+        if behind > CATCH_UP {
+            self.left_out += behind;
+        }
+        // By this clock once: a slow computer is to come out of it.
+        let now = self.now();
+        while Duration::from_micros(self.world.now_us()) < now {
+            self.world.step();
+        }
+    }
+}
+
+impl Port for LivePort {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        let end = Instant::now() + timeout;
+        loop {
+            self.catch_up();
+            let n = self.world.host_read(buffer);
+            let left = end.saturating_duration_since(Instant::now());
+            if n > 0 || left.is_zero() {
+                return Ok(n);
+            }
+            std::thread::sleep(left.min(Duration::from_millis(1)));
+        }
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.catch_up();
+        self.world.host_write(bytes);
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.start.elapsed().saturating_sub(self.left_out)
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.world.config().baud
+    }
+
+    fn name(&self) -> String {
+        self.name.clone()
     }
 }

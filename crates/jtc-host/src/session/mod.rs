@@ -263,6 +263,8 @@ impl<P: Port> Session<P> {
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let mut bad = None;
+        // What was denied before was another one.
+        self.port.take_denial();
         self.catch_up()?;
         self.records.clear();
         for attempt in 0..self.timeouts.tries {
@@ -309,7 +311,11 @@ impl<P: Port> Session<P> {
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    fn refused(&self, record: Response) -> LinkError {
+    /// Why the request with this record was refused: by the device, or by who shares the line with us.
+    fn refused(&mut self, record: Response) -> LinkError {
+        if let Some(reason) = self.port.take_denial() {
+            return LinkError::Denied { request: frame_type(record.frame_type), reason };
+        }
         let last = self.last.unwrap_or_default();
         LinkError::Refused {
             request: frame_type(record.frame_type),

@@ -4,11 +4,13 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use jtc_core::{POINTS_MAX, SEGMENTS_MAX};
-use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN, TrajectoryState};
+use jtc_wire::{
+    DataStatus, EncodeError, FrameStatus, FrameType, RawPoint, Response, STATUS_LEN, TrajectoryState,
+};
 
 use super::{Flow, Session};
 use crate::check::CheckedTrajectory;
-use crate::error::{Error, UploadError, accepted};
+use crate::error::{Error, LinkError, UploadError, accepted};
 use crate::frame;
 use crate::port::{Port, line_time};
 use crate::trajectory::UploadOptions;
@@ -330,6 +332,9 @@ impl<P: Port> Session<P> {
             }
             DataStatus::IncorrectSegmentOrder => self.start_over(up),
             code => {
+                if let Some(reason) = self.port.take_denial() {
+                    return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
+                }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
                     .into())
             }

@@ -1,0 +1,330 @@
+//! Who is let in: tokens, and where a request may come from.
+//!
+//! A page of another site that somebody has open in a browser can send requests to this computer's own address. It is known by its `Origin`;
+//! and one that has made a name of its own point here (DNS rebinding) by its `Host`. Both are refused, whatever token they have.
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write as _};
+use std::net::{IpAddr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use subtle::ConstantTimeEq as _;
+
+use crate::line::Role;
+
+/// Wrong tokens from one address in a minute that are answered as such, and from all.
+const WRONG_MAX: usize = 20;
+const ALL_WRONG_MAX: usize = 2000;
+const MINUTE: Duration = Duration::from_secs(60);
+
+/// The tokens of an agent, as its token file has them.
+#[derive(Clone, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tokens {
+    /// Lets its bearer command.
+    pub operator: String,
+    /// Lets its bearer look and stop.
+    pub viewer: String,
+}
+
+/// Why there are no tokens.
+#[derive(Debug, thiserror::Error)]
+pub enum TokenError {
+    /// It cannot be read or written.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// Others can read it.
+    #[error("{path}: mode {mode:04o}: other users can read this token file", path = path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Its mode.
+        mode: u32,
+    },
+    /// It has other contents.
+    #[error("{path}: no token file: {what}", path = path.display())]
+    Contents {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+    /// The system has no random numbers.
+    #[error("no random numbers from this system: {0}")]
+    Random(getrandom::Error),
+}
+
+impl host_kit::Diagnose for TokenError {
+    fn diagnosis(&self) -> host_kit::Diagnosis {
+        let next = match self {
+            Self::Open { path, .. } => format!("`chmod 600 {}`", path.display()),
+            Self::Contents { path, .. } => {
+                format!(
+                    "remove {}, and new tokens are made; or name another with --token-file",
+                    path.display()
+                )
+            }
+            Self::Io { .. } | Self::Random(_) => "name a file that you may write with --token-file".into(),
+        };
+        host_kit::Diagnosis::new(host_kit::ErrorKind::Usage, "token-file", next)
+    }
+}
+
+/// 32 random bytes as text.
+fn random() -> Result<String, TokenError> {
+    let mut bytes = [0; 32];
+    getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
+    Ok(URL_SAFE_NO_PAD.encode(bytes))
+}
+
+impl Tokens {
+    /// Those of a file.
+    ///
+    /// # Errors
+    ///
+    /// The file can be read by others, is none, or cannot be read.
+    pub fn load(path: &Path) -> Result<Self, TokenError> {
+        let contents = |what: String| TokenError::Contents { path: path.to_owned(), what };
+        let text =
+            fs::read_to_string(path).map_err(|source| TokenError::Io { path: path.to_owned(), source })?;
+        check_mode(path)?;
+        let tokens: Self = toml::from_str(&text).map_err(|e| contents(e.message().to_owned()))?;
+        let short = [&tokens.operator, &tokens.viewer].into_iter().any(|token| token.len() < 20);
+        if short || tokens.operator == tokens.viewer {
+            let what = "`operator` and `viewer` are two different tokens of 20 characters or more";
+            return Err(contents(what.into()));
+        }
+        Ok(tokens)
+    }
+
+    /// Those of the file, or new ones in a new file that only its owner can read. True: they are new.
+    ///
+    /// # Errors
+    ///
+    /// The file can be read by others, is none, or cannot be read or written.
+    pub fn load_or_make(path: &Path) -> Result<(Self, bool), TokenError> {
+        match Self::load(path) {
+            Err(TokenError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {}
+            loaded => return Ok((loaded?, false)),
+        }
+        let tokens = Self { operator: random()?, viewer: random()? };
+        let write = || {
+            if let Some(parent) = path.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            let text = format!(
+                "# Lets its bearer command the arm.\noperator = \"{}\"\n# Lets its bearer look, stop and pause.\nviewer = \"{}\"\n",
+                tokens.operator, tokens.viewer
+            );
+            private(path)?.write_all(text.as_bytes())
+        };
+        write().map_err(|source| TokenError::Io { path: path.to_owned(), source })?;
+        Ok((tokens, true))
+    }
+}
+
+/// The token file of this user, where none is named.
+pub fn default_token_file() -> Option<PathBuf> {
+    let dir = |name: &str| std::env::var_os(name).filter(|dir| !dir.is_empty()).map(PathBuf::from);
+    let state = dir("XDG_STATE_HOME").or_else(|| Some(dir("HOME")?.join(".local/state")))?;
+    Some(state.join("openjtc").join("tokens.toml"))
+}
+
+/// A new file that only its owner can read.
+pub(crate) fn private(path: &Path) -> io::Result<fs::File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path)
+}
+
+#[cfg(unix)]
+fn check_mode(path: &Path) -> Result<(), TokenError> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let metadata = fs::metadata(path).map_err(|source| TokenError::Io { path: path.to_owned(), source })?;
+    let mode = metadata.permissions().mode() & 0o777;
+    if mode & 0o077 == 0 { Ok(()) } else { Err(TokenError::Open { path: path.to_owned(), mode }) }
+}
+
+#[cfg(not(unix))]
+fn check_mode(_: &Path) -> Result<(), TokenError> {
+    Ok(())
+}
+
+/// Why a request is not let in.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// It asks for another name than this agent has.
+    #[error("this agent is not {0}: it is asked for by its address, or by a name given with --name")]
+    Host(String),
+    /// It was made by a page of another site.
+    #[error("a page of {0} may not use this agent")]
+    Origin(String),
+    /// Its token is none of this agent's.
+    #[error("the token is none of this agent's")]
+    WrongToken,
+    /// It needs a token.
+    #[error("a token is needed: `Authorization: Bearer …`")]
+    NoToken,
+    /// Too many wrong tokens came from there.
+    #[error("too many wrong tokens came from this address")]
+    TooManyWrong,
+}
+
+/// What a request says of itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Whose address it comes from.
+    pub peer: IpAddr,
+    /// `Host`.
+    pub host: Option<&'a str>,
+    /// `Origin`, which browsers send.
+    pub origin: Option<&'a str>,
+    /// The token, if it has one.
+    pub token: Option<&'a str>,
+}
+
+/// Who is let in.
+pub struct Access {
+    tokens: Tokens,
+    /// Names and addresses, with the port, that this agent is asked for by.
+    hosts: Vec<String>,
+    /// When a wrong token came, and from whom.
+    wrong: Mutex<Vec<(IpAddr, Instant)>>,
+}
+
+impl Access {
+    /// Of an agent that listens at `listen`, and has these names beside its address.
+    pub fn new(tokens: Tokens, listen: SocketAddr, names: &[String]) -> Self {
+        let port = listen.port();
+        let mut hosts: Vec<String> = names
+            .iter()
+            .flat_map(|name| [name.to_lowercase(), format!("{}:{port}", name.to_lowercase())])
+            .collect();
+        hosts.push(listen.to_string());
+        if listen.ip().is_loopback() || listen.ip().is_unspecified() {
+            hosts.extend(["localhost", "127.0.0.1", "[::1]"].map(|name| format!("{name}:{port}")));
+        }
+        Self { tokens, hosts, wrong: Mutex::new(Vec::new()) }
+    }
+
+    /// What this request may do.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`].
+    pub fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
+        let host = request.host.unwrap_or_default().to_lowercase();
+        if !self.hosts.contains(&host) {
+            return Err(Refusal::Host(if host.is_empty() { "named".into() } else { host }));
+        }
+        if let Some(origin) = request.origin {
+            let site = origin.to_lowercase();
+            let site = site.strip_prefix("http://").or_else(|| site.strip_prefix("https://"));
+            // Its own page, not one of another agent on this computer.
+            if site != Some(host.as_str()) {
+                return Err(Refusal::Origin(origin.to_owned()));
+            }
+        }
+        match request.token {
+            Some(token) => self.bearer(token, request.peer),
+            None if request.peer.to_canonical().is_loopback() => Ok(Role::Viewer),
+            None => Err(Refusal::NoToken),
+        }
+    }
+
+    fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {
+        let is = |other: &str| bool::from(token.as_bytes().ct_eq(other.as_bytes()));
+        // Both are compared, and first: nobody's wrong tokens keep those who have a right one from stopping an arm.
+        match (is(&self.tokens.operator), is(&self.tokens.viewer)) {
+            (true, _) => return Ok(Role::Operator),
+            (_, true) => return Ok(Role::Viewer),
+            _ => {}
+        }
+        let mut wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
+        wrong.retain(|(_, at)| at.elapsed() < MINUTE);
+        if wrong.iter().filter(|(from, _)| *from == peer).count() >= WRONG_MAX || wrong.len() >= ALL_WRONG_MAX
+        {
+            return Err(Refusal::TooManyWrong);
+        }
+        wrong.push((peer, Instant::now()));
+        Err(Refusal::WrongToken)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: &str = "127.0.0.1:8780";
+
+    fn access() -> Access {
+        let tokens = Tokens { operator: "o".repeat(43), viewer: "v".repeat(43) };
+        Access::new(tokens, HERE.parse().expect("an address"), &["arm.example".into()])
+    }
+
+    fn role(
+        access: &Access,
+        peer: &str,
+        host: Option<&str>,
+        origin: Option<&str>,
+        token: Option<&str>,
+    ) -> Result<Role, Refusal> {
+        access.role(&Request { peer: peer.parse().expect("an address"), host, origin, token })
+    }
+
+    #[test]
+    fn pages_of_other_sites_and_names_that_are_not_ours_are_refused_with_any_token() {
+        let (access, operator) = (access(), "o".repeat(43));
+        for host in [HERE, "localhost:8780", "[::1]:8780", "ARM.example", "arm.example:8780"] {
+            assert_eq!(role(&access, "127.0.0.1", Some(host), None, Some(&operator)), Ok(Role::Operator));
+            let own = format!("http://{host}");
+            assert_eq!(role(&access, "127.0.0.1", Some(host), Some(&own), None), Ok(Role::Viewer));
+        }
+        for host in [
+            None,
+            Some(""),
+            Some("evil.example"),
+            Some("evil.example:8780"),
+            Some("127.0.0.1"),
+            Some("127.0.0.1:80"),
+        ] {
+            let refused = role(&access, "127.0.0.1", host, None, Some(&operator));
+            assert!(matches!(refused, Err(Refusal::Host(_))), "{host:?}");
+        }
+        for origin in [
+            "http://evil.example",
+            "null",
+            "http://localhost:8781",
+            "file://",
+            "https://127.0.0.1:8780.evil.example",
+        ] {
+            let refused = role(&access, "127.0.0.1", Some(HERE), Some(origin), Some(&operator));
+            assert!(matches!(refused, Err(Refusal::Origin(_))), "{origin}");
+        }
+    }
+
+    #[test]
+    fn from_elsewhere_nobody_gets_in_without_a_token_and_wrong_ones_are_counted() {
+        let access = access();
+        let from = |token: Option<&str>| role(&access, "10.0.0.9", Some(HERE), None, token);
+        assert_eq!(from(None), Err(Refusal::NoToken));
+        assert_eq!(from(Some(&"v".repeat(43))), Ok(Role::Viewer));
+        for _ in 0..WRONG_MAX {
+            assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::WrongToken));
+        }
+        assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::TooManyWrong));
+        // Nobody is kept out by that who has a right one, or needs none.
+        assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
+        assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
+    }
+}

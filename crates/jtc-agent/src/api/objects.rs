@@ -1,0 +1,135 @@
+//! What the API sends: one type for each object, from which its description is made.
+use jtc_host::sample::is_measured;
+use jtc_host::words;
+use jtc_wire::{Joint, Status};
+use utoipa::ToSchema;
+
+use crate::line::Role;
+
+/// The controller, as its last status has it.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct StatusObject {
+    /// No arm moves: the controller is simulated.
+    pub simulated: bool,
+    /// Name of the port.
+    pub port: String,
+    /// Why the port is gone; missing while it is there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost: Option<String>,
+    /// Time since the last status, ms; missing before the first. Old values are not those of now.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_ms: Option<u64>,
+    /// Missing before the first status.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub controller: Option<ControllerObject>,
+    /// Who commands; missing where nobody does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lease: Option<LeaseObject>,
+    /// How many clients are on the line.
+    pub clients: usize,
+    /// What the caller may do.
+    pub role: Role,
+}
+
+/// What the controller reports.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ControllerObject {
+    /// State, in the words of the protocol.
+    pub state: String,
+    /// What becomes of the trajectory.
+    pub trajectory: String,
+    /// The 1 ms point of the trajectory that the controller is at.
+    pub point: u32,
+    /// Errors now.
+    pub errors: Vec<String>,
+    /// Errors since they were cleared last.
+    pub errors_occurred: Vec<String>,
+    /// Joints, from the base.
+    #[schema(min_items = 6, max_items = 6)]
+    pub joints: Vec<JointObject>,
+    /// What helps now; empty where nothing is wrong.
+    pub next: String,
+}
+
+/// What the controller reports of a joint.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct JointObject {
+    /// 1 to 6, from the base.
+    pub joint: u8,
+    /// State of its drive.
+    pub state: String,
+    /// rad; missing where it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_rad: Option<f32>,
+    /// rad/s; missing alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_rad_s: Option<f32>,
+    /// N·m; missing alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_nm: Option<f32>,
+    /// °C; missing alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<u8>,
+    /// Errors that the controller has found at it.
+    pub errors: Vec<String>,
+}
+
+/// Who commands.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LeaseObject {
+    /// Its name.
+    pub holder: String,
+    /// For how long, ms.
+    pub age_ms: u64,
+    /// How long it lasts without renewal, ms; missing: as long as the client is connected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_ms: Option<u64>,
+    /// Who has asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_by: Option<String>,
+}
+
+/// A command that was handed to the line.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct SentObject {
+    /// What was sent: `stop` or `pause`.
+    pub sent: String,
+}
+
+/// Why something was not done.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ErrorObject {
+    /// Short name, for programs.
+    pub code: String,
+    /// What was wrong, for people.
+    pub message: String,
+    /// What helps.
+    pub next: String,
+}
+
+impl From<&Status> for ControllerObject {
+    fn from(status: &Status) -> Self {
+        let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
+        let joints = Joint::ALL.into_iter().zip(&status.joints).map(|(joint, values)| {
+            let measured = is_measured(status, joint.index());
+            JointObject {
+                joint: joint.number(),
+                state: values.state.name().to_owned(),
+                position_rad: measured.then_some(values.position),
+                velocity_rad_s: measured.then_some(values.velocity),
+                torque_nm: measured.then_some(values.torque),
+                temperature_c: measured.then_some(values.temperature),
+                errors: texts(words::joint_errors(values.internal)),
+            }
+        });
+        Self {
+            state: status.state.name().to_owned(),
+            trajectory: status.trajectory.name().to_owned(),
+            point: status.point,
+            errors: texts(words::errors(status.errors)),
+            errors_occurred: texts(words::errors(status.occurred)),
+            joints: joints.collect(),
+            next: words::next_step(status).replace('`', ""),
+        }
+    }
+}

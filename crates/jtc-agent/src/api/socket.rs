@@ -1,0 +1,280 @@
+//! A client's end of the line as a WebSocket: binary messages are bytes of the line, text messages are what an agent has to say.
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::Extension;
+use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade};
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt as _, StreamExt as _};
+use serde_json::json;
+use tokio::time::MissedTickBehavior;
+
+use super::{Agent, Caller};
+use crate::line::{ClientId, Delivery, Introduction, LineEvent, Policy, Role};
+use crate::owner::Line;
+
+/// Longest message that a client may send.
+const MESSAGE_MAX: usize = 64 << 10;
+/// How long a client may leave a message untaken.
+const SEND_TIME: Duration = Duration::from_secs(5);
+/// How often a client shows that it is there.
+const PING_TIME: Duration = Duration::from_secs(1);
+/// Of so many in a row nothing is heard: it commands no more.
+const SILENT_MAX: u32 = 4;
+/// Longest name of a client.
+const NAME_MAX: usize = 64;
+/// The socket was closed because the client was put out: it sent no frames, or did not read.
+pub const CLOSE_PUT_OUT: u16 = 4000;
+
+/// How a client introduces itself, in the address of the socket.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Joining {
+    /// What people are to call it.
+    name: Option<String>,
+    /// What becomes of its motion without it.
+    #[serde(default)]
+    policy: Policy,
+}
+
+/// The first message of an agent.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Hello {
+    /// Name of the port.
+    pub port: String,
+    /// Rate of the line, Bd, if it has one.
+    pub baud: Option<u32>,
+    /// No arm moves.
+    pub simulated: bool,
+    /// What this client may do.
+    pub role: Role,
+}
+
+/// What an agent has to say to a client.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Notice {
+    /// The first message.
+    Hello(Hello),
+    /// A frame was not passed on.
+    Denied {
+        /// Why.
+        why: String,
+    },
+    /// What was asked about the lease was not done.
+    LeaseDenied {
+        /// Why.
+        why: String,
+    },
+    /// Another client asks for the lease.
+    LeaseWanted {
+        /// Its name.
+        by: String,
+    },
+}
+
+impl Notice {
+    fn message(&self) -> Message {
+        // Made of strings and numbers.
+        Message::Text(serde_json::to_string(self).unwrap_or_default().into())
+    }
+}
+
+/// What a client asks of the agent itself.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Wish {
+    lease: LeaseWish,
+}
+
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum LeaseWish {
+    Take,
+    Release,
+    /// The client that has it is asked to let it go.
+    Ask,
+}
+
+/// `GET /api/line`: an end of the line for a client.
+pub(super) async fn line(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Query(joining): Query<Joining>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let sockets = if caller.role == Role::Operator { &agent.operators } else { &agent.viewers };
+    let Ok(permit) = sockets.clone().try_acquire_owned() else {
+        return StatusCode::SERVICE_UNAVAILABLE.into_response();
+    };
+    let upgrade = upgrade.max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
+    upgrade.on_upgrade(async move |socket| {
+        serve(&agent, &caller, joining, socket).await;
+        drop(permit);
+    })
+}
+
+/// A client that goes when this does.
+struct Joined {
+    line: Line,
+    client: ClientId,
+}
+
+impl Drop for Joined {
+    fn drop(&mut self) {
+        self.line.with(|line, now| line.leave(self.client, now));
+    }
+}
+
+async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: WebSocket) {
+    let name: String =
+        joining.name.unwrap_or_default().chars().filter(|c| !c.is_control()).take(NAME_MAX).collect();
+    let name = if name.is_empty() { caller.peer.to_string() } else { name };
+    let role = caller.role;
+    let introduction = Introduction { name: name.clone(), role, policy: joining.policy };
+    let client = agent.line.with(|line, _| line.join(introduction));
+    let joined = Joined { line: agent.line.clone(), client };
+    agent.note(
+        "joined",
+        json!({ "client": client.0, "name": name, "role": role, "from": caller.peer.to_string() }),
+    );
+    let hello =
+        Hello { port: agent.port.to_string(), baud: agent.line.baud(), simulated: agent.simulated, role };
+    if matches!(
+        tokio::time::timeout(SEND_TIME, socket.send(Notice::Hello(hello).message())).await,
+        Ok(Ok(()))
+    ) {
+        pass(&agent.line, client, socket).await;
+    }
+    drop(joined);
+    agent.note("left", json!({ "client": client.0, "name": name }));
+}
+
+/// Passes messages both ways until one end has gone. Neither waits for the other: a Stop is read also where nothing is taken.
+async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
+    let heard = AtomicBool::new(true);
+    let (to, from) = socket.split();
+    tokio::select! {
+        () = receive(line, client, from, &heard) => {}
+        () = deliver(line, client, to, &heard) => {}
+    }
+}
+
+/// What the client sends.
+async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>, heard: &AtomicBool) {
+    while let Some(Ok(message)) = from.next().await {
+        heard.store(true, Ordering::Relaxed);
+        match message {
+            Message::Binary(bytes) => line.with(|line, now| line.from_client(client, &bytes, now)),
+            Message::Text(text) => wish(line, client, &text),
+            Message::Pong(number) => {
+                let number = number.as_ref().try_into().map_or(0, u64::from_be_bytes);
+                line.with(|line, _| line.confirm_halt(client, number));
+            }
+            Message::Ping(_) => {}
+            Message::Close(_) => return,
+        }
+    }
+}
+
+/// What it is to get; and whether it is there.
+async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, heard: &AtomicBool) {
+    let mut changes = line.changes();
+    let mut pings = tokio::time::interval(PING_TIME);
+    // What this computer has missed is no silence of the client.
+    pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let (mut pinged, mut silent) = (0, 0);
+    loop {
+        let (deliveries, halt) = line.with(|line, _| (line.take_deliveries(client), line.last_halt()));
+        let Some(deliveries) = deliveries else {
+            let reason = Utf8Bytes::from_static("put out: no frames, too many of them, or nothing read");
+            send(&mut to, Message::Close(Some(CloseFrame { code: CLOSE_PUT_OUT, reason }))).await;
+            return;
+        };
+        for delivery in deliveries {
+            let message = match delivery {
+                Delivery::Bytes(bytes) => Message::Binary(bytes.into()),
+                Delivery::Denied(denied) => Notice::Denied { why: denied.to_string() }.message(),
+                Delivery::LeaseDenied(denied) => Notice::LeaseDenied { why: denied.to_string() }.message(),
+                Delivery::LeaseWanted(by) => Notice::LeaseWanted { by }.message(),
+            };
+            if !send(&mut to, message).await {
+                return;
+            }
+        }
+        if line.lost().is_some() {
+            return;
+        }
+        let mut ping = halt != pinged;
+        if !ping {
+            tokio::select! {
+                changed = changes.changed() => if changed.is_err() { return },
+                _ = pings.tick() => {
+                    ping = true;
+                    silent = if heard.swap(false, Ordering::Relaxed) { 0 } else { silent + 1 };
+                    if silent >= SILENT_MAX {
+                        line.with(|line, now| line.lapse(client, now));
+                    }
+                }
+            }
+        }
+        // The answer comes behind everything that the client had sent before it knew of the last halt.
+        if ping && !send(&mut to, Message::Ping(halt.to_be_bytes().to_vec().into())).await {
+            return;
+        }
+        if ping {
+            pinged = halt;
+        }
+    }
+}
+
+/// What a client asks of the agent; what is none is passed over.
+fn wish(line: &Line, client: ClientId, text: &str) {
+    let Ok(Wish { lease: wish }) = serde_json::from_str(text) else { return };
+    line.with(|line, now| {
+        let done = match wish {
+            LeaseWish::Take => line.take_lease(client, None, now),
+            LeaseWish::Release => line.release_lease(client, now),
+            LeaseWish::Ask => line.want_lease(client),
+        };
+        if let Err(denied) = done {
+            line.notify(client, Delivery::LeaseDenied(denied));
+        }
+    });
+    line.wake();
+}
+
+/// False when the client does not take it.
+async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
+    matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
+}
+
+/// An event of the line as a line of the log of commands; `None` for what is none of its business.
+pub fn logged(event: &LineEvent) -> Option<(&'static str, serde_json::Value)> {
+    match event {
+        LineEvent::Sent { client, frame_type, .. } => {
+            Some(("sent", json!({ "client": client.0, "frame": frame_type.name() })))
+        }
+        LineEvent::Answered { client, response } => {
+            Some(("answered", json!({ "client": client.0, "response": response.to_string() })))
+        }
+        LineEvent::Denied { client, frame_type, denied } => Some((
+            "denied",
+            json!({ "client": client.0, "frame": frame_type.name(), "why": denied.to_string() }),
+        )),
+        LineEvent::Lease(lease) => {
+            Some(("lease", json!({ "client": lease.as_ref().map(|lease| lease.holder.0) })))
+        }
+        LineEvent::PolicyApplied { client, policy } => {
+            Some(("policy", json!({ "client": client.0, "policy": policy })))
+        }
+        LineEvent::NotTaken => Some(("not-taken", json!({ "frame": "TrajSetExecStatus" }))),
+        LineEvent::PutOut { client, reason } => {
+            Some(("put-out", json!({ "client": client.0, "why": reason.to_string() })))
+        }
+        LineEvent::Status(_) => None,
+    }
+}

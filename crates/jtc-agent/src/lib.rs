@@ -1,0 +1,12 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod access;
+pub mod api;
+pub mod line;
+pub mod log;
+pub mod owner;
+pub mod serve;
+
+pub use line::{ClientId, Denied, Introduction, Lease, LineEvent, Policy, Role, SharedLine};
+pub use owner::{ClientPort, Line, Owner};

@@ -1,0 +1,209 @@
+//! A client on the line: what it has sent, what it is to get.
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jtc_wire::{FRAME_MAX, FRAME_MIN, FrameRef, Response};
+
+use super::Denied;
+
+/// Bytes of frames that a client may have waiting: a trajectory in flight and some commands.
+const WAITING_MAX: usize = 8 * FRAME_MAX;
+/// Bytes that wait for a client that does not take them: two minutes of statuses.
+const UNREAD_MAX: usize = 1 << 20;
+
+/// Frames that a client may send, in a second and at once.
+const FRAMES_PER_S: f64 = 250.0;
+const FRAMES_AT_ONCE: f64 = 500.0;
+/// Records that may wait for a client whose frames are refused: one goes with each status.
+const REFUSALS_MAX: usize = 600;
+
+/// A client by number; numbers are not used again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+pub struct ClientId(pub u64);
+
+/// What a client may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Look, stop and pause.
+    Viewer,
+    /// All of it, one at a time.
+    Operator,
+}
+
+/// What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Policy {
+    /// It goes on, as with a host whose cable is pulled.
+    #[default]
+    Continue,
+    /// It pauses on the path.
+    Pause,
+    /// It stops on the path.
+    Stop,
+}
+
+/// How a client presents itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Introduction {
+    /// What people call it.
+    pub name: String,
+    /// What it may do.
+    pub role: Role,
+    /// What becomes of its motion without it.
+    pub policy: Policy,
+}
+
+/// What a client gets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Delivery {
+    /// Bytes of the device: statuses, and what it asked for.
+    Bytes(Vec<u8>),
+    /// A frame that it sent was not passed on; its record, which says no more than "not allowed", follows in a status.
+    Denied(Denied),
+    /// What it has asked about the lease was not done.
+    LeaseDenied(Denied),
+    /// Another client asks for the lease.
+    LeaseWanted(String),
+}
+
+impl Delivery {
+    fn len(&self) -> usize {
+        match self {
+            Self::Bytes(bytes) => bytes.len(),
+            Self::Denied(_) | Self::LeaseDenied(_) | Self::LeaseWanted(_) => 64,
+        }
+    }
+}
+
+/// Why a client was put out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PutOut {
+    /// It sent bytes that are no frame of a host.
+    #[error("it sent bytes that are no frame of this protocol")]
+    NoFrame,
+    /// It sent more than the line and the others bear.
+    #[error(
+        "it sent more than {FRAMES_PER_S} frames a second, or more than {WAITING_MAX} bytes wait for the line"
+    )]
+    TooMuch,
+    /// It commanded, and nothing was heard of it for seconds.
+    #[error("it commanded, and nothing was heard of it for some seconds")]
+    Silent,
+    /// It does not read.
+    #[error("it has left more than {UNREAD_MAX} bytes unread")]
+    Unread,
+}
+
+/// A client.
+pub(super) struct Client {
+    pub introduction: Introduction,
+    /// Bytes of a frame that is not whole yet.
+    partial: Vec<u8>,
+    /// Frames that wait for the line.
+    pub waiting: VecDeque<Vec<u8>>,
+    waiting_bytes: usize,
+    /// Records of frames that were not passed on.
+    refusals: VecDeque<Response>,
+    deliveries: VecDeque<Delivery>,
+    unread: usize,
+    /// No motion begins before: somebody else has stopped the arm.
+    pub calm_until: Duration,
+    /// The last halt of somebody else, by number, and the last that is known to have been seen.
+    pub halted: u64,
+    pub seen: u64,
+    /// Frames that it may send at once, and when that was.
+    allowance: f64,
+    allowed_at: Duration,
+}
+
+impl Client {
+    pub fn new(introduction: Introduction) -> Self {
+        Self {
+            introduction,
+            partial: Vec::new(),
+            waiting: VecDeque::new(),
+            waiting_bytes: 0,
+            refusals: VecDeque::new(),
+            deliveries: VecDeque::new(),
+            unread: 0,
+            calm_until: Duration::ZERO,
+            halted: 0,
+            seen: 0,
+            allowance: FRAMES_AT_ONCE,
+            allowed_at: Duration::ZERO,
+        }
+    }
+
+    /// Takes bytes from the front of `bytes` until a frame is whole.
+    pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<Vec<u8>>, PutOut> {
+        loop {
+            let wanted = match self.partial.get(2..4) {
+                None => 4,
+                Some(length) => usize::from(u16::from_be_bytes([length[0], length[1]])),
+            };
+            if !(4..=FRAME_MAX).contains(&wanted) || (self.partial.len() >= 4 && wanted < FRAME_MIN) {
+                return Err(PutOut::NoFrame);
+            }
+            if self.partial.len() < wanted {
+                if bytes.is_empty() {
+                    return Ok(None);
+                }
+                let (taken, rest) = bytes.split_at((wanted - self.partial.len()).min(bytes.len()));
+                self.partial.extend(taken);
+                *bytes = rest;
+                continue;
+            }
+            let frame = std::mem::take(&mut self.partial);
+            let good = FrameRef::new_checked(&frame).is_some_and(|frame| frame.frame_type.from_host());
+            return if good { Ok(Some(frame)) } else { Err(PutOut::NoFrame) };
+        }
+    }
+
+    /// It may send another frame now.
+    pub fn allow(&mut self, now: Duration) -> Result<(), PutOut> {
+        let passed = now.saturating_sub(self.allowed_at).as_secs_f64();
+        self.allowance = (self.allowance + passed * FRAMES_PER_S).min(FRAMES_AT_ONCE) - 1.0;
+        self.allowed_at = now;
+        if self.allowance < 0.0 { Err(PutOut::TooMuch) } else { Ok(()) }
+    }
+
+    /// A frame of its own was refused: its record goes with one of the next statuses.
+    pub fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
+        self.refusals.push_back(response);
+        if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
+    }
+
+    /// The record of a refused frame that has not gone to it yet.
+    pub fn take_refusal(&mut self) -> Option<Response> {
+        self.refusals.pop_front()
+    }
+
+    /// A frame waits for its turn.
+    pub fn wait(&mut self, frame: Vec<u8>) -> Result<(), PutOut> {
+        self.waiting_bytes += frame.len();
+        self.waiting.push_back(frame);
+        if self.waiting_bytes > WAITING_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
+    }
+
+    /// The next frame in its turn.
+    pub fn take_waiting(&mut self) -> Option<Vec<u8>> {
+        let frame = self.waiting.pop_front()?;
+        self.waiting_bytes -= frame.len();
+        Some(frame)
+    }
+
+    /// Gives it something, if it reads.
+    pub fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
+        self.unread += delivery.len();
+        self.deliveries.push_back(delivery);
+        if self.unread > UNREAD_MAX { Err(PutOut::Unread) } else { Ok(()) }
+    }
+
+    /// What it has not had yet.
+    pub fn take_deliveries(&mut self) -> Vec<Delivery> {
+        self.unread = 0;
+        self.deliveries.drain(..).collect()
+    }
+}

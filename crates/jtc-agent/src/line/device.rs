@@ -1,0 +1,185 @@
+//! The device's side of the line: what is written next, and whose its records are.
+use std::time::Duration;
+
+use jtc_wire::{FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
+
+use super::class::{Class, returned_by};
+use super::outbox::{Outgoing, Passed};
+use super::{
+    ClientId, Delivery, Denied, HALTS, LineEvent, OWNER, RECORD_TIME, RETURN_TIME, Return, Sent, SharedLine,
+    class_of,
+};
+
+impl SharedLine {
+    /// When [`to_device`](Self::to_device) is to be called again if nothing happens before.
+    pub fn due(&self, now: Duration) -> Option<Duration> {
+        let waits = !self.own.is_empty() || self.clients.values().any(|client| !client.waiting.is_empty());
+        let line = match self.outbox.due(now) {
+            None if waits => Some(self.returns.as_ref().map_or(now, |returns| returns.until)),
+            due => due,
+        };
+        let lease = self.lease.as_ref().and_then(|lease| lease.until);
+        // One that waits for the line is due when the line is.
+        let halt = self.halts.due(now).filter(|_| self.outbox.due(now).is_none());
+        [line, lease, halt].into_iter().flatten().min()
+    }
+
+    /// What is to be written to the device now.
+    pub fn to_device(&mut self, now: Duration) -> Vec<u8> {
+        self.end_lapsed(now);
+        self.sent.retain(|sent| now < sent.at + RECORD_TIME);
+        self.returns.take_if(|returns| now >= returns.until);
+        if self.halts.look(now) {
+            self.events.push_back(LineEvent::NotTaken);
+        }
+        let mut all = Vec::new();
+        loop {
+            self.outbox.set_urgent(self.halts.frame().map(|frame| Outgoing { client: HALTS, frame }));
+            if self.outbox.is_free()
+                && let Some(outgoing) = self.next_turn(now)
+            {
+                self.outbox.begin(outgoing);
+            }
+            let (bytes, passed) = self.outbox.next(now);
+            let more = !bytes.is_empty();
+            all.extend(bytes);
+            for passed in passed {
+                match passed {
+                    Passed::Written(outgoing) => self.note_written(outgoing, false),
+                    Passed::Abandoned(outgoing) => {
+                        let by = self.halted.1.clone();
+                        self.refuse(outgoing.client, &outgoing.frame, Denied::Stopped { by });
+                        self.note_written(outgoing, true);
+                    }
+                }
+            }
+            if !more {
+                return all;
+            }
+        }
+    }
+
+    /// The next frame, of each client in turn.
+    fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
+        if let Some(frame) = self.own.pop_front() {
+            return Some(Outgoing { client: OWNER, frame });
+        }
+        self.refuse_without_lease();
+        let after = |id: &ClientId| *id > self.last_turn;
+        let ids: Vec<ClientId> = self.clients.keys().copied().collect();
+        let (first, then): (Vec<ClientId>, Vec<ClientId>) = ids.into_iter().partition(after);
+        for id in first.into_iter().chain(then) {
+            let Some(client) = self.clients.get_mut(&id) else { continue };
+            let Some(frame) = client.waiting.front() else { continue };
+            // What is returned has no number: one request of those at a time (J-50).
+            let returns = FrameRef::new_checked(frame).and_then(|frame| returned_by(frame.frame_type));
+            if returns.is_some() && self.returns.is_some() {
+                continue;
+            }
+            let frame = client.take_waiting()?;
+            if let Some(kind) = returns {
+                let until = self.outbox.free_at().max(now) + RECORD_TIME;
+                self.returns = Some(Return { client: id, kind, until });
+            }
+            self.last_turn = id;
+            return Some(Outgoing { client: id, frame });
+        }
+        None
+    }
+
+    /// Frames that were taken while their sender commanded, and wait still now that it does not any more.
+    fn refuse_without_lease(&mut self) {
+        let holder = self.lease.as_ref().map(|lease| lease.holder);
+        let ids: Vec<ClientId> = self.clients.keys().copied().filter(|id| Some(*id) != holder).collect();
+        for id in ids {
+            while let Some(client) = self.clients.get_mut(&id)
+                && client.waiting.front().and_then(|frame| class_of(frame)).is_some_and(Class::needs_lease)
+                && let Some(frame) = client.take_waiting()
+            {
+                self.refuse(id, &frame, Denied::NotHolder);
+            }
+        }
+    }
+
+    pub(super) fn note_written(&mut self, outgoing: Outgoing, abandoned: bool) {
+        let Outgoing { client, frame } = outgoing;
+        let Some(parsed) = FrameRef::new_checked(&frame) else { return };
+        let (class, at) = (Class::of(parsed), self.outbox.free_at());
+        match class {
+            Class::Halt(_) => self.halts.written(at, self.outbox.baud()),
+            Class::Motion if !abandoned => self.halts.motion_written(),
+            _ => {}
+        }
+        if class != Class::Ask && !abandoned {
+            let client = if client == HALTS { OWNER } else { client };
+            self.events.push_back(LineEvent::Sent { client, frame_type: parsed.frame_type, class });
+        }
+        self.sent.push_back(Sent { client, kind: parsed.frame_type as u8, abandoned, at });
+    }
+
+    /// Bytes that the device has sent, in any pieces.
+    pub fn from_device(&mut self, mut bytes: &[u8], now: Duration) {
+        loop {
+            match self.receiver.next_frame(&mut bytes) {
+                None => return,
+                Some(FromDevice::Status(status)) => {
+                    let frame = self.receiver.frame_bytes().to_vec();
+                    self.take_status(status, &frame, now);
+                }
+                Some(FromDevice::Answer(_)) => {
+                    let frame = self.receiver.frame_bytes().to_vec();
+                    let kind = FrameRef::new_checked(&frame).map(|frame| frame.frame_type);
+                    if let Some(Return { client, .. }) =
+                        self.returns.take_if(|returns| Some(returns.kind) == kind)
+                    {
+                        self.deliver(client, Delivery::Bytes(frame));
+                    }
+                }
+            }
+        }
+    }
+
+    fn take_status(&mut self, status: Status, frame: &[u8], now: Duration) {
+        self.status = Some((now, status));
+        let answered = status.response().map_or_else(Vec::new, |response| self.whose(response, now));
+        for (client, response) in &answered {
+            if FrameType::from_byte(response.frame_type).is_some_and(|t| returned_by(t).is_none()) {
+                self.events.push_back(LineEvent::Answered { client: *client, response: *response });
+            }
+        }
+        self.events.push_back(LineEvent::Status(Box::new(status)));
+        let clients: Vec<ClientId> = self.clients.keys().copied().collect();
+        for id in clients {
+            let own = answered.iter().find(|(client, _)| *client == id).map(|(_, response)| *response);
+            let refused = || self.clients.get_mut(&id).and_then(|client| client.take_refusal());
+            let response = own.or_else(refused).unwrap_or(Response::NONE);
+            let mut bytes = frame.to_vec();
+            Status::replace_response(&mut bytes, &response);
+            self.deliver(id, Delivery::Bytes(bytes));
+        }
+    }
+
+    /// Whose frame a record answers: those of all who asked for the same Stop.
+    fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
+        let arrived = response.status == FrameStatus::NoError;
+        // Records come in the order of the frames: those before it have none, or a bad one.
+        let at = self.sent.iter().position(|sent| {
+            if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
+        });
+        let Some(at) = at.or_else(|| (!arrived && !self.sent.is_empty()).then_some(0)) else {
+            return Vec::new();
+        };
+        let Some(sent) = self.sent.drain(..=at).next_back() else { return Vec::new() };
+        let returned = FrameType::from_byte(sent.kind).and_then(returned_by);
+        if let Some(returns) =
+            self.returns.as_mut().filter(|r| r.client == sent.client && Some(r.kind) == returned)
+        {
+            // What it returns follows; a refused request returns nothing.
+            returns.until = if response.accepted() { now + RETURN_TIME } else { now };
+        }
+        if sent.client == HALTS {
+            return self.halts.answered(&response, arrived);
+        }
+        if sent.abandoned { Vec::new() } else { vec![(sent.client, response)] }
+    }
+}

@@ -1,0 +1,304 @@
+//! Many clients on the line of one controller, without I/O: bytes and time go in, bytes come out.
+//!
+//! A client speaks the protocol of the line as if it were alone: it sends frames, and receives every status with the records of its own
+//! frames only. That is why every program that can use a serial port can use a shared line. What is added is who may send what: questions
+//! from anyone who was let in, a Stop and a Pause from the same ahead of all else, everything else from the one who has the [`Lease`].
+mod class;
+mod client;
+mod device;
+mod event;
+mod halts;
+mod lease;
+mod outbox;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use jtc_wire::{ExecCommand, FrameRef, FrameType, Status, StatusReceiver, fixed};
+
+pub use class::Class;
+pub use client::{ClientId, Delivery, Introduction, Policy, PutOut, Role};
+pub use event::LineEvent;
+pub use lease::{Denied, Lease};
+pub use outbox::{AHEAD, GAP};
+
+use class::refusal;
+use client::Client;
+use halts::Halts;
+use outbox::Outbox;
+
+/// Records that do not come within this time behind their frame do not come any more.
+const RECORD_TIME: Duration = Duration::from_secs(2);
+/// Nor do frames that a request returns.
+const RETURN_TIME: Duration = Duration::from_millis(500);
+/// For so long after somebody else's Stop no frame may begin a motion: it may have been sent before, or be sent again for want of a record.
+const CALM: Duration = Duration::from_secs(3);
+/// And for so long after one that was refused for that.
+const CALM_AGAIN: Duration = Duration::from_millis(500);
+
+/// A frame that was written and has no record yet.
+struct Sent {
+    client: ClientId,
+    kind: u8,
+    /// It was given up in the middle: its record is a bad one.
+    abandoned: bool,
+    /// When the line will have carried it.
+    at: Duration,
+}
+
+/// What a device is to return beside a record.
+struct Return {
+    client: ClientId,
+    kind: FrameType,
+    until: Duration,
+}
+
+/// One line, many clients.
+pub struct SharedLine {
+    clients: BTreeMap<ClientId, Client>,
+    next_id: u64,
+    outbox: Outbox,
+    sent: VecDeque<Sent>,
+    returns: Option<Return>,
+    /// Whose frame was sent last: the next client has its turn.
+    last_turn: ClientId,
+    lease: Option<Lease>,
+    halts: Halts,
+    /// How many halts there were, and who asked for the last.
+    halted: (u64, String),
+    /// Frames of the owner itself.
+    own: VecDeque<Vec<u8>>,
+    receiver: StatusReceiver,
+    status: Option<(Duration, Status)>,
+    events: VecDeque<LineEvent>,
+}
+
+/// The owner of the line itself, which acts for clients that have gone and for those that have no end of the line of their own.
+pub const OWNER: ClientId = ClientId(0);
+/// Stands for all who have asked for a Stop or a Pause.
+const HALTS: ClientId = ClientId(u64::MAX);
+
+impl SharedLine {
+    /// A line at this rate, Bd, if it has one.
+    pub fn new(baud: Option<u32>) -> Self {
+        Self {
+            clients: BTreeMap::new(),
+            next_id: OWNER.0 + 1,
+            outbox: Outbox::new(baud),
+            sent: VecDeque::new(),
+            returns: None,
+            last_turn: OWNER,
+            lease: None,
+            halts: Halts::default(),
+            halted: (0, String::new()),
+            own: VecDeque::new(),
+            receiver: StatusReceiver::new(),
+            status: None,
+            events: VecDeque::new(),
+        }
+    }
+
+    /// A client comes.
+    pub fn join(&mut self, introduction: Introduction) -> ClientId {
+        let id = ClientId(self.next_id);
+        self.next_id += 1;
+        let mut client = Client::new(introduction);
+        // What was stopped before concerns it no more.
+        (client.halted, client.seen) = (self.halted.0, self.halted.0);
+        self.clients.insert(id, client);
+        id
+    }
+
+    /// A client goes. What it has sent and is not on the line yet is dropped; its motion follows its policy.
+    pub fn leave(&mut self, client: ClientId, now: Duration) {
+        let Some(gone) = self.clients.remove(&client) else { return };
+        if let Some((outgoing, _)) = self.outbox.writing()
+            && outgoing.client == client
+            && let Some((outgoing, true)) = self.outbox.give_up(now)
+        {
+            self.note_written(outgoing, true);
+        }
+        if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
+            self.end_lease(client, gone.introduction.policy, now);
+        }
+    }
+
+    /// How a client has presented itself.
+    pub fn introduction(&self, client: ClientId) -> Option<&Introduction> {
+        self.clients.get(&client).map(|client| &client.introduction)
+    }
+
+    /// The policy of a client from now on.
+    pub fn set_policy(&mut self, client: ClientId, policy: Policy) {
+        if let Some(client) = self.clients.get_mut(&client) {
+            client.introduction.policy = policy;
+        }
+    }
+
+    /// How many clients there are.
+    pub fn clients(&self) -> usize {
+        self.clients.len()
+    }
+
+    /// The last status, and when it came.
+    pub fn status(&self) -> Option<&(Duration, Status)> {
+        self.status.as_ref()
+    }
+
+    /// Stops or pauses the motion for a client, ahead of all else: what is sent already and not on the line yet is dropped. It is sent again
+    /// until the device has taken it. `name`: who it is, for those who ask why their frames were not passed on.
+    pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
+        let name = name.to_owned();
+        self.halted = (self.halted.0 + 1, name.clone());
+        for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != client) {
+            (other.halted, other.calm_until) = (self.halted.0, now + CALM);
+        }
+        self.halts.ask(client, command);
+        let denied = Denied::Stopped { by: name };
+        if let Some((outgoing, written)) = self.outbox.writing()
+            && written == 0
+            && class_of(&outgoing.frame).is_some_and(Class::needs_lease)
+            && let Some((outgoing, _)) = self.outbox.give_up(now)
+        {
+            self.refuse(outgoing.client, &outgoing.frame, denied.clone());
+        }
+        let clients: Vec<ClientId> = self.clients.keys().copied().collect();
+        for id in clients {
+            let Some(client) = self.clients.get_mut(&id) else { continue };
+            let frames: Vec<Vec<u8>> = std::iter::from_fn(|| client.take_waiting()).collect();
+            let (dropped, kept): (Vec<_>, Vec<_>) =
+                frames.into_iter().partition(|frame| class_of(frame).is_some_and(Class::needs_lease));
+            // There was room for them before.
+            for frame in kept {
+                let _ = client.wait(frame);
+            }
+            for frame in dropped {
+                self.refuse(id, &frame, denied.clone());
+            }
+        }
+    }
+
+    /// Bytes that a client has sent, in any pieces.
+    pub fn from_client(&mut self, id: ClientId, mut bytes: &[u8], now: Duration) {
+        loop {
+            let Some(client) = self.clients.get_mut(&id) else { return };
+            let frame = client.next_frame(&mut bytes);
+            match frame.and_then(|frame| frame.map(|frame| client.allow(now).map(|()| frame)).transpose()) {
+                Ok(Some(frame)) => self.take_frame(id, frame, now),
+                Ok(None) => return,
+                Err(reason) => return self.put_out(id, reason, now),
+            }
+        }
+    }
+
+    fn take_frame(&mut self, id: ClientId, frame: Vec<u8>, now: Duration) {
+        let Some(class) = class_of(&frame) else { return };
+        if let Class::Halt(command) = class {
+            let name = self.name(id);
+            return self.halt(id, &name, command, now);
+        }
+        if class.needs_lease()
+            && let Err(denied) = self.may_send(id, class, now)
+        {
+            return self.refuse(id, &frame, denied);
+        }
+        if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.wait(frame)) {
+            self.put_out(id, reason, now);
+        }
+    }
+
+    /// A frame of this class may be sent by this client.
+    fn may_send(&mut self, id: ClientId, class: Class, now: Duration) -> Result<(), Denied> {
+        self.may_command(id, now)?;
+        let Some(client) = self.clients.get_mut(&id).filter(|_| class == Class::Motion) else {
+            return Ok(());
+        };
+        if now >= client.calm_until && client.seen >= client.halted {
+            return Ok(());
+        }
+        client.calm_until = client.calm_until.max(now + CALM_AGAIN);
+        Err(Denied::Stopped { by: self.halted.1.clone() })
+    }
+
+    /// Number of the last halt: whoever carries a client's bytes asks it whether it has seen that, behind what it has sent before.
+    pub fn last_halt(&self) -> u64 {
+        self.halted.0
+    }
+
+    /// Everything that the client had sent when it did not know of this halt has come.
+    pub fn confirm_halt(&mut self, client: ClientId, number: u64) {
+        if let Some(client) = self.clients.get_mut(&client) {
+            client.seen = client.seen.max(number);
+        }
+    }
+
+    /// Brings the arm to rest for the end of the owner.
+    pub fn end(&mut self, now: Duration) {
+        self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
+        self.own.push_back(fixed::empty(FrameType::TeachingModeDisable).to_vec());
+    }
+
+    /// Nothing waits for the line, nor for a record of a Stop.
+    pub fn is_idle(&self) -> bool {
+        self.halts.are_done() && self.own.is_empty() && self.outbox.is_free()
+    }
+
+    fn set_lease(&mut self, lease: Option<Lease>) {
+        self.lease.clone_from(&lease);
+        self.events.push_back(LineEvent::Lease(lease));
+    }
+
+    /// A frame of this client is not passed on.
+    fn refuse(&mut self, id: ClientId, frame: &[u8], denied: Denied) {
+        let response = refusal(frame);
+        let frame_type = FrameType::from_byte(response.frame_type).unwrap_or(FrameType::JtcStatus);
+        self.events.push_back(LineEvent::Denied { client: id, frame_type, denied: denied.clone() });
+        if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.refuse(response)) {
+            return self.put_out(id, reason, self.now());
+        }
+        self.deliver(id, Delivery::Denied(denied));
+    }
+
+    /// Gives a client something to read.
+    pub fn notify(&mut self, client: ClientId, delivery: Delivery) {
+        self.deliver(client, delivery);
+    }
+
+    fn deliver(&mut self, id: ClientId, delivery: Delivery) {
+        if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.deliver(delivery)) {
+            self.put_out(id, reason, self.now());
+        }
+    }
+
+    pub(super) fn put_out(&mut self, client: ClientId, reason: PutOut, now: Duration) {
+        self.events.push_back(LineEvent::PutOut { client, reason });
+        self.leave(client, now);
+    }
+
+    /// What a client has not had yet; `None` when there is no such client any more.
+    pub fn take_deliveries(&mut self, client: ClientId) -> Option<Vec<Delivery>> {
+        self.clients.get_mut(&client).map(Client::take_deliveries)
+    }
+
+    /// What has happened since the last call.
+    pub fn take_events(&mut self) -> Vec<LineEvent> {
+        self.events.drain(..).collect()
+    }
+
+    /// About now: when the last status came.
+    fn now(&self) -> Duration {
+        self.status.map_or(Duration::ZERO, |(at, _)| at)
+    }
+
+    fn name(&self, client: ClientId) -> String {
+        match self.introduction(client) {
+            Some(client) => client.name.clone(),
+            None if client == OWNER => "the owner of the line".to_owned(),
+            None => "a client that has gone".to_owned(),
+        }
+    }
+}
+
+fn class_of(frame: &[u8]) -> Option<Class> {
+    FrameRef::new_checked(frame).map(Class::of)
+}

@@ -1,0 +1,294 @@
+//! The owner of a port: one thread that reads and writes it for all clients.
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use jtc_host::{Port, PortError};
+use tokio::sync::watch;
+
+use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine};
+
+/// Longest that the owner waits for the device before it looks at what clients want: a Stop waits no longer for its turn.
+const TURN: Duration = Duration::from_millis(2);
+
+/// Longest that the end waits for what is on its way.
+const LAST_TURNS: Duration = Duration::from_secs(1);
+
+/// Called with what has happened, on the owner's thread: it is to return soon.
+pub type Observer = Box<dyn FnMut(Duration, &LineEvent) + Send>;
+
+struct State {
+    line: SharedLine,
+    /// The port is gone: why.
+    lost: Option<String>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    /// Something was delivered: for those who block, and for those who do not.
+    delivered: Condvar,
+    changed: watch::Sender<()>,
+    ended: AtomicBool,
+    start: Instant,
+    baud: Option<u32>,
+    name: String,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A panic of another thread leaves no half-done state behind that matters more than a Stop.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    fn wake(&self) {
+        self.delivered.notify_all();
+        self.changed.send_replace(());
+    }
+}
+
+/// The port is gone when this is, also where its thread has panicked.
+struct Gone<'a>(&'a Shared, String);
+
+impl Drop for Gone<'_> {
+    fn drop(&mut self) {
+        self.0.lock().lost = Some(std::mem::take(&mut self.1));
+        self.0.wake();
+    }
+}
+
+/// What clients and the API have of a line that a thread owns.
+#[derive(Clone)]
+pub struct Line(Arc<Shared>);
+
+impl Line {
+    /// Time of the line: since its owner began.
+    pub fn now(&self) -> Duration {
+        self.0.now()
+    }
+
+    /// Something with the line, now.
+    pub fn with<T>(&self, act: impl FnOnce(&mut SharedLine, Duration) -> T) -> T {
+        act(&mut self.0.lock().line, self.0.now())
+    }
+
+    /// Rate of the line, Bd, if it has one.
+    pub fn baud(&self) -> Option<u32> {
+        self.0.baud
+    }
+
+    /// Something may have been delivered.
+    pub fn changes(&self) -> watch::Receiver<()> {
+        self.0.changed.subscribe()
+    }
+
+    /// Those who wait for something look whether it is there.
+    pub fn wake(&self) {
+        self.0.wake();
+    }
+
+    /// Why the port is gone; `None` while it is there.
+    pub fn lost(&self) -> Option<String> {
+        self.0.lock().lost.clone()
+    }
+
+    /// A client's port: whatever speaks over a serial port speaks over it. The client goes when it is dropped.
+    pub fn connect(&self, introduction: Introduction) -> ClientPort {
+        let client = self.with(|line, _| line.join(introduction));
+        ClientPort { shared: self.0.clone(), client, read: Vec::new(), denied: None }
+    }
+}
+
+/// The thread that owns the port.
+pub struct Owner {
+    line: Line,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Owner {
+    /// Takes a port. `observer` sees everything that happens on the line.
+    pub fn new(port: impl Port + Send + 'static, observer: Observer) -> Self {
+        let shared = Arc::new(Shared {
+            state: Mutex::new(State { line: SharedLine::new(port.baud()), lost: None }),
+            delivered: Condvar::new(),
+            changed: watch::Sender::new(()),
+            ended: AtomicBool::new(false),
+            start: Instant::now(),
+            baud: port.baud(),
+            name: port.name(),
+        });
+        let own = shared.clone();
+        let thread = std::thread::spawn(move || own_port(&own, port, observer));
+        Self { line: Line(shared), thread: Some(thread) }
+    }
+
+    /// The line.
+    pub fn line(&self) -> Line {
+        self.line.clone()
+    }
+
+    /// Lets the port go, when what is on its way is written.
+    pub fn end(mut self) {
+        self.join();
+    }
+
+    fn join(&mut self) {
+        self.line.0.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic of that thread has been printed.
+            drop(thread.join());
+        }
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        self.join();
+    }
+}
+
+/// Reads and writes until the port is gone or nobody wants it any more.
+fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
+    let mut gone = Gone(shared, "the agent has a fault".to_owned());
+    let mut last_turns = None;
+    loop {
+        if let Err(error) = turn(shared, &mut port, &mut observer) {
+            gone.1 = error.to_string();
+            return;
+        }
+        if !shared.ended.load(Ordering::Relaxed) {
+            continue;
+        }
+        let end = *last_turns.get_or_insert_with(|| shared.now() + LAST_TURNS);
+        if shared.lock().line.is_idle() || shared.now() >= end {
+            gone.1 = "the agent was ended".to_owned();
+            return;
+        }
+    }
+}
+
+/// What is to be written, what there is to read, and who is to know.
+fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Result<(), PortError> {
+    let (now, bytes, due) = {
+        let mut state = shared.lock();
+        let now = shared.now();
+        (now, state.line.to_device(now), state.line.due(now))
+    };
+    if !bytes.is_empty() {
+        port.write_all(&bytes)?;
+    }
+    let wait = due.map_or(TURN, |due| due.saturating_sub(now).min(TURN));
+    let mut buffer = [0; 4096];
+    let read = port.read(&mut buffer, wait)?;
+    let now = shared.now();
+    let events = {
+        let mut state = shared.lock();
+        state.line.from_device(&buffer[..read], now);
+        state.line.take_events()
+    };
+    if read > 0 || !events.is_empty() {
+        shared.wake();
+    }
+    events.iter().for_each(|event| observer(now, event));
+    Ok(())
+}
+
+/// A client's end of the line.
+pub struct ClientPort {
+    shared: Arc<Shared>,
+    client: ClientId,
+    /// Bytes that were delivered and not read yet.
+    read: Vec<u8>,
+    denied: Option<Denied>,
+}
+
+impl ClientPort {
+    /// Whose it is.
+    pub fn client(&self) -> ClientId {
+        self.client
+    }
+
+    /// What was delivered, waiting for it at most so long.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError::Gone`] when the port is, or when this client was put out.
+    pub fn deliveries(&mut self, timeout: Duration) -> Result<Vec<Delivery>, PortError> {
+        let end = Instant::now() + timeout;
+        let mut state = self.shared.lock();
+        loop {
+            // What this client had sent before has come: it was sent in this process.
+            let last = state.line.last_halt();
+            state.line.confirm_halt(self.client, last);
+            let deliveries = state.line.take_deliveries(self.client);
+            let gone = || PortError::Gone { path: self.shared.name.clone() };
+            match deliveries {
+                Some(deliveries) if !deliveries.is_empty() => return Ok(deliveries),
+                _ if state.lost.is_some() => return Err(gone()),
+                None => return Err(gone()),
+                Some(_) => {}
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(Vec::new());
+            }
+            let waited = self.shared.delivered.wait_timeout(state, left);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+impl Drop for ClientPort {
+    fn drop(&mut self) {
+        let now = self.shared.now();
+        self.shared.lock().line.leave(self.client, now);
+    }
+}
+
+impl Port for ClientPort {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        if self.read.is_empty() {
+            for delivery in self.deliveries(timeout)? {
+                match delivery {
+                    Delivery::Bytes(bytes) => self.read.extend(bytes),
+                    Delivery::Denied(denied) => self.denied = Some(denied),
+                    Delivery::LeaseDenied(_) | Delivery::LeaseWanted(_) => {}
+                }
+            }
+        }
+        let n = buffer.len().min(self.read.len());
+        buffer[..n].copy_from_slice(&self.read[..n]);
+        self.read.drain(..n);
+        Ok(n)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let now = self.shared.now();
+        let mut state = self.shared.lock();
+        if state.lost.is_some() {
+            return Err(PortError::Gone { path: self.shared.name.clone() });
+        }
+        state.line.from_client(self.client, bytes, now);
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.shared.now()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.shared.baud
+    }
+
+    fn name(&self) -> String {
+        self.shared.name.clone()
+    }
+
+    fn take_denial(&mut self) -> Option<String> {
+        self.denied.take().map(|denied| denied.to_string())
+    }
+}

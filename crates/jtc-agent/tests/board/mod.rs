@@ -1,0 +1,138 @@
+//! A controller's end of a serial line, bit by bit in virtual time, that shares no code with what is tested but the parser of the wire.
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jtc_agent::line::{ClientId, Delivery};
+use jtc_agent::{Introduction, Policy, Role, SharedLine};
+use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, Status};
+
+/// What one step of time is, µs: a byte at 115,200 Bd takes 86.8.
+const STEP_US: u64 = 20;
+/// How often the owner of a line has its turn, µs, at worst.
+const TURN_US: u64 = 2000;
+/// How often the controller reports, µs.
+const REPORT_US: u64 = 15_500;
+
+/// Line and board.
+pub struct Board {
+    pub line: SharedLine,
+    baud: f64,
+    now_us: u64,
+    /// Bytes that the operating system has taken, and when the next of them is over.
+    queue: VecDeque<u8>,
+    byte_over_us: f64,
+    receiver: Receiver<Vec<u8>>,
+    records: VecDeque<Response>,
+    /// What came at the board: when, which type (`None`: a bad one), its first bytes.
+    pub frames: Vec<(Duration, Option<FrameType>, Vec<u8>)>,
+    /// When each byte was written to the operating system.
+    pub written: Vec<(Duration, Vec<u8>)>,
+    pub status: Status,
+    /// So many of the next bytes arrive with other contents.
+    pub damaged: usize,
+    /// No status comes before.
+    pub deaf_until: Duration,
+}
+
+impl Board {
+    pub fn new(baud: u32) -> Self {
+        Self {
+            line: SharedLine::new(Some(baud)),
+            baud: f64::from(baud),
+            now_us: 0,
+            queue: VecDeque::new(),
+            byte_over_us: 0.0,
+            receiver: Receiver::new(vec![0; FRAME_MAX], 5000),
+            records: VecDeque::new(),
+            frames: Vec::new(),
+            written: Vec::new(),
+            damaged: 0,
+            deaf_until: Duration::ZERO,
+            status: Status { gripper: Some(Default::default()), ..Status::default() },
+        }
+    }
+
+    pub fn join(&mut self, name: &str, role: Role, policy: Policy) -> ClientId {
+        self.line.join(Introduction { name: name.into(), role, policy })
+    }
+
+    pub fn now(&self) -> Duration {
+        Duration::from_micros(self.now_us)
+    }
+
+    pub fn send(&mut self, client: ClientId, bytes: &[u8]) {
+        let now = self.now();
+        self.line.from_client(client, bytes, now);
+    }
+
+    pub fn run_ms(&mut self, ms: u64) {
+        for _ in 0..ms * 1000 / STEP_US {
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        self.now_us += STEP_US;
+        let now = self.now();
+        if self.now_us.is_multiple_of(TURN_US) {
+            let bytes = self.line.to_device(now);
+            if !bytes.is_empty() {
+                if self.queue.is_empty() {
+                    self.byte_over_us = self.now_us as f64 + 1e7 / self.baud;
+                }
+                self.queue.extend(&bytes);
+                self.written.push((now, bytes));
+            }
+        }
+        while !self.queue.is_empty() && self.byte_over_us <= self.now_us as f64 {
+            let mut byte = self.queue.pop_front().expect("it is not empty");
+            if self.damaged > 0 {
+                self.damaged -= 1;
+                byte ^= 0x10;
+            }
+            self.byte_over_us += 1e7 / self.baud;
+            assert_eq!(self.receiver.push(self.now_us, &[byte]), 1);
+        }
+        while self.receiver.poll(self.now_us) {
+            let (frame_type, response, bytes) = match self.receiver.event().expect("there is one") {
+                LinkEvent::Frame(frame) => {
+                    let n = frame.bytes.len();
+                    let good = Response::good(frame.frame_type, DataStatus::NoError, n as u16);
+                    (Some(frame.frame_type), good, frame.bytes[..n.min(40)].to_vec())
+                }
+                LinkEvent::Bad(response) | LinkEvent::Noise(response) => (None, response, Vec::new()),
+            };
+            self.receiver.release();
+            self.records.push_back(response);
+            self.frames.push((now, frame_type, bytes));
+        }
+        if self.now_us % REPORT_US < STEP_US {
+            self.status.response = self.records.pop_front().unwrap_or_default();
+            let bytes = self.status.emit();
+            if now >= self.deaf_until {
+                self.line.from_device(&bytes, now);
+            }
+        }
+    }
+
+    /// Frames of this type that have arrived.
+    pub fn arrived(&self, frame_type: FrameType) -> usize {
+        self.frames.iter().filter(|(_, t, _)| *t == Some(frame_type)).count()
+    }
+
+    /// Records that a client has got, and the reasons of what was denied.
+    pub fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
+        let (mut records, mut denied) = (Vec::new(), Vec::new());
+        for delivery in self.line.take_deliveries(client).expect("it is there") {
+            match delivery {
+                Delivery::Bytes(bytes) => {
+                    records.extend(Status::parse(&bytes).and_then(|status| status.response()))
+                }
+                Delivery::Denied(why) => denied.push(why.to_string()),
+                Delivery::LeaseDenied(why) => denied.push(why.to_string()),
+                Delivery::LeaseWanted(name) => denied.push(format!("{name} wants it")),
+            }
+        }
+        (records, denied)
+    }
+}

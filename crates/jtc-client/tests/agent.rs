@@ -1,0 +1,133 @@
+//! Sessions through an agent: all that works over a serial port, several at a time.
+mod common;
+
+use std::time::Duration;
+
+use common::Served;
+use jtc_host::check::CheckOptions;
+use jtc_host::session::{Flow, Outcome};
+use jtc_host::{Arm, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, PortError, plan};
+use jtc_wire::{ControllerState, TrajectoryState};
+
+const WAIT: Duration = Duration::from_secs(30);
+
+/// A motion of some seconds from the zero pose, checked.
+fn motion(percent: f64) -> CheckedTrajectory {
+    let arm = Arm::avena();
+    let to = [0.4, -0.3, 0.3, 0.4, -0.3, 0.4];
+    let trajectory =
+        plan::joint_move(&[0.0; 6], &to, &arm.config(), percent).expect("it is within the limits");
+    CheckedTrajectory::check(&trajectory, &arm, &[0.0; 6], &CheckOptions::default())
+        .expect("it is within the limits")
+}
+
+#[test]
+fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
+    let served = Served::start(921_600);
+    let mut anna = served.operator("anna");
+    anna.use_defaults().expect("it takes them");
+    anna.wait_ready(WAIT).expect("it holds the arm");
+    let checked = motion(5.0);
+    anna.upload(&checked, |_| Flow::Continue).expect("it takes it");
+    anna.execute(&checked).expect("it starts");
+
+    let mut bob = served.operator("bob");
+    let status = bob.fresh_status().expect("it looks");
+    assert_eq!((status.state.known(), status.is_executing()), (Some(ControllerState::Operate), true));
+    let denied = bob.gripper(true).expect_err("anna commands");
+    assert!(matches!(&denied, LinkError::Denied { reason, .. } if reason.contains("anna")), "{denied}");
+    assert_eq!(denied.kind(), ErrorKind::Refused);
+    // Nobody needs a lease, or a token on this computer, to stop.
+    let mut passer_by = served.session("a passer-by", None);
+    passer_by.stop().expect("it is taken");
+    let outcome = anna.follow(|_| Flow::Continue).expect("it comes to an end");
+    assert!(matches!(outcome, Outcome::Stopped(status) if status.trajectory == TrajectoryState::Stop));
+    let refused = passer_by.teach(true).expect_err("a viewer");
+    assert!(refused.to_string().contains("to look and to stop"), "{refused}");
+
+    // With anna gone bob commands at once.
+    drop(anna);
+    std::thread::sleep(Duration::from_millis(200));
+    bob.gripper(true).expect("nobody else commands");
+    let log = std::fs::read_to_string(&served.log).expect("the log of commands");
+    for words in ["\"joined\"", "anna", "\"denied\"", "TrajSetExecStatus", "\"lease\"", "\"left\""] {
+        assert!(log.contains(words), "{words} in {log}");
+    }
+}
+
+#[test]
+fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
+    let served = Served::start(115_200);
+    let mut anna = served.operator("anna");
+    anna.use_defaults().expect("it takes them");
+    anna.wait_ready(WAIT).expect("it holds the arm");
+    let checked = motion(10.0);
+    let url = served.url();
+    let mut done = 0;
+    let error = anna
+        .upload(&checked, |progress| {
+            done += 1;
+            if done == 2 {
+                assert!(progress.segments_done < progress.segments);
+                let (status, body) = served.get("POST /api/stop");
+                assert_eq!((status, body.contains("stop")), (200, true), "{url}");
+            }
+            Flow::Continue
+        })
+        .expect_err("it was stopped");
+    assert!(
+        matches!(&error, Error::Link(LinkError::Denied { reason, .. }) if reason.contains("127.0.0.1")),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_end_of_an_agent_is_known_to_its_clients_at_once() {
+    let mut served = Served::start(921_600);
+    let mut anna = served.operator("anna");
+    anna.fresh_status().expect("it reports");
+    let url = served.url();
+    served.end();
+    let error = (0..100).find_map(|_| anna.fresh_status().err()).expect("it is gone");
+    assert!(matches!(error, LinkError::Port(PortError::AgentGone { .. })), "{error}");
+    let error = jtc_client::AgentPort::open(&url, &Default::default()).err().expect("nobody is there");
+    assert!(matches!(error, PortError::NoAgent { .. }), "{error}");
+    assert_eq!(error.kind(), ErrorKind::NoLink);
+}
+
+#[test]
+fn one_that_hangs_commands_no_more_and_has_to_come_again() {
+    let served = Served::start(921_600);
+    let (mut anna, mut bob) = (served.operator("anna"), served.operator("bob"));
+    anna.gripper(false).expect("nobody else commands");
+    assert!(matches!(bob.gripper(false), Err(LinkError::Denied { .. })));
+    // She does not read what comes.
+    for _ in 0..80 {
+        std::thread::sleep(Duration::from_millis(100));
+        bob.fresh_status().expect("it reports");
+        if served.line.with(|line, _| line.lease().is_none()) {
+            break;
+        }
+    }
+    bob.gripper(false).expect("nobody commands");
+    drop(bob);
+    std::thread::sleep(Duration::from_millis(200));
+    // What she believes of the arm is old.
+    let gone = anna.gripper(false).expect_err("she was put out");
+    assert!(matches!(gone, LinkError::Port(PortError::AgentGone { .. })), "{gone}");
+}
+
+#[test]
+fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
+    let served = Served::start(921_600);
+    let (mut anna, mut looks) = (served.operator("anna"), served.operator("looks"));
+    looks.fresh_status().expect("it reports");
+    anna.use_defaults().expect("it takes them");
+    anna.wait_ready(WAIT).expect("it holds the arm");
+    for _ in 0..8 {
+        std::thread::sleep(Duration::from_millis(500));
+        anna.fresh_status().expect("it reports");
+    }
+    let status = looks.fresh_status().expect("it reports");
+    assert_eq!(status.state, ControllerState::HoldPos);
+}

@@ -10,6 +10,7 @@ mod offline;
 mod params;
 mod payload;
 mod plan;
+mod serve;
 mod sim;
 
 use std::path::PathBuf;
@@ -26,6 +27,7 @@ pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use payload::PayloadCommand;
 pub use plan::{MoveArgs, PlanArgs, PoseCommand, Target};
+pub use serve::ServeArgs;
 pub use sim::{DemoArgs, SimArgs, SimSpeed};
 
 /// The joint trajectory controller from your terminal.
@@ -66,9 +68,12 @@ pub struct Cli {
 /// Which controller.
 #[derive(Args, Clone, Debug)]
 pub struct LinkArgs {
-    /// Serial port; default: the only one found
+    /// Serial port, or http://HOST:PORT of an agent; default: the only port found
     #[arg(long, env = "JTC_PORT", value_name = "PATH", help_heading = "Link")]
     pub port: Option<String>,
+    /// Token file of the agent; default: that of an agent of this computer
+    #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
+    pub token_file: Option<std::path::PathBuf>,
     /// Rate of the port, Bd
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200, help_heading = "Link",
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
@@ -102,6 +107,15 @@ pub enum Command {
                             hand lead.csv    a hand leads the arm along the positions of a trajectory file while it is taught"
     )]
     Sim(SimArgs),
+    /// Own the port for all clients: many look, one at a time commands, and everyone can stop
+    #[command(
+        after_help = "Every other command goes through the agent with --port http://…, and by itself where its port is the one that an\n\
+                            agent of this user owns. Reading, stopping and pausing need no token on this computer; commanding needs the\n\
+                            operator's token of the token file, which only its owner can read.\n\n\
+                            Examples:\n  jtc serve --sim\n  jtc serve --port /dev/ttyUSB0\n  jtc status --port http://127.0.0.1:8780\n  \
+                            curl -X POST http://127.0.0.1:8780/api/stop"
+    )]
+    Serve(ServeArgs),
     /// Serial ports found, and why one cannot be used
     #[command(after_help = "Examples:\n  jtc ports\n  jtc --json ports")]
     Ports,

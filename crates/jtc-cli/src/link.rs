@@ -1,10 +1,17 @@
-//! The way to the controller: the port named, or the only one found.
+//! The way to the controller: the port named, or the only one found; itself, or the agent that owns it.
+use std::path::PathBuf;
 
 use cli_kit::Failure;
-use jtc_host::Session;
+use jtc_agent::access::Tokens;
+use jtc_client::agents::{is_same_port, owner_of, registered};
+use jtc_client::{AgentPort, Options};
 use jtc_host::port::{SerialPort, only_one};
+use jtc_host::{Port, PortError, Session};
 
 use crate::args::LinkArgs;
+
+/// A serial port, or an agent's line.
+pub type LinkPort = Box<dyn Port>;
 
 impl LinkArgs {
     /// The port's name.
@@ -15,13 +22,57 @@ impl LinkArgs {
         }
     }
 
-    /// Opens the port.
-    pub fn open(&self) -> Result<SerialPort, Failure> {
-        Ok(SerialPort::open(&self.name()?, self.baud)?)
+    /// Opens the port, or the line of the agent that owns it.
+    pub fn open(&self) -> Result<LinkPort, Failure> {
+        let name = self.name()?;
+        if name.starts_with("http://") {
+            let agent = registered().into_iter().find(|agent| agent.url == name.trim_end_matches('/'));
+            let options = self.options(agent.map(|agent| agent.token_file))?;
+            return Ok(Box::new(AgentPort::open(&name, &options)?));
+        }
+        let Some(agent) = owner_of(&name) else { return Ok(Box::new(SerialPort::open(&name, self.baud)?)) };
+        let port = AgentPort::open(&agent.url, &self.options(Some(agent.token_file))?)?;
+        if !is_same_port(&port.hello().port, &name) {
+            let what = format!("{}: the agent there has {}, not {name}", agent.url, port.hello().port);
+            return Err(
+                Failure::nothing_sent(Failure::usage(what)).hint("name the agent with --port http://…")
+            );
+        }
+        Ok(Box::new(port))
+    }
+
+    /// How this program presents itself to an agent. A token goes to agents of this user only, and where its file was named.
+    fn options(&self, token_file: Option<PathBuf>) -> Result<Options, Failure> {
+        let file = self.token_file.clone().or(token_file);
+        let token = file.map(|file| Tokens::load(&file)).transpose()?.map(|tokens| tokens.operator);
+        Ok(Options { name: who(), token })
     }
 
     /// A conversation over it.
-    pub fn session(&self) -> Result<Session<SerialPort>, Failure> {
+    pub fn session(&self) -> Result<Session<LinkPort>, Failure> {
         Ok(Session::new(self.open()?))
+    }
+
+    /// The serial port itself, for the one who is to own it.
+    pub fn own(&self) -> Result<SerialPort, Failure> {
+        let name = self.name()?;
+        if name.starts_with("http://") {
+            let what = format!("{name} is the address of an agent, and no port that another could own");
+            return Err(Failure::usage(what).hint("name a serial port; `jtc ports` lists them"));
+        }
+        if let Some(agent) = owner_of(&name) {
+            return Err(Failure::from(PortError::Busy { path: name })
+                .hint(format!("an agent owns it: `--port {}` uses it", agent.url)));
+        }
+        Ok(SerialPort::open(&name, self.baud)?)
+    }
+}
+
+/// What others see of this program: its command, and who runs it.
+fn who() -> String {
+    let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
+    match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {
+        Ok(user) if !user.is_empty() => format!("{user}: jtc {command}"),
+        _ => format!("jtc {command}"),
     }
 }

@@ -21,7 +21,7 @@ const TRY: Duration = Duration::from_millis(300);
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
-    let mut session = Session::new(SerialPort::open(&name, link.baud)?);
+    let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
     // A drive that answers although its joint is set absent has no bit of its own (J-53).
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);

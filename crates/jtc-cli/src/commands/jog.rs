@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
-use jtc_host::port::SerialPort;
 use jtc_host::words;
 use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
@@ -11,6 +10,7 @@ use serde_json::json;
 
 use super::run::BRING_UP;
 use crate::args::JogArgs;
+use crate::link::LinkPort;
 
 /// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
 const AGAIN: Duration = Duration::from_millis(50);
@@ -53,7 +53,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
             .hint("`jtc bench show` shows which joints are absent"));
     }
     let end = args.duration.map(|s| session.now() + Duration::from_secs_f64(s.clamp(0.0, 86_400.0)));
-    let over = |session: &Session<SerialPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
+    let over = |session: &Session<LinkPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
     let jogged = match (args.joint.and_then(|joint| Joint::from_number(joint.into())), rate) {
         (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
         _ => with_keys(&mut session, out, over),
@@ -71,7 +71,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Joints whose load has just been caught are not jogged yet; anything else that forbids it is an error at once.
-fn settled(session: &mut Session<SerialPort>) -> Result<(), Failure> {
+fn settled(session: &mut Session<LinkPort>) -> Result<(), Failure> {
     let end = session.now() + REST;
     loop {
         match session.jog(&[0.0; JOINTS]) {
@@ -100,10 +100,10 @@ fn moved(from: &Status, to: &Status) -> String {
 }
 
 fn one(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     joint: Joint,
     rate: f64,
-    over: impl Fn(&Session<SerialPort>) -> bool,
+    over: impl Fn(&Session<LinkPort>) -> bool,
 ) -> Result<(), Failure> {
     let mut velocity = [0.0; JOINTS];
     velocity[joint.index()] = rate;
@@ -115,7 +115,7 @@ fn one(
 }
 
 /// Statuses are taken meanwhile.
-fn wait(session: &mut Session<SerialPort>, time: Duration) -> Result<(), Failure> {
+fn wait(session: &mut Session<LinkPort>, time: Duration) -> Result<(), Failure> {
     let end = session.now() + time;
     while session.now() < end {
         session.poll(end.saturating_sub(session.now()))?;
@@ -160,9 +160,9 @@ impl Held {
 }
 
 fn with_keys(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     out: &Output,
-    over: impl Fn(&Session<SerialPort>) -> bool,
+    over: impl Fn(&Session<LinkPort>) -> bool,
 ) -> Result<(), Failure> {
     let Some(mut keys) = Keys::listen() else {
         return Err(Failure::usage("without a terminal there are no keys; nothing was sent").hint(
@@ -217,7 +217,7 @@ fn refused(error: Error) -> Failure {
 }
 
 /// Every joint stands.
-fn rest(session: &mut Session<SerialPort>) -> Result<Status, Failure> {
+fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
     // Refused where nothing is jogged any more, which is just as well.
     match session.jog(&[0.0; JOINTS]) {

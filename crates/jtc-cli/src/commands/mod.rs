@@ -28,6 +28,7 @@ mod reset;
 mod resume;
 mod run;
 mod run_report;
+mod serve;
 mod sim;
 mod status;
 mod teach;
@@ -42,6 +43,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::demo(&args, out),
         Command::Sim(args) => sim::sim(&args, out),
+        Command::Serve(args) => serve::serve(&args, out),
         Command::Ports => ports::ports(out),
         Command::Doctor(link) => doctor::doctor(&link, out),
         Command::Status(link) => status::status(&link, out),

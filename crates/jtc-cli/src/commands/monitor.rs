@@ -6,12 +6,13 @@ mod view;
 use std::time::{Duration, Instant};
 
 use cli_kit::{Failure, Key, Output, Screen, Stop, figure};
-use jtc_host::port::{Port, SerialPort};
+use jtc_host::port::Port;
 use jtc_host::sample::is_measured;
 use jtc_host::{Session, words};
 
 use super::status;
 use crate::args::MonitorArgs;
+use crate::link::LinkPort;
 use view::View;
 
 /// 25 pictures a second are enough, however fast statuses come.
@@ -31,7 +32,7 @@ pub fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
 }
 
 fn lines(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     count: Option<u64>,
     stop: &Stop,
     out: &Output,
@@ -63,7 +64,7 @@ fn lines(
 }
 
 fn live(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     count: Option<u64>,
     mut screen: Screen,
     stop: &Stop,
@@ -108,7 +109,7 @@ fn live(
 }
 
 /// Stops the motion on its path; what became of it.
-fn stop_motion(session: &mut Session<SerialPort>) -> String {
+fn stop_motion(session: &mut Session<LinkPort>) -> String {
     match session.stop() {
         Ok(()) => "stopping on the path".into(),
         Err(e) => format!("stop: {e}"),

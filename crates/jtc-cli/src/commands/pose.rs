@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::arm::{Arm, remove_pose, save_pose};
-use jtc_host::port::SerialPort;
 use jtc_host::{Session, sample, words};
 use jtc_wire::{Joint, Status};
 use serde_json::json;
@@ -13,6 +12,7 @@ use serde_json::json;
 use super::arm::poses_table;
 use super::job::typed;
 use crate::args::{LinkArgs, PoseCommand};
+use crate::link::LinkPort;
 
 /// What moves by less than this within [`WATCHED`] stands, rad: the slowest jog moves twice as far.
 const STILL: f64 = 1.2e-3;
@@ -60,7 +60,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, force: bool, out: &Output) -> 
 }
 
 /// The arm stands, for as long as it is watched; else where it moves is the reason why nothing is saved.
-fn standing(session: &mut Session<SerialPort>) -> Result<Status, Failure> {
+fn standing(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     let begin = session.fresh_status()?;
     let (start, mut now) = (session.now(), begin);
     loop {

@@ -2,13 +2,13 @@
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::error::MotionError;
-use jtc_host::port::SerialPort;
 use jtc_host::{Error, Session};
 use jtc_wire::{Joint, Status, TrajectoryState};
 use serde_json::json;
 
 use super::job::Job;
 use crate::args::ResumeArgs;
+use crate::link::LinkPort;
 use crate::progress::Progress;
 
 /// Goes on, unless what remains of the trajectory that was named does not pass the check any more (J-36, J-60).
@@ -36,7 +36,7 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
 fn check_rest(
     job: &mut Job,
     arm_of_device: bool,
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     status: &Status,
 ) -> Result<(), Failure> {
     job.device = session.device_config()?;
@@ -67,7 +67,7 @@ fn check_rest(
 }
 
 /// This program did not load the motion, and a controller does not give it back.
-fn note_what_is_not_checked(session: &mut Session<SerialPort>, out: &Output) -> Result<(), Failure> {
+fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {
         out.note(format!(

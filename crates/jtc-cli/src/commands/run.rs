@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::check::ProblemKind;
-use jtc_host::port::{Port, SerialPort};
+use jtc_host::port::Port;
 use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::Summary;
 use jtc_host::session::UploadOptions;
@@ -23,6 +23,7 @@ use super::job::{Job, stem, typed};
 use super::run_report;
 use crate::args::{ExecuteArgs, RunArgs};
 use crate::limits;
+use crate::link::LinkPort;
 use crate::operator::Operator;
 use crate::progress::Progress;
 use conclude::{Done, Finished, Legs, conclude};
@@ -106,7 +107,7 @@ pub fn perform(
 /// The arm of the controller and that of the job are one (J-55): the controller's own where none was named, else a refusal. From
 /// then on its settings count.
 fn match_device(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     job: &mut Job,
     course: &Course,
     out: &Output,
@@ -218,7 +219,7 @@ impl Stage<'_> {
     /// All motions, until one is not finished or all are done.
     fn legs(
         &mut self,
-        session: &mut Session<SerialPort>,
+        session: &mut Session<LinkPort>,
         operator: &mut Operator,
         mut status: Status,
     ) -> Result<Legs, Failure> {
@@ -276,7 +277,7 @@ impl Stage<'_> {
     /// Runs one motion; the recording is begun with the first one.
     fn leg(
         &mut self,
-        session: &mut Session<SerialPort>,
+        session: &mut Session<LinkPort>,
         checked: &CheckedTrajectory,
         phase: &'static str,
         operator: &mut Operator,
@@ -326,7 +327,7 @@ impl Stage<'_> {
 }
 
 /// Waits until the controller holds the arm with all drives enabled.
-fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Status, Failure> {
+fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status, Failure> {
     let mut status = session.fresh_status()?;
     if status.is_coming_up() && status.jtc_init == 0 && status.errors == 0 {
         operator.out.note("waiting until the drives hold the arm");

@@ -5,7 +5,6 @@ use std::path::Path;
 use cli_kit::{ErrorKind, Failure, Output, figure, table};
 use jtc_core::{Config, Payload};
 use jtc_host::check::Verdict;
-use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded};
 use jtc_host::{Error, Session};
@@ -15,6 +14,7 @@ use serde_json::json;
 use super::job::{Job, typed};
 use super::{continued, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
+use crate::link::LinkPort;
 use crate::progress::Progress;
 
 /// Does one of the family.
@@ -77,8 +77,8 @@ fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Fail
 }
 
 fn send(
-    open: impl FnOnce() -> Result<Session<SerialPort>, Failure>,
-    command: impl FnOnce(&mut Session<SerialPort>) -> Result<(), Error>,
+    open: impl FnOnce() -> Result<Session<LinkPort>, Failure>,
+    command: impl FnOnce(&mut Session<LinkPort>) -> Result<(), Error>,
     name: &str,
     words: &str,
     out: &Output,

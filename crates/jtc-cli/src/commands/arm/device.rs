@@ -5,7 +5,6 @@ use std::path::Path;
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, table};
 use jtc_core::Config;
 use jtc_host::arm::{Arm, Difference};
-use jtc_host::port::SerialPort;
 use jtc_host::session::PushReport;
 use jtc_host::{Error, LinkError, Session};
 use serde_json::json;
@@ -14,6 +13,7 @@ use super::super::info::hash;
 use super::super::named_arm;
 use crate::args::{AcceptArgs, ForceArgs, LinkArgs};
 use crate::limits;
+use crate::link::LinkPort;
 
 /// Gives the controller the whole arm.
 pub(super) fn push(
@@ -82,7 +82,7 @@ fn refused(error: Error, arm: &Arm) -> Failure {
 
 /// A device that takes friction, gains and model only.
 fn without_extensions(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     arm: &Arm,
     store: bool,
     accept: AcceptArgs,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use cli_kit::{ErrorKind, Failure, Output, table};
 use jtc_host::check::Verdict;
-use jtc_host::port::{Port, SerialPort};
+use jtc_host::port::Port;
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::{ReportInput, RunFailure, Summary};
 use jtc_host::session::Outcome;
@@ -15,6 +15,7 @@ use super::super::job::Job;
 use super::super::run_report;
 use super::leg::{APPROACH, Leg, Reel};
 use super::outputs::Outputs;
+use crate::link::LinkPort;
 
 /// Motions whose figures are kept: many runs must not fill the memory of a PC.
 const KEPT: usize = 1000;
@@ -83,7 +84,7 @@ pub fn conclude(
     job: &Job,
     legs: Legs,
     reel: Reel,
-    session: &Session<SerialPort>,
+    session: &Session<LinkPort>,
     outputs: Outputs,
     out: &Output,
 ) -> Result<(), Failure> {

@@ -3,13 +3,13 @@
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cli_kit::Failure;
-use jtc_host::port::SerialPort;
 use jtc_host::recording::{RecordingInfo, SampleSink};
 use jtc_host::session::{Flow, Outcome, Run, UploadReport};
 use jtc_host::{CheckedTrajectory, Error, Sample, Session};
 use serde_json::json;
 
 use super::super::run_report;
+use crate::link::LinkPort;
 use crate::operator::Operator;
 use crate::tape::Tape;
 
@@ -37,7 +37,7 @@ impl Leg {
     /// Uploads and executes. `record` begins the recording of this motion or goes on with the one that was begun. An error before the
     /// motion begins is the command's own; one in motion is the outcome.
     pub fn run(
-        session: &mut Session<SerialPort>,
+        session: &mut Session<LinkPort>,
         checked: &CheckedTrajectory,
         phase: &'static str,
         operator: &mut Operator,
@@ -80,7 +80,7 @@ fn not_started(failure: Failure) -> Failure {
 }
 
 fn upload(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     checked: &CheckedTrajectory,
     phase: &str,
     operator: &Operator,
@@ -101,7 +101,7 @@ fn upload(
 }
 
 fn execute(
-    session: &mut Session<SerialPort>,
+    session: &mut Session<LinkPort>,
     checked: &CheckedTrajectory,
     what: &str,
     (sink, offset_s): (Option<SampleSink>, f64),

@@ -1,0 +1,31 @@
+//! `jtc serve`: the agent.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::FalseyValueParser;
+
+use super::LinkArgs;
+
+/// Options of `jtc serve`.
+#[derive(Args, Debug)]
+pub struct ServeArgs {
+    /// A simulated controller instead of a port
+    #[arg(long, env = "JTC_SIM", value_parser = FalseyValueParser::new(), conflicts_with = "port")]
+    pub sim: bool,
+    /// Arm to simulate with --sim, TOML or URDF; default: the built-in one
+    #[arg(long, env = "JTC_ARM", value_name = "FILE", requires = "sim")]
+    pub arm: Option<PathBuf>,
+    /// Address to listen at; beyond this computer everybody needs a token
+    #[arg(long, env = "JTC_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8780")]
+    pub listen: SocketAddr,
+    /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
+    #[arg(long = "name", env = "JTC_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
+    pub names: Vec<String>,
+    /// File to which each command is appended: who, what, when, result
+    #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
+    pub command_log: Option<PathBuf>,
+    #[command(flatten)]
+    pub link: LinkArgs,
+}

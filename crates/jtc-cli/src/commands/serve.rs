@@ -1,0 +1,121 @@
+//! `jtc serve`: the agent that owns a port.
+
+use std::net::TcpListener;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use cli_kit::{ErrorKind, Failure, Output, Stop};
+use jtc_agent::access::{Access, Tokens, default_token_file};
+use jtc_agent::api::{Agent, logged};
+use jtc_agent::log::CommandLog;
+use jtc_agent::{Line, Owner, serve as service};
+use jtc_client::agents::{Registered, register};
+use jtc_host::Arm;
+use jtc_host::port::Port;
+use jtc_host::port::sim::LivePort;
+use jtc_sim::{SimConfig, World};
+use jtc_wire::{ControllerState, Status};
+use serde_json::json;
+
+use crate::args::ServeArgs;
+
+/// Longest that the end of the agent waits for a motion to stop.
+const STOPPING: Duration = Duration::from_secs(5);
+
+/// Owns the port until SIGINT or SIGTERM; a motion is stopped on its path first.
+pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
+    let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
+        Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
+            .hint("name one with --token-file FILE")
+    })?;
+    let stop = Stop::listen()?;
+    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+        let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
+        Failure::usage(format!("{}: {error}", path.display()))
+    })?;
+    let listener = TcpListener::bind(args.listen).map_err(|error| {
+        Failure::usage(format!("{}: {error}", args.listen))
+            .hint("another agent may listen there: name another address with --listen")
+    })?;
+    let listen = listener.local_addr()?;
+    let port = port(args)?;
+    let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
+    let (url, name) = (format!("http://{listen}"), port.name());
+    // A relative name would be another port in another directory.
+    let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
+
+    let log = Arc::new(Mutex::new(log));
+    let own_log = log.clone();
+    let owner = Owner::new(
+        port,
+        Box::new(move |_, event| {
+            let Some((what, facts)) = logged(event) else { return };
+            own_log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+        }),
+    );
+    let registered = Registered { url: url.clone(), port: name.clone(), token_file: token_file.clone() };
+    // Without it every command can still be given the address.
+    let registration = register(&registered).ok().flatten();
+    if !listen.ip().is_loopback() {
+        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it");
+    }
+    if are_new {
+        out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
+    }
+    let access = Access::new(tokens, listen, &args.names);
+    let agent = Agent::new(owner.line(), access, log, &name, args.sim);
+    let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim });
+    out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
+    let (line, ended) = (owner.line(), stop.clone());
+    let lost = owner.line();
+    service::serve(agent.router(), listener, move || ended.asked() || lost.lost().is_some())?;
+    drop(registration);
+    let gone = line.lost();
+    if gone.is_none() {
+        come_to_rest(&line, out);
+    }
+    owner.end();
+    match gone {
+        Some(why) => {
+            Err(Failure::new(ErrorKind::NoLink, "port", why).hint("plug it in again, then `jtc ports`"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held.
+fn come_to_rest(line: &Line, out: &Output) {
+    let began = line.now();
+    line.with(|line, now| line.end(now));
+    let moves = |status: &Status| status.is_executing() || status.state == ControllerState::Teaching;
+    // By what the controller reports from then on.
+    let rests = || {
+        line.with(|line, _| {
+            line.is_idle() && line.status().is_some_and(|(at, status)| *at > began && !moves(status))
+        })
+    };
+    let end = Instant::now() + STOPPING;
+    while !rests() && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    if !rests() {
+        out.note("the arm may be moving: the controller has not reported the end of its motion");
+    }
+}
+
+/// Notes that the log of commands cannot be written.
+fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
+    let out = *out;
+    move |error| {
+        out.note(format!("the log of commands cannot be written: {error}; commands are taken all the same"));
+    }
+}
+
+fn port(args: &ServeArgs) -> Result<Box<dyn Port + Send>, Failure> {
+    if !args.sim {
+        return Ok(Box::new(args.link.own()?));
+    }
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    let config = SimConfig { baud: Some(args.link.baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
+    Ok(Box::new(LivePort::new(World::new(config))))
+}

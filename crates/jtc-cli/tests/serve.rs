@@ -1,0 +1,140 @@
+//! `jtc serve`: an agent, and every other command through it.
+#![cfg(unix)]
+
+mod common;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use cli_kit::trial::{CommandOutput, run};
+use common::{Sim, command, slow_motion};
+use serde_json::Value;
+
+/// An agent with places of its own for tokens and for what it leaves behind; it ends with the test.
+struct Agent {
+    child: Child,
+    url: String,
+    dir: tempfile::TempDir,
+}
+
+impl Agent {
+    fn start(words: &[&str]) -> Self {
+        let dir = tempfile::tempdir().expect("a directory");
+        let mut child = here(command(), &dir)
+            .args(["--json", "serve", "--listen", "127.0.0.1:0"])
+            .args(words)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("jtc serve starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        let ready: Value = serde_json::from_str(&line).expect("an object");
+        assert!(ready["token_file"].is_string() && ready["simulated"].is_boolean(), "{line}");
+        Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
+    }
+
+    fn command(&self, words: &[&str], port: &str) -> Command {
+        let mut command = here(command(), &self.dir);
+        command.args(words).args(["--port", port]);
+        command
+    }
+
+    fn jtc(&self, words: &[&str]) -> CommandOutput {
+        run(self.command(words, &self.url), &[], "")
+    }
+
+    fn end(mut self, signal: &str) -> Option<i32> {
+        Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
+        self.child.wait().expect("it ends").code()
+    }
+}
+
+impl Drop for Agent {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+fn here(mut command: Command, dir: &tempfile::TempDir) -> Command {
+    command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
+    command
+}
+
+#[test]
+fn every_command_works_through_an_agent() {
+    let agent = Agent::start(&["--sim", "--baud", "921600"]);
+    agent.jtc(&["recover", "--defaults"]).ends(0);
+    let info = agent.jtc(&["--json", "info"]).ends(0).json();
+    assert_eq!(info["arm"], "avena");
+    agent.jtc(&["doctor"]).ends(0);
+    let motion = agent.dir.path().join("motion.csv");
+    std::fs::write(&motion, slow_motion(20)).expect("a file");
+    let report = agent.jtc(&["--json", "traj", "run", motion.to_str().expect("a name")]).ends(0).json();
+    assert_eq!(report["outcome"], "finished", "{report}");
+    agent.jtc(&["gripper", "on"]).ends(0);
+    let status = agent.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!(status["state"], "HoldPos");
+    assert_eq!(agent.end("-TERM"), Some(0));
+}
+
+#[test]
+fn another_terminal_looks_and_stops_while_one_runs() {
+    let agent = Agent::start(&["--sim", "--baud", "921600"]);
+    agent.jtc(&["recover", "--defaults"]).ends(0);
+    let motion = agent.dir.path().join("motion.csv");
+    std::fs::write(&motion, slow_motion(300)).expect("a file");
+    let mut runs = agent
+        .command(&["--json", "traj", "run", motion.to_str().expect("a name")], &agent.url)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let state = || agent.jtc(&["--json", "status"]).ends(0).json()["trajectory"].clone();
+    while state() != "Execute" {
+        assert!(runs.try_wait().expect("a child").is_none(), "it ended before it ran");
+    }
+    let denied = agent.jtc(&["gripper", "on"]).ends(4);
+    assert!(denied.err.contains("has commanded this arm"), "{}", denied.err);
+    agent.jtc(&["traj", "stop"]).ends(0);
+    let ended = runs.wait_with_output().expect("it ends");
+    let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
+    assert_eq!(report["outcome"], "stopped", "{report}");
+}
+
+#[test]
+fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gone() {
+    let sim = Sim::start(&["--baud", "921600"]);
+    let port = sim.port.to_str().expect("a name").to_owned();
+    let agent = Agent::start(&["--port", &port, "--baud", "921600"]);
+    for _ in 0..3 {
+        run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
+    }
+    let log = run(agent.command(&["recover", "--defaults", "--baud", "921600"], &port), &[], "").ends(0);
+    assert!(log.out.contains("HoldPos"), "{}", log.out);
+    let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
+    assert!(second.err.contains(&agent.url), "{}", second.err);
+    // It leaves a file behind that names an address where nobody is.
+    Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
+}
+
+#[test]
+fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let jtc = |words: &[&str]| run(here(command(), &dir), words, "");
+    let none = jtc(&["serve", "--port", "/dev/does-not-exist", "--listen", "127.0.0.1:0"]).ends(3);
+    assert!(none.err.contains("no such port"), "{}", none.err);
+    jtc(&["serve", "--sim", "--port", "/dev/null"]).ends(2);
+    jtc(&["serve", "--port", "http://127.0.0.1:1", "--listen", "127.0.0.1:0"]).ends(2);
+    let gone = jtc(&["status", "--port", "http://127.0.0.1:1"]).ends(3);
+    assert!(gone.err.contains("jtc serve"), "{}", gone.err);
+    let tokens = dir.path().join("tokens.toml");
+    std::fs::write(&tokens, "operator = \"short\"\nviewer = \"short\"\n").expect("a file");
+    let open =
+        jtc(&["serve", "--sim", "--listen", "127.0.0.1:0", "--token-file", tokens.to_str().expect("a name")])
+            .ends(2);
+    assert!(open.err.contains("chmod 600"), "{}", open.err);
+}

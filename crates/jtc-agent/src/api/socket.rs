@@ -241,7 +241,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
             LeaseWish::Ask => line.want_lease(client),
         };
         if let Err(denied) = done {
-            line.notify(client, Delivery::LeaseDenied(denied));
+            line.deliver(client, Delivery::LeaseDenied(denied));
         }
     });
     line.wake();
@@ -275,6 +275,5 @@ pub fn logged(event: &LineEvent) -> Option<(&'static str, serde_json::Value)> {
         LineEvent::PutOut { client, reason } => {
             Some(("put-out", json!({ "client": client.0, "why": reason.to_string() })))
         }
-        LineEvent::Status(_) => None,
     }
 }

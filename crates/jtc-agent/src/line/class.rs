@@ -37,6 +37,33 @@ impl Class {
     }
 }
 
+/// A whole good frame of a host, and what it does.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct HostFrame {
+    pub bytes: Vec<u8>,
+    pub frame_type: FrameType,
+    pub class: Class,
+}
+
+impl HostFrame {
+    /// `None` where the bytes are no such frame.
+    pub fn parse(bytes: Vec<u8>) -> Option<Self> {
+        let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
+        let (frame_type, class) = (frame.frame_type, Class::of(frame));
+        Some(Self { bytes, frame_type, class })
+    }
+
+    /// The frame that a device returns to it beside the record.
+    pub fn returns(&self) -> Option<FrameType> {
+        returned_by(self.frame_type)
+    }
+
+    /// The record of a frame that never gets to the device.
+    pub fn refusal(&self) -> Response {
+        Response::good(self.frame_type, DataStatus::NotAllowed, self.bytes.len() as u16)
+    }
+}
+
 /// The frame that a device returns to a request of this type beside the record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {
@@ -47,10 +74,4 @@ pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
         FrameType::GetPoints => Some(FrameType::Points),
         _ => None,
     }
-}
-
-/// The record of a frame that never gets to the device.
-pub(super) fn refusal(frame: &[u8]) -> Response {
-    let kind = frame.get(1).copied().and_then(FrameType::from_byte).unwrap_or(FrameType::JtcStatus);
-    Response::good(kind, DataStatus::NotAllowed, frame.len() as u16)
 }

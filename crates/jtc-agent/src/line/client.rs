@@ -2,9 +2,10 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use jtc_wire::{FRAME_MAX, FRAME_MIN, FrameRef, Response};
+use jtc_wire::{FRAME_MAX, FRAME_MIN, Response};
 
 use super::Denied;
+use super::class::HostFrame;
 
 /// Bytes of frames that a client may have waiting: a trajectory in flight and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
@@ -102,7 +103,7 @@ pub(super) struct Client {
     /// Bytes of a frame that is not whole yet.
     partial: Vec<u8>,
     /// Frames that wait for the line.
-    pub waiting: VecDeque<Vec<u8>>,
+    pub waiting: VecDeque<HostFrame>,
     waiting_bytes: usize,
     /// Records of frames that were not passed on.
     refusals: VecDeque<Response>,
@@ -137,7 +138,7 @@ impl Client {
     }
 
     /// Takes bytes from the front of `bytes` until a frame is whole.
-    pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<Vec<u8>>, PutOut> {
+    pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
         loop {
             let wanted = match self.partial.get(2..4) {
                 None => 4,
@@ -155,9 +156,8 @@ impl Client {
                 *bytes = rest;
                 continue;
             }
-            let frame = std::mem::take(&mut self.partial);
-            let good = FrameRef::new_checked(&frame).is_some_and(|frame| frame.frame_type.from_host());
-            return if good { Ok(Some(frame)) } else { Err(PutOut::NoFrame) };
+            let frame = HostFrame::parse(std::mem::take(&mut self.partial));
+            return frame.map(Some).ok_or(PutOut::NoFrame);
         }
     }
 
@@ -181,16 +181,16 @@ impl Client {
     }
 
     /// A frame waits for its turn.
-    pub fn wait(&mut self, frame: Vec<u8>) -> Result<(), PutOut> {
-        self.waiting_bytes += frame.len();
+    pub fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
+        self.waiting_bytes += frame.bytes.len();
         self.waiting.push_back(frame);
         if self.waiting_bytes > WAITING_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
     /// The next frame in its turn.
-    pub fn take_waiting(&mut self) -> Option<Vec<u8>> {
+    pub fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
-        self.waiting_bytes -= frame.len();
+        self.waiting_bytes -= frame.bytes.len();
         Some(frame)
     }
 

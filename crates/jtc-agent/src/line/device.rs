@@ -3,11 +3,10 @@ use std::time::Duration;
 
 use jtc_wire::{FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
 
-use super::class::{Class, returned_by};
+use super::class::{Class, HostFrame, returned_by};
 use super::outbox::{Outgoing, Passed};
 use super::{
     ClientId, Delivery, Denied, HALTS, LineEvent, OWNER, RECORD_TIME, RETURN_TIME, Return, Sent, SharedLine,
-    class_of,
 };
 
 impl SharedLine {
@@ -72,7 +71,7 @@ impl SharedLine {
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
             // What is returned has no number: one request of those at a time (J-50).
-            let returns = FrameRef::new_checked(frame).and_then(|frame| returned_by(frame.frame_type));
+            let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
                 continue;
             }
@@ -93,7 +92,7 @@ impl SharedLine {
         let ids: Vec<ClientId> = self.clients.keys().copied().filter(|id| Some(*id) != holder).collect();
         for id in ids {
             while let Some(client) = self.clients.get_mut(&id)
-                && client.waiting.front().and_then(|frame| class_of(frame)).is_some_and(Class::needs_lease)
+                && client.waiting.front().is_some_and(|frame| frame.class.needs_lease())
                 && let Some(frame) = client.take_waiting()
             {
                 self.refuse(id, &frame, Denied::NotHolder);
@@ -102,9 +101,8 @@ impl SharedLine {
     }
 
     pub(super) fn note_written(&mut self, outgoing: Outgoing, abandoned: bool) {
-        let Outgoing { client, frame } = outgoing;
-        let Some(parsed) = FrameRef::new_checked(&frame) else { return };
-        let (class, at) = (Class::of(parsed), self.outbox.free_at());
+        let Outgoing { client, frame: HostFrame { frame_type, class, .. } } = outgoing;
+        let at = self.outbox.free_at();
         match class {
             Class::Halt(_) => self.halts.written(at, self.outbox.baud()),
             Class::Motion if !abandoned => self.halts.motion_written(),
@@ -112,9 +110,9 @@ impl SharedLine {
         }
         if class != Class::Ask && !abandoned {
             let client = if client == HALTS { OWNER } else { client };
-            self.events.push_back(LineEvent::Sent { client, frame_type: parsed.frame_type, class });
+            self.events.push_back(LineEvent::Sent { client, frame_type, class });
         }
-        self.sent.push_back(Sent { client, kind: parsed.frame_type as u8, abandoned, at });
+        self.sent.push_back(Sent { client, kind: frame_type as u8, abandoned, at });
     }
 
     /// Bytes that the device has sent, in any pieces.
@@ -147,7 +145,6 @@ impl SharedLine {
                 self.events.push_back(LineEvent::Answered { client: *client, response: *response });
             }
         }
-        self.events.push_back(LineEvent::Status(Box::new(status)));
         let clients: Vec<ClientId> = self.clients.keys().copied().collect();
         for id in clients {
             let own = answered.iter().find(|(client, _)| *client == id).map(|(_, response)| *response);

@@ -1,5 +1,5 @@
 //! What happens on the line.
-use jtc_wire::{FrameType, Response, Status};
+use jtc_wire::{FrameType, Response};
 
 use super::{Class, ClientId, Denied, Lease, Policy, PutOut};
 
@@ -49,6 +49,4 @@ pub enum LineEvent {
         /// Why.
         reason: PutOut,
     },
-    /// A status came.
-    Status(Box<Status>),
 }

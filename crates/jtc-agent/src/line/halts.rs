@@ -6,6 +6,7 @@ use jtc_host::port::line_time;
 use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 
 use super::ClientId;
+use super::class::HostFrame;
 
 /// A record is awaited for so long, and three statuses on the line, before the frame is sent again.
 const AWAITED: Duration = Duration::from_millis(150);
@@ -62,8 +63,8 @@ impl Halts {
     }
 
     /// The frame that is to be written before all others.
-    pub fn frame(&self) -> Option<Vec<u8>> {
-        self.waiting.as_ref().map(|halt| fixed::exec(halt.command).to_vec())
+    pub fn frame(&self) -> Option<HostFrame> {
+        self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
     /// It was written; the line has carried it at `at`.

@@ -1,9 +1,9 @@
 //! The lease: one client commands at a time, and all see who.
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, FrameType, fixed};
+use jtc_wire::ExecCommand;
 
-use super::{ClientId, Delivery, Introduction, LineEvent, OWNER, Policy, PutOut, Role, SharedLine};
+use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
 /// Who commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,9 +142,7 @@ impl SharedLine {
         }) else {
             return;
         };
-        // Whatever the last status says: it may be older than the last command. Where nothing moves it is refused.
-        self.halt(OWNER, "the policy of a client that has gone", command, now);
-        self.own.push_back(fixed::empty(FrameType::TeachingModeDisable).to_vec());
+        self.hold("the policy of a client that has gone", command, now);
         self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
     }
 }

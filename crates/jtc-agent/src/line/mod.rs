@@ -14,15 +14,14 @@ mod outbox;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, FrameRef, FrameType, Status, StatusReceiver, fixed};
+use jtc_wire::{ExecCommand, FrameType, Status, StatusReceiver, fixed};
 
 pub use class::Class;
 pub use client::{ClientId, Delivery, Introduction, Policy, PutOut, Role};
 pub use event::LineEvent;
 pub use lease::{Denied, Lease};
-pub use outbox::{AHEAD, GAP};
 
-use class::refusal;
+use class::HostFrame;
 use client::Client;
 use halts::Halts;
 use outbox::Outbox;
@@ -67,7 +66,7 @@ pub struct SharedLine {
     /// How many halts there were, and who asked for the last.
     halted: (u64, String),
     /// Frames of the owner itself.
-    own: VecDeque<Vec<u8>>,
+    own: VecDeque<HostFrame>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
     events: VecDeque<LineEvent>,
@@ -128,13 +127,6 @@ impl SharedLine {
         self.clients.get(&client).map(|client| &client.introduction)
     }
 
-    /// The policy of a client from now on.
-    pub fn set_policy(&mut self, client: ClientId, policy: Policy) {
-        if let Some(client) = self.clients.get_mut(&client) {
-            client.introduction.policy = policy;
-        }
-    }
-
     /// How many clients there are.
     pub fn clients(&self) -> usize {
         self.clients.len()
@@ -157,7 +149,7 @@ impl SharedLine {
         let denied = Denied::Stopped { by: name };
         if let Some((outgoing, written)) = self.outbox.writing()
             && written == 0
-            && class_of(&outgoing.frame).is_some_and(Class::needs_lease)
+            && outgoing.frame.class.needs_lease()
             && let Some((outgoing, _)) = self.outbox.give_up(now)
         {
             self.refuse(outgoing.client, &outgoing.frame, denied.clone());
@@ -165,9 +157,9 @@ impl SharedLine {
         let clients: Vec<ClientId> = self.clients.keys().copied().collect();
         for id in clients {
             let Some(client) = self.clients.get_mut(&id) else { continue };
-            let frames: Vec<Vec<u8>> = std::iter::from_fn(|| client.take_waiting()).collect();
+            let frames: Vec<HostFrame> = std::iter::from_fn(|| client.take_waiting()).collect();
             let (dropped, kept): (Vec<_>, Vec<_>) =
-                frames.into_iter().partition(|frame| class_of(frame).is_some_and(Class::needs_lease));
+                frames.into_iter().partition(|frame| frame.class.needs_lease());
             // There was room for them before.
             for frame in kept {
                 let _ = client.wait(frame);
@@ -191,14 +183,13 @@ impl SharedLine {
         }
     }
 
-    fn take_frame(&mut self, id: ClientId, frame: Vec<u8>, now: Duration) {
-        let Some(class) = class_of(&frame) else { return };
-        if let Class::Halt(command) = class {
+    fn take_frame(&mut self, id: ClientId, frame: HostFrame, now: Duration) {
+        if let Class::Halt(command) = frame.class {
             let name = self.name(id);
             return self.halt(id, &name, command, now);
         }
-        if class.needs_lease()
-            && let Err(denied) = self.may_send(id, class, now)
+        if frame.class.needs_lease()
+            && let Err(denied) = self.may_send(id, frame.class, now)
         {
             return self.refuse(id, &frame, denied);
         }
@@ -234,8 +225,14 @@ impl SharedLine {
 
     /// Brings the arm to rest for the end of the owner.
     pub fn end(&mut self, now: Duration) {
-        self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
-        self.own.push_back(fixed::empty(FrameType::TeachingModeDisable).to_vec());
+        self.hold("the end of the agent", ExecCommand::Stop, now);
+    }
+
+    /// Ends whatever moves the arm, for the owner. Whatever the last status says: it may be older than the last command, and where nothing
+    /// moves it is refused.
+    fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) {
+        self.halt(OWNER, name, command, now);
+        self.own.extend(HostFrame::parse(fixed::empty(FrameType::TeachingModeDisable).to_vec()));
     }
 
     /// Nothing waits for the line, nor for a record of a Stop.
@@ -249,22 +246,17 @@ impl SharedLine {
     }
 
     /// A frame of this client is not passed on.
-    fn refuse(&mut self, id: ClientId, frame: &[u8], denied: Denied) {
-        let response = refusal(frame);
-        let frame_type = FrameType::from_byte(response.frame_type).unwrap_or(FrameType::JtcStatus);
-        self.events.push_back(LineEvent::Denied { client: id, frame_type, denied: denied.clone() });
-        if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.refuse(response)) {
+    fn refuse(&mut self, id: ClientId, frame: &HostFrame, denied: Denied) {
+        let event = LineEvent::Denied { client: id, frame_type: frame.frame_type, denied: denied.clone() };
+        self.events.push_back(event);
+        if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.refuse(frame.refusal())) {
             return self.put_out(id, reason, self.now());
         }
         self.deliver(id, Delivery::Denied(denied));
     }
 
     /// Gives a client something to read.
-    pub fn notify(&mut self, client: ClientId, delivery: Delivery) {
-        self.deliver(client, delivery);
-    }
-
-    fn deliver(&mut self, id: ClientId, delivery: Delivery) {
+    pub fn deliver(&mut self, id: ClientId, delivery: Delivery) {
         if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.deliver(delivery)) {
             self.put_out(id, reason, self.now());
         }
@@ -297,8 +289,4 @@ impl SharedLine {
             None => "a client that has gone".to_owned(),
         }
     }
-}
-
-fn class_of(frame: &[u8]) -> Option<Class> {
-    FrameRef::new_checked(frame).map(Class::of)
 }

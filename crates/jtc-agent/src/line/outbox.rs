@@ -7,11 +7,12 @@ use std::time::Duration;
 use jtc_host::port::line_time;
 
 use super::ClientId;
+use super::class::HostFrame;
 
 /// Most bytes of a frame on their way at once.
-pub const AHEAD: usize = 256;
+const AHEAD: usize = 256;
 /// Silence behind an abandoned frame: the 5 ms of J-03, and as much as adapters may take off it.
-pub const GAP: Duration = Duration::from_millis(8);
+const GAP: Duration = Duration::from_millis(8);
 /// Rests of frames up to this are sent before a Stop: it takes no longer than the gap would.
 const SHORT: usize = 64;
 /// Fewest bytes of a longer frame that are written at once.
@@ -23,7 +24,7 @@ pub struct Outgoing {
     /// Who sent it.
     pub client: ClientId,
     /// All of it.
-    pub frame: Vec<u8>,
+    pub frame: HostFrame,
 }
 
 /// What has become of a frame.
@@ -91,7 +92,7 @@ impl Outbox {
         if self.urgent.is_some() {
             return Some(now.max(self.free_at.saturating_sub(line_time(AHEAD - PIECE, self.baud))));
         }
-        let left = self.writing.as_ref().map(|w| w.outgoing.frame.len() - w.at)?;
+        let left = self.writing.as_ref().map(|w| w.outgoing.frame.bytes.len() - w.at)?;
         let ahead = AHEAD - left.min(PIECE);
         Some(now.max(self.free_at.saturating_sub(line_time(ahead, self.baud))))
     }
@@ -107,7 +108,7 @@ impl Outbox {
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
             if let Some(writing) = self.writing.take_if(|writing| writing.at > 0) {
-                let rest = &writing.outgoing.frame[writing.at..];
+                let rest = &writing.outgoing.frame.bytes[writing.at..];
                 if rest.len() > SHORT {
                     self.silent_until = self.free_at.max(now) + GAP;
                     passed.push(Passed::Abandoned(writing.outgoing));
@@ -120,17 +121,17 @@ impl Outbox {
             if queued <= AHEAD
                 && let Some(urgent) = self.urgent.take()
             {
-                bytes.extend(&urgent.frame);
+                bytes.extend(&urgent.frame.bytes);
                 passed.push(Passed::Written(urgent));
             }
         } else if let Some(writing) = &mut self.writing {
-            let left = writing.outgoing.frame.len() - writing.at;
+            let left = writing.outgoing.frame.bytes.len() - writing.at;
             if room >= left.min(PIECE) {
                 let end = writing.at + left.min(room);
-                bytes.extend(&writing.outgoing.frame[writing.at..end]);
+                bytes.extend(&writing.outgoing.frame.bytes[writing.at..end]);
                 writing.at = end;
             }
-            if writing.at == writing.outgoing.frame.len()
+            if writing.at == writing.outgoing.frame.bytes.len()
                 && let Some(writing) = self.writing.take()
             {
                 passed.push(Passed::Written(writing.outgoing));

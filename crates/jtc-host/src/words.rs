@@ -121,6 +121,11 @@ pub fn absent(s: &Status) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| is_absent(s, joint.index())).collect()
 }
 
+/// Joints by their names, with commas.
+pub fn joints(joints: &[Joint]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
 /// Every joint that is there has its drive enabled.
 pub fn is_held(s: &Status) -> bool {
     let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;

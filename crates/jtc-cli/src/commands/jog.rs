@@ -8,9 +8,9 @@ use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
 use serde_json::json;
 
-use super::run::BRING_UP;
 use crate::args::JogArgs;
 use crate::link::LinkPort;
+use jtc_host::session::BRING_UP;
 
 /// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
 const AGAIN: Duration = Duration::from_millis(50);

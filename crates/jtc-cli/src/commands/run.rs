@@ -16,8 +16,8 @@ use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::Summary;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Session, StateError, words};
-use jtc_wire::{ControllerState, Joint, Status};
+use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Error, Session};
+use jtc_wire::{Joint, Status};
 
 use super::job::{Job, stem, typed};
 use super::run_report;
@@ -29,9 +29,6 @@ use crate::progress::Progress;
 use conclude::{Done, Finished, Legs, conclude};
 use leg::{APPROACH, Leg, Reel, cancelled};
 use outputs::Outputs;
-
-/// How long the drives may take: 4 s for their first enable.
-pub(super) const BRING_UP: Duration = Duration::from_secs(15);
 
 /// What a motion is run with, whichever command asks for it.
 #[derive(Clone, Debug)]
@@ -328,39 +325,11 @@ impl Stage<'_> {
 
 /// Waits until the controller holds the arm with all drives enabled.
 fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status, Failure> {
-    let mut status = session.fresh_status()?;
-    if status.is_coming_up() && status.jtc_init == 0 && status.errors == 0 {
-        operator.out.note("waiting until the drives hold the arm");
-        status = session.wait_for("HoldPos", BRING_UP, |s| {
-            s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error]) || operator.wants_the_end()
-        })?;
-        if status.state == ControllerState::Error {
-            return Err(StateError::Device { status: Box::new(status) }.into());
-        }
-    }
-    if operator.wants_the_end() {
-        return Err(cancelled("wait for the drives"));
-    }
-    if status.state != ControllerState::HoldPos {
-        let failure = Failure::new(ErrorKind::Device, "not-ready", words::waiting_for(&status));
-        return Err(failure.hint(words::next_step(&status)));
-    }
-    let absent: Vec<String> = words::absent(&status).iter().map(ToString::to_string).collect();
-    if !absent.is_empty() {
-        let message =
-            format!("{}: set absent; no motion is executed, and nothing was sent", absent.join(", "));
-        return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
-            .hint("`jtc bench show` shows them; `jtc jog` moves the joints that are there; `jtc disable`, then `jtc bench present` ends it"));
-    }
-    if !words::is_held(&status) {
-        operator.out.note("waiting until all drives are enabled");
-        let reached = |s: &Status| words::is_held(s) || operator.wants_the_end();
-        status = session.wait_for("all drives enabled", BRING_UP, reached)?;
-        if operator.wants_the_end() {
-            return Err(cancelled("wait for the drives"));
-        }
-    }
-    Ok(status)
+    let waits = |what| operator.out.note(format!("waiting until {what}"));
+    session.ready_to_move(waits, || operator.wants_the_end()).map_err(|error| match error {
+        Error::Cancelled => cancelled("wait for the drives"),
+        other => other.into(),
+    })
 }
 
 impl Job {
@@ -371,10 +340,13 @@ impl Job {
         status: &Status,
         course: &Course,
     ) -> Result<CheckedTrajectory, CheckError> {
+        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &self.options(course))
+    }
+
+    /// How its motions are checked.
+    fn options(&self, course: &Course) -> CheckOptions {
         let accept_device_limits = course.accepts_device_limits();
-        let options =
-            CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() };
-        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)
+        CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() }
     }
 
     /// Prints what forbids to run it.

@@ -3,6 +3,7 @@
 
 mod check;
 mod extension;
+mod facts;
 mod link;
 mod motion;
 mod parameters;
@@ -14,6 +15,7 @@ pub use host_kit::{Diagnose, Diagnosis};
 
 pub use check::CheckError;
 pub use extension::ExtensionError;
+pub use facts::Facts;
 pub use link::LinkError;
 pub(crate) use link::accepted;
 pub use motion::MotionError;

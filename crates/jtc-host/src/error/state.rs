@@ -1,7 +1,7 @@
 //! Errors of waiting for a state.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::Status;
+use jtc_wire::{Joint, Status};
 
 use crate::words;
 
@@ -25,6 +25,18 @@ pub enum StateError {
         /// The last status.
         status: Box<Status>,
     },
+    /// The arm is not held, and nothing on the way to that is going on.
+    #[error("{}", words::waiting_for(status))]
+    NotReady {
+        /// The status of then.
+        status: Box<Status>,
+    },
+    /// Joints are set absent, and the controller executes no motion.
+    #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
+    Absent {
+        /// Which.
+        joints: Vec<Joint>,
+    },
 }
 
 impl Diagnose for StateError {
@@ -38,6 +50,14 @@ impl Diagnose for StateError {
             Self::Timeout { status, .. } => {
                 Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))
             }
+            Self::NotReady { status } => {
+                Diagnosis::new(ErrorKind::Device, "not-ready", words::next_step(status))
+            }
+            Self::Absent { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "absent-joints",
+                "`jtc bench show` shows them; `jtc jog` moves the joints that are there; `jtc disable`, then `jtc bench present` ends it",
+            ),
         }
     }
 }

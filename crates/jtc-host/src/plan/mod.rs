@@ -17,6 +17,7 @@
 //! ```
 
 mod again;
+mod approach;
 mod error;
 mod lines;
 mod rest_of;
@@ -33,6 +34,7 @@ pub use jtc_plan::{Waypoint, kinematics};
 use jtc_wire::Joint;
 use serde::Serialize;
 
+pub use approach::{ApproachError, approach};
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use rest_of::rest_of;

@@ -3,7 +3,7 @@
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::CheckError;
 use jtc_host::check::CheckedTrajectory;
-use jtc_host::plan::Planner;
+use jtc_host::plan::{self, ApproachError};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -17,28 +17,26 @@ pub fn approach(
     course: &Course,
     out: &Output,
 ) -> Result<CheckedTrajectory, Failure> {
-    let here = status.positions();
-    let first = job.trajectory.points.first().map_or(here, |p| p.position);
-    // Half of the limits: nobody has looked at this path for obstacles.
-    let speed = course.speed_pct.min(50.0);
-    let friction = job.arm.friction();
-    let planner = Planner { speed_pct: speed, ..job.planner(friction.as_ref()) };
-    let path = planner.to(&here, &first).map_err(|e| refused(&e.to_string(), &course.words))?.trajectory;
-    let checked =
-        job.checked(&path, status, &Course { points_per_segment: None, ..course.clone() }).map_err(|e| {
-            let CheckError::Refused(verdict) = e else { return e.into() };
-            let failure = refused(&verdict.to_string(), &course.words);
-            if !out.is_json() {
-                return failure;
-            }
-            let error = failure.to_json();
-            let value =
-                json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
-            out.result(&value, String::new);
-            out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-            Failure::printed(failure.kind)
-        })?;
-    out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
+    let (here, options) = (status.positions(), job.options(course));
+    let checked = plan::approach(&job.trajectory, &job.arm, &here, course.speed_pct, &options);
+    let checked = checked.map_err(|error| {
+        let verdict = match error {
+            ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
+            ApproachError::Check(CheckError::Refused(verdict)) => verdict,
+            ApproachError::Check(e) => return e.into(),
+        };
+        let failure = refused(&verdict.to_string(), &course.words);
+        if !out.is_json() {
+            return failure;
+        }
+        let error = failure.to_json();
+        let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
+        out.result(&value, String::new);
+        out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
+        Failure::printed(failure.kind)
+    })?;
+    let duration_s = checked.trajectory().duration_s();
+    out.note(format!("approach: {duration_s:.1} s to the first point"));
     Ok(checked)
 }
 

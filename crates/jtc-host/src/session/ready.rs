@@ -1,0 +1,53 @@
+//! From connecting to an arm that can be moved.
+
+use std::time::Duration;
+
+use jtc_wire::{ControllerState, Status};
+
+use super::Session;
+use crate::error::{Error, StateError};
+use crate::port::Port;
+use crate::words;
+
+/// How long the drives may take: 4 s for their first enable.
+pub const BRING_UP: Duration = Duration::from_secs(15);
+
+impl<P: Port> Session<P> {
+    /// Waits until the controller holds the arm with all drives enabled, where it is on the way to that, and returns the status that a
+    /// motion can be checked with. `waits` is called with what is waited for.
+    ///
+    /// # Errors
+    ///
+    /// [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent,
+    /// [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns true; those of the line.
+    pub fn ready_to_move(
+        &mut self,
+        mut waits: impl FnMut(&'static str),
+        ended: impl Fn() -> bool,
+    ) -> Result<Status, Error> {
+        let unless_ended = |status: Status| if ended() { Err(Error::Cancelled) } else { Ok(status) };
+        let mut status = self.fresh_status()?;
+        if status.is_coming_up() && status.jtc_init == 0 && status.errors == 0 {
+            waits("the drives hold the arm");
+            status = self.wait_for("HoldPos", BRING_UP, |s| {
+                s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error]) || ended()
+            })?;
+            if status.state == ControllerState::Error {
+                return Err(StateError::Device { status: Box::new(status) }.into());
+            }
+        }
+        let mut status = unless_ended(status)?;
+        if status.state != ControllerState::HoldPos {
+            return Err(StateError::NotReady { status: Box::new(status) }.into());
+        }
+        let joints = words::absent(&status);
+        if !joints.is_empty() {
+            return Err(StateError::Absent { joints }.into());
+        }
+        if !words::is_held(&status) {
+            waits("all drives are enabled");
+            status = self.wait_for("all drives enabled", BRING_UP, |s| words::is_held(s) || ended())?;
+        }
+        unless_ended(status)
+    }
+}

@@ -79,7 +79,7 @@ impl host_kit::Diagnose for TokenError {
 }
 
 /// 32 random bytes as text.
-fn random() -> Result<String, TokenError> {
+pub(crate) fn random() -> Result<String, TokenError> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
     Ok(URL_SAFE_NO_PAD.encode(bytes))

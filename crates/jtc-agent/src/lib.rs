@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod api;
+pub mod jobs;
 pub mod line;
 pub mod log;
 pub mod owner;

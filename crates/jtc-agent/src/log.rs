@@ -2,13 +2,16 @@
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::SystemTime;
 
 use serde_json::{Value, json};
+
+use crate::line::LineEvent;
+use crate::owner::Observer;
 
 /// Lines that may wait for a slow disk.
 const WAITING_MAX: usize = 4096;
@@ -88,5 +91,36 @@ fn write(mut file: File, lines: &Receiver<Value>, waiting: &AtomicUsize, mut fai
             failed(error);
         }
         fails = written.is_err();
+    }
+}
+
+/// Writes what happens on a line to a log of commands.
+pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
+    Box::new(move |_, event| {
+        let (what, facts) = logged(event);
+        log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+    })
+}
+
+/// An event of the line as a line of the log: what happened, and what is to be known of it.
+fn logged(event: &LineEvent) -> (&'static str, Value) {
+    match event {
+        LineEvent::Sent { client, frame_type, .. } => {
+            ("sent", json!({ "client": client.0, "frame": frame_type.name() }))
+        }
+        LineEvent::Answered { client, response } => {
+            ("answered", json!({ "client": client.0, "response": response.to_string() }))
+        }
+        LineEvent::Denied { client, frame_type, denied } => {
+            ("denied", json!({ "client": client.0, "frame": frame_type.name(), "why": denied.to_string() }))
+        }
+        LineEvent::Lease(lease) => ("lease", json!({ "client": lease.as_ref().map(|lease| lease.holder.0) })),
+        LineEvent::PolicyApplied { client, policy } => {
+            ("policy", json!({ "client": client.0, "policy": policy }))
+        }
+        LineEvent::NotTaken => ("not-taken", json!({ "frame": "TrajSetExecStatus" })),
+        LineEvent::PutOut { client, reason } => {
+            ("put-out", json!({ "client": client.0, "why": reason.to_string() }))
+        }
     }
 }

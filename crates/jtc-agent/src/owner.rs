@@ -86,6 +86,17 @@ impl Line {
         self.0.changed.subscribe()
     }
 
+    /// Number of the last Stop or Pause.
+    pub fn last_halt(&self) -> u64 {
+        self.0.lock().line.last_halt()
+    }
+
+    /// Waits until something is delivered, at most so long.
+    pub fn wait(&self, timeout: Duration) {
+        // Whoever waits looks for itself, whatever woke it.
+        drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
+    }
+
     /// Those who wait for something look whether it is there.
     pub fn wake(&self) {
         self.0.wake();
@@ -96,10 +107,34 @@ impl Line {
         self.0.lock().lost.clone()
     }
 
-    /// A client's port: whatever speaks over a serial port speaks over it. The client goes when it is dropped.
-    pub fn connect(&self, introduction: Introduction) -> ClientPort {
+    /// A client comes; it goes when what is returned is dropped.
+    pub fn join(&self, introduction: Introduction) -> Joined {
         let client = self.with(|line, _| line.join(introduction));
-        ClientPort { shared: self.0.clone(), client, read: Vec::new(), denied: None }
+        Joined { line: self.clone(), client }
+    }
+
+    /// A client's port: whatever speaks over a serial port speaks over it.
+    pub fn connect(&self, introduction: Introduction) -> ClientPort {
+        ClientPort { joined: self.join(introduction), read: Vec::new(), denied: None }
+    }
+}
+
+/// A client, as long as it is there.
+pub struct Joined {
+    line: Line,
+    client: ClientId,
+}
+
+impl Joined {
+    /// Its number.
+    pub fn client(&self) -> ClientId {
+        self.client
+    }
+}
+
+impl Drop for Joined {
+    fn drop(&mut self) {
+        self.line.with(|line, now| line.leave(self.client, now));
     }
 }
 
@@ -199,8 +234,7 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
 
 /// A client's end of the line.
 pub struct ClientPort {
-    shared: Arc<Shared>,
-    client: ClientId,
+    joined: Joined,
     /// Bytes that were delivered and not read yet.
     read: Vec<u8>,
     denied: Option<Denied>,
@@ -209,7 +243,11 @@ pub struct ClientPort {
 impl ClientPort {
     /// Whose it is.
     pub fn client(&self) -> ClientId {
-        self.client
+        self.joined.client
+    }
+
+    fn shared(&self) -> &Shared {
+        &self.joined.line.0
     }
 
     /// What was delivered, waiting for it at most so long.
@@ -219,13 +257,13 @@ impl ClientPort {
     /// [`PortError::Gone`] when the port is, or when this client was put out.
     pub fn deliveries(&mut self, timeout: Duration) -> Result<Vec<Delivery>, PortError> {
         let end = Instant::now() + timeout;
-        let mut state = self.shared.lock();
+        let mut state = self.shared().lock();
         loop {
             // What this client had sent before has come: it was sent in this process.
             let last = state.line.last_halt();
-            state.line.confirm_halt(self.client, last);
-            let deliveries = state.line.take_deliveries(self.client);
-            let gone = || PortError::Gone { path: self.shared.name.clone() };
+            state.line.confirm_halt(self.joined.client, last);
+            let deliveries = state.line.take_deliveries(self.joined.client);
+            let gone = || PortError::Gone { path: self.shared().name.clone() };
             match deliveries {
                 Some(deliveries) if !deliveries.is_empty() => return Ok(deliveries),
                 _ if state.lost.is_some() => return Err(gone()),
@@ -236,16 +274,9 @@ impl ClientPort {
             if left.is_zero() {
                 return Ok(Vec::new());
             }
-            let waited = self.shared.delivered.wait_timeout(state, left);
+            let waited = self.shared().delivered.wait_timeout(state, left);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-    }
-}
-
-impl Drop for ClientPort {
-    fn drop(&mut self) {
-        let now = self.shared.now();
-        self.shared.lock().line.leave(self.client, now);
     }
 }
 
@@ -267,25 +298,25 @@ impl Port for ClientPort {
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let now = self.shared.now();
-        let mut state = self.shared.lock();
+        let now = self.shared().now();
+        let mut state = self.shared().lock();
         if state.lost.is_some() {
-            return Err(PortError::Gone { path: self.shared.name.clone() });
+            return Err(PortError::Gone { path: self.shared().name.clone() });
         }
-        state.line.from_client(self.client, bytes, now);
+        state.line.from_client(self.joined.client, bytes, now);
         Ok(())
     }
 
     fn now(&self) -> Duration {
-        self.shared.now()
+        self.shared().now()
     }
 
     fn baud(&self) -> Option<u32> {
-        self.shared.baud
+        self.shared().baud
     }
 
     fn name(&self) -> String {
-        self.shared.name.clone()
+        self.shared().name.clone()
     }
 
     fn take_denial(&mut self) -> Option<String> {

@@ -1,36 +1,50 @@
 //! The agent's API: what is asked by HTTP, and one socket for a client's end of the line.
+mod commands;
+mod error;
+mod events;
+mod lease;
 mod objects;
+mod questions;
+mod runs;
 mod socket;
+mod trajectories;
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::{ConnectInfo, Request, State};
+use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json, Router};
+use jtc_host::ErrorKind;
 use jtc_wire::ExecCommand;
 use serde_json::json;
 use tokio::sync::Semaphore;
-use tower_http::limit::RequestBodyLimitLayer;
 use tower_http::timeout::TimeoutLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::access::{Access, Refusal, Request as Asked};
+use crate::access::{Access, Refusal, Request as Asked, TokenError, random};
+use crate::jobs::Jobs;
 use crate::line::{OWNER, Role};
 use crate::log::CommandLog;
 use crate::owner::Line;
 
-pub use objects::{ControllerObject, ErrorObject, JointObject, LeaseObject, SentObject, StatusObject};
-pub use socket::{CLOSE_PUT_OUT, Hello, Notice, logged};
+pub use error::ErrorObject;
+pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
+pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
+
+use error::Refusals;
 
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
+/// Longest of a trajectory: 12,000 points as text, with room to spare. So many of them are read at once.
+const TRAJECTORY_MAX: usize = 16 << 20;
+const TRAJECTORIES_AT_ONCE: usize = 4;
 /// Longest that a request may take.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 /// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
@@ -41,12 +55,16 @@ const OPERATORS_MAX: usize = 32;
 #[derive(Clone)]
 pub struct Agent {
     line: Line,
+    jobs: Arc<Jobs>,
     access: Arc<Access>,
     log: Arc<Mutex<CommandLog>>,
+    /// A number of its own, by which clients know that it is another one.
+    id: Arc<str>,
     port: Arc<str>,
     simulated: bool,
     viewers: Arc<Semaphore>,
     operators: Arc<Semaphore>,
+    bodies: Arc<Semaphore>,
 }
 
 /// Who asks.
@@ -58,10 +76,31 @@ struct Caller {
 
 impl Agent {
     /// An agent of a line. `port` is what people call it.
-    pub fn new(line: Line, access: Access, log: Arc<Mutex<CommandLog>>, port: &str, simulated: bool) -> Self {
-        let (viewers, operators) = (Semaphore::new(VIEWERS_MAX), Semaphore::new(OPERATORS_MAX));
-        let (viewers, operators) = (Arc::new(viewers), Arc::new(operators));
-        Self { line, access: Arc::new(access), log, port: port.into(), simulated, viewers, operators }
+    ///
+    /// # Errors
+    ///
+    /// The system has no random numbers.
+    pub fn new(
+        line: Line,
+        jobs: Arc<Jobs>,
+        access: Access,
+        log: Arc<Mutex<CommandLog>>,
+        port: &str,
+        simulated: bool,
+    ) -> Result<Self, TokenError> {
+        let room = |most| Arc::new(Semaphore::new(most));
+        Ok(Self {
+            line,
+            jobs,
+            access: Arc::new(access),
+            log,
+            id: random()?.get(..8).unwrap_or_default().into(),
+            port: port.into(),
+            simulated,
+            viewers: room(VIEWERS_MAX),
+            operators: room(OPERATORS_MAX),
+            bodies: room(TRAJECTORIES_AT_ONCE),
+        })
     }
 
     /// Everything that is served.
@@ -72,9 +111,9 @@ impl Agent {
             move || async move { ([(header::CONTENT_TYPE, "application/json")], description.to_string()) };
         router
             .route("/api/line", axum::routing::get(socket::line))
+            .route("/api/stream", axum::routing::get(events::stream))
             .route("/openapi.json", axum::routing::get(openapi))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
-            .layer(RequestBodyLimitLayer::new(BODY_MAX))
             .layer(from_fn_with_state(self.clone(), let_in))
             .with_state(self)
     }
@@ -83,27 +122,63 @@ impl Agent {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Stops or pauses for somebody who asked by HTTP.
+    /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
+    /// way from there may have been sent before.
     fn halt(
         &self,
         caller: &Caller,
+        headers: &HeaderMap,
         command: ExecCommand,
-    ) -> Result<Json<SentObject>, (StatusCode, Json<ErrorObject>)> {
+    ) -> Result<Json<SentObject>, ErrorObject> {
+        // Who it is does not matter, but for going on later.
+        let client = self.client(caller, headers).ok().map(|(client, _)| client);
+        let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();
         let facts = json!({
-            "command": command.name(), "from": caller.peer.to_string(), "by": "http", "lost": lost,
+            "command": command.name(), "from": caller.peer.to_string(), "by": name, "lost": lost,
         });
         self.note("halt", facts);
         if let Some(lost) = lost {
-            let object = ErrorObject {
-                code: "no-link".into(),
-                message: format!("{lost}: nothing was sent; the arm may be moving"),
-                next: "the emergency stop, if it is".into(),
-            };
-            return Err((StatusCode::SERVICE_UNAVAILABLE, Json(object)));
+            let message = format!("{lost}: nothing was sent; the arm may be moving");
+            let object = ErrorObject::new("no-link", message, "the emergency stop, if it is");
+            return Err(object.kind(ErrorKind::NoLink));
         }
-        self.line.with(|line, now| line.halt(OWNER, &caller.peer.to_string(), command, now));
+        let number = self.line.with(|line, now| {
+            line.halt(OWNER, &name, command, now);
+            line.last_halt()
+        });
+        if let Some(client) = client {
+            client.has_halted(number);
+        }
         Ok(Json(SentObject { sent: command.name().to_owned() }))
+    }
+
+    /// The controller, as its last status has it, and who commands.
+    fn status(&self, caller: &Caller) -> StatusObject {
+        let lost = self.line.lost();
+        let (status, lease, clients) = self.line.with(|line, now| {
+            let name = |client| line.introduction(client).map(|client| client.name.clone());
+            let lease = line.lease().map(|lease| LeaseObject {
+                holder: name(lease.holder).unwrap_or_default(),
+                age_ms: now.saturating_sub(lease.since).as_millis() as u64,
+                left_ms: lease.until.map(|until| until.saturating_sub(now).as_millis() as u64),
+                wanted_by: lease.wanted_by.and_then(name),
+            });
+            let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
+            (status, lease, line.clients())
+        });
+        StatusObject {
+            simulated: self.simulated,
+            port: self.port.to_string(),
+            lost,
+            age_ms: status.as_ref().map(|(age, _)| age.as_millis() as u64),
+            controller: status.as_ref().map(|(_, status)| status.into()),
+            lease,
+            clients,
+            role: caller.role,
+            agent: self.id.to_string(),
+            last_event: self.jobs.journal.last(),
+        }
     }
 }
 
@@ -130,82 +205,81 @@ fn text(description: &utoipa::openapi::OpenApi) -> String {
 struct Description;
 
 fn described() -> OpenApiRouter<Agent> {
-    OpenApiRouter::with_openapi(Description::openapi())
+    let trajectories = OpenApiRouter::new()
+        .routes(routes!(trajectories::put, trajectories::delete))
+        .layer(DefaultBodyLimit::max(TRAJECTORY_MAX));
+    let others = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(status))
         .routes(routes!(stop))
         .routes(routes!(pause))
+        .routes(routes!(events::events))
+        .routes(routes!(questions::info))
+        .routes(routes!(lease::take, lease::renew, lease::release))
+        .routes(routes!(trajectories::list))
+        .routes(routes!(trajectories::check))
+        .routes(routes!(runs::begin_run))
+        .routes(routes!(runs::begin_move))
+        .routes(routes!(runs::jobs))
+        .routes(routes!(runs::job))
+        .routes(routes!(commands::resume))
+        .routes(routes!(commands::speed))
+        .routes(routes!(commands::jog))
+        .routes(routes!(commands::teach))
+        .routes(routes!(commands::gripper))
+        .routes(routes!(commands::clear))
+        .routes(routes!(commands::disable))
+        .routes(routes!(commands::recover))
+        .routes(routes!(questions::payload, commands::set_payload))
+        .layer(DefaultBodyLimit::max(BODY_MAX));
+    others.merge(trajectories)
 }
 
 /// The controller, as its last status has it, and who commands.
 #[utoipa::path(
     get,
     path = "/api/status",
-    responses(
-        (status = 200, description = "What the controller reports", body = StatusObject),
-        (status = 401, description = "The token is missing or none of this agent's", body = ErrorObject),
-        (status = 403, description = "The request comes from a page of another site, or asks for another name", body = ErrorObject),
-        (status = 429, description = "Too many wrong tokens came", body = ErrorObject),
-    )
+    responses((status = 200, description = "What the controller reports", body = StatusObject), Refusals)
 )]
 async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>) -> Json<StatusObject> {
-    let lost = agent.line.lost();
-    let (status, lease, clients) = agent.line.with(|line, now| {
-        let name = |client| line.introduction(client).map(|client| client.name.clone());
-        let lease = line.lease().map(|lease| LeaseObject {
-            holder: name(lease.holder).unwrap_or_default(),
-            age_ms: now.saturating_sub(lease.since).as_millis() as u64,
-            left_ms: lease.until.map(|until| until.saturating_sub(now).as_millis() as u64),
-            wanted_by: lease.wanted_by.and_then(name),
-        });
-        let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
-        (status, lease, line.clients())
-    });
-    Json(StatusObject {
-        simulated: agent.simulated,
-        port: agent.port.to_string(),
-        lost,
-        age_ms: status.as_ref().map(|(age, _)| age.as_millis() as u64),
-        controller: status.as_ref().map(|(_, status)| status.into()),
-        lease,
-        clients,
-        role: caller.role,
-    })
+    Json(agent.status(&caller))
 }
 
 /// Ends the motion on its path, ahead of all else. No lease is needed.
 #[utoipa::path(
     post,
     path = "/api/stop",
+    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
     responses(
         (status = 200, description = "The Stop is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 401, description = "The token is missing or none of this agent's", body = ErrorObject),
-        (status = 403, description = "The request comes from a page of another site, or asks for another name", body = ErrorObject),
         (status = 503, description = "The port is gone: nothing was sent", body = ErrorObject),
+        Refusals
     )
 )]
 async fn stop(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
-) -> Result<Json<SentObject>, (StatusCode, Json<ErrorObject>)> {
-    agent.halt(&caller, ExecCommand::Stop)
+    headers: HeaderMap,
+) -> Result<Json<SentObject>, ErrorObject> {
+    agent.halt(&caller, &headers, ExecCommand::Stop)
 }
 
 /// Pauses the motion on its path, ahead of all else. No lease is needed.
 #[utoipa::path(
     post,
     path = "/api/pause",
+    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
     responses(
         (status = 200, description = "The Pause is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 401, description = "The token is missing or none of this agent's", body = ErrorObject),
-        (status = 403, description = "The request comes from a page of another site, or asks for another name", body = ErrorObject),
         (status = 503, description = "The port is gone: nothing was sent", body = ErrorObject),
+        Refusals
     )
 )]
 async fn pause(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
-) -> Result<Json<SentObject>, (StatusCode, Json<ErrorObject>)> {
-    agent.halt(&caller, ExecCommand::Pause)
+    headers: HeaderMap,
+) -> Result<Json<SentObject>, ErrorObject> {
+    agent.halt(&caller, &headers, ExecCommand::Pause)
 }
 
 /// In front of every handler: who is it, and may it come in?
@@ -258,8 +332,6 @@ impl IntoResponse for Refusal {
             Self::NoToken => (StatusCode::UNAUTHORIZED, "take a token from the agent's token file"),
             Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
         };
-        let object =
-            ErrorObject { code: "not-let-in".into(), message: self.to_string(), next: next.to_owned() };
-        (status, Json(object)).into_response()
+        (status, Json(ErrorObject::new("not-let-in", self.to_string(), next))).into_response()
     }
 }

@@ -1,5 +1,6 @@
 //! What the API sends: one type for each object, from which its description is made.
 use jtc_host::sample::is_measured;
+use jtc_host::session::Payload;
 use jtc_host::words;
 use jtc_wire::{Joint, Status};
 use utoipa::ToSchema;
@@ -29,6 +30,10 @@ pub struct StatusObject {
     pub clients: usize,
     /// What the caller may do.
     pub role: Role,
+    /// Which agent this is, by a number that it was given at its start.
+    pub agent: String,
+    /// Number of the last event.
+    pub last_event: u64,
 }
 
 /// What the controller reports.
@@ -89,22 +94,39 @@ pub struct LeaseObject {
     pub wanted_by: Option<String>,
 }
 
+/// What an arm carries at its flange.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PayloadObject {
+    /// kg; 0: nothing.
+    #[schema(minimum = 0)]
+    pub mass_kg: f64,
+    /// Centre of mass in the frame of the flange, m.
+    #[schema(min_items = 3, max_items = 3)]
+    pub com_m: [f64; 3],
+    /// Inertia about the centre of mass, kg·m²: xx, xy, xz, yy, yz, zz. Zeros: a point mass.
+    #[serde(default)]
+    #[schema(min_items = 6, max_items = 6)]
+    pub inertia_kg_m2: [f64; 6],
+}
+
+impl From<PayloadObject> for Payload {
+    fn from(object: PayloadObject) -> Self {
+        Self { mass: object.mass_kg, com: object.com_m, inertia: object.inertia_kg_m2 }
+    }
+}
+
+impl From<Payload> for PayloadObject {
+    fn from(payload: Payload) -> Self {
+        Self { mass_kg: payload.mass, com_m: payload.com, inertia_kg_m2: payload.inertia }
+    }
+}
+
 /// A command that was handed to the line.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct SentObject {
     /// What was sent: `stop` or `pause`.
     pub sent: String,
-}
-
-/// Why something was not done.
-#[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ErrorObject {
-    /// Short name, for programs.
-    pub code: String,
-    /// What was wrong, for people.
-    pub message: String,
-    /// What helps.
-    pub next: String,
 }
 
 impl From<&Status> for ControllerObject {

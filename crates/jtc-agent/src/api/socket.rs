@@ -13,7 +13,7 @@ use serde_json::json;
 use tokio::time::MissedTickBehavior;
 
 use super::{Agent, Caller};
-use crate::line::{ClientId, Delivery, Introduction, LineEvent, Policy, Role};
+use crate::line::{ClientId, Delivery, Introduction, Policy, Role};
 use crate::owner::Line;
 
 /// Longest message that a client may send.
@@ -22,10 +22,8 @@ const MESSAGE_MAX: usize = 64 << 10;
 const SEND_TIME: Duration = Duration::from_secs(5);
 /// How often a client shows that it is there.
 const PING_TIME: Duration = Duration::from_secs(1);
-/// Of so many in a row nothing is heard: it commands no more.
+/// So many pings in a row without a sign of it: it commands no more.
 const SILENT_MAX: u32 = 4;
-/// Longest name of a client.
-const NAME_MAX: usize = 64;
 /// The socket was closed because the client was put out: it sent no frames, or did not read.
 pub const CLOSE_PUT_OUT: u16 = 4000;
 
@@ -117,26 +115,12 @@ pub(super) async fn line(
     })
 }
 
-/// A client that goes when this does.
-struct Joined {
-    line: Line,
-    client: ClientId,
-}
-
-impl Drop for Joined {
-    fn drop(&mut self) {
-        self.line.with(|line, now| line.leave(self.client, now));
-    }
-}
-
 async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: WebSocket) {
-    let name: String =
-        joining.name.unwrap_or_default().chars().filter(|c| !c.is_control()).take(NAME_MAX).collect();
-    let name = if name.is_empty() { caller.peer.to_string() } else { name };
+    let name = caller.named(joining.name.as_deref().unwrap_or_default());
     let role = caller.role;
     let introduction = Introduction { name: name.clone(), role, policy: joining.policy };
-    let client = agent.line.with(|line, _| line.join(introduction));
-    let joined = Joined { line: agent.line.clone(), client };
+    let joined = agent.line.join(introduction);
+    let client = joined.client();
     agent.note(
         "joined",
         json!({ "client": client.0, "name": name, "role": role, "from": caller.peer.to_string() }),
@@ -155,18 +139,18 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
 
 /// Passes messages both ways until one end has gone. Neither waits for the other: a Stop is read also where nothing is taken.
 async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
-    let heard = AtomicBool::new(true);
+    let alive = AtomicBool::new(true);
     let (to, from) = socket.split();
     tokio::select! {
-        () = receive(line, client, from, &heard) => {}
-        () = deliver(line, client, to, &heard) => {}
+        () = receive(line, client, from, &alive) => {}
+        () = deliver(line, client, to, &alive) => {}
     }
 }
 
 /// What the client sends.
-async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>, heard: &AtomicBool) {
+async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>, alive: &AtomicBool) {
     while let Some(Ok(message)) = from.next().await {
-        heard.store(true, Ordering::Relaxed);
+        alive.store(true, Ordering::Relaxed);
         match message {
             Message::Binary(bytes) => line.with(|line, now| line.from_client(client, &bytes, now)),
             Message::Text(text) => wish(line, client, &text),
@@ -181,7 +165,7 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
 }
 
 /// What it is to get; and whether it is there.
-async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, heard: &AtomicBool) {
+async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
     // What this computer has missed is no silence of the client.
@@ -214,7 +198,7 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
                 changed = changes.changed() => if changed.is_err() { return },
                 _ = pings.tick() => {
                     ping = true;
-                    silent = if heard.swap(false, Ordering::Relaxed) { 0 } else { silent + 1 };
+                    silent = if alive.swap(false, Ordering::Relaxed) { 0 } else { silent + 1 };
                     if silent >= SILENT_MAX {
                         line.with(|line, now| line.lapse(client, now));
                     }
@@ -250,30 +234,4 @@ fn wish(line: &Line, client: ClientId, text: &str) {
 /// False when the client does not take it.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
-}
-
-/// An event of the line as a line of the log of commands; `None` for what is none of its business.
-pub fn logged(event: &LineEvent) -> Option<(&'static str, serde_json::Value)> {
-    match event {
-        LineEvent::Sent { client, frame_type, .. } => {
-            Some(("sent", json!({ "client": client.0, "frame": frame_type.name() })))
-        }
-        LineEvent::Answered { client, response } => {
-            Some(("answered", json!({ "client": client.0, "response": response.to_string() })))
-        }
-        LineEvent::Denied { client, frame_type, denied } => Some((
-            "denied",
-            json!({ "client": client.0, "frame": frame_type.name(), "why": denied.to_string() }),
-        )),
-        LineEvent::Lease(lease) => {
-            Some(("lease", json!({ "client": lease.as_ref().map(|lease| lease.holder.0) })))
-        }
-        LineEvent::PolicyApplied { client, policy } => {
-            Some(("policy", json!({ "client": client.0, "policy": policy })))
-        }
-        LineEvent::NotTaken => Some(("not-taken", json!({ "frame": "TrajSetExecStatus" }))),
-        LineEvent::PutOut { client, reason } => {
-            Some(("put-out", json!({ "client": client.0, "why": reason.to_string() })))
-        }
-    }
 }

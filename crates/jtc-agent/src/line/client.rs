@@ -33,7 +33,9 @@ pub enum Role {
 }
 
 /// What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
     /// It goes on, as with a host whose cable is pulled.
@@ -111,6 +113,8 @@ pub(super) struct Client {
     unread: usize,
     /// No motion begins before: somebody else has stopped the arm.
     pub calm_until: Duration,
+    /// For how long it commands without showing that it is there; `None`: as long as it is connected.
+    pub lasts: Option<Duration>,
     /// The last halt of somebody else, by number, and the last that is known to have been seen.
     pub halted: u64,
     pub seen: u64,
@@ -130,6 +134,7 @@ impl Client {
             deliveries: VecDeque::new(),
             unread: 0,
             calm_until: Duration::ZERO,
+            lasts: None,
             halted: 0,
             seen: 0,
             allowance: FRAMES_AT_ONCE,

@@ -50,7 +50,8 @@ impl SharedLine {
         self.lease.as_ref()
     }
 
-    /// Takes, or renews, the lease. `lasts`: for how long without renewal; `None`: as long as the client is there.
+    /// Takes, or renews, the lease. `lasts`: for how long without renewal, also where the client takes it later by a command or is given it;
+    /// `None`: as long as the client is there.
     ///
     /// # Errors
     ///
@@ -61,6 +62,9 @@ impl SharedLine {
         lasts: Option<Duration>,
         now: Duration,
     ) -> Result<(), Denied> {
+        if let Some(client) = self.clients.get_mut(&client) {
+            client.lasts = lasts;
+        }
         self.may_command(client, now)?;
         if let Some(lease) = &mut self.lease {
             lease.until = lasts.map(|lasts| now + lasts);
@@ -76,7 +80,7 @@ impl SharedLine {
     pub fn release_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
         let next = lease.wanted_by.filter(|next| self.clients.contains_key(next));
-        self.set_lease(next.map(|holder| Lease { holder, since: now, until: None, wanted_by: None }));
+        self.set_lease(next.map(|holder| self.lease_of(holder, now)));
         Ok(())
     }
 
@@ -117,10 +121,16 @@ impl SharedLine {
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
             None => {
-                self.set_lease(Some(Lease { holder: id, since: now, until: None, wanted_by: None }));
+                self.set_lease(Some(self.lease_of(id, now)));
                 Ok(())
             }
         }
+    }
+
+    /// One that this client has from now on.
+    fn lease_of(&self, holder: ClientId, now: Duration) -> Lease {
+        let lasts = self.clients.get(&holder).and_then(|client| client.lasts);
+        Lease { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
     }
 
     pub(super) fn end_lapsed(&mut self, now: Duration) {

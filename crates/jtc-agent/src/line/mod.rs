@@ -63,8 +63,8 @@ pub struct SharedLine {
     last_turn: ClientId,
     lease: Option<Lease>,
     halts: Halts,
-    /// How many halts there were, and who asked for the last.
-    halted: (u64, String),
+    /// How many halts there were, who asked for the last, and for what.
+    halted: (u64, String, ExecCommand),
     /// Frames of the owner itself.
     own: VecDeque<HostFrame>,
     receiver: StatusReceiver,
@@ -89,7 +89,7 @@ impl SharedLine {
             last_turn: OWNER,
             lease: None,
             halts: Halts::default(),
-            halted: (0, String::new()),
+            halted: (0, String::new(), ExecCommand::Stop),
             own: VecDeque::new(),
             receiver: StatusReceiver::new(),
             status: None,
@@ -127,6 +127,13 @@ impl SharedLine {
         self.clients.get(&client).map(|client| &client.introduction)
     }
 
+    /// The policy of a client from now on.
+    pub fn set_policy(&mut self, client: ClientId, policy: Policy) {
+        if let Some(client) = self.clients.get_mut(&client) {
+            client.introduction.policy = policy;
+        }
+    }
+
     /// How many clients there are.
     pub fn clients(&self) -> usize {
         self.clients.len()
@@ -141,7 +148,7 @@ impl SharedLine {
     /// until the device has taken it. `name`: who it is, for those who ask why their frames were not passed on.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
-        self.halted = (self.halted.0 + 1, name.clone());
+        self.halted = (self.halted.0 + 1, name.clone(), command);
         for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != client) {
             (other.halted, other.calm_until) = (self.halted.0, now + CALM);
         }
@@ -214,6 +221,28 @@ impl SharedLine {
     /// Number of the last halt: whoever carries a client's bytes asks it whether it has seen that, behind what it has sent before.
     pub fn last_halt(&self) -> u64 {
         self.halted.0
+    }
+
+    /// Who asked for the last halt, and for what.
+    pub fn last_halt_by(&self) -> (&str, ExecCommand) {
+        (&self.halted.1, self.halted.2)
+    }
+
+    /// The client asked for this halt itself, and goes on now: nothing that it had sent before is to be waited for. Not where there was
+    /// another one since.
+    pub fn go_on_after(&mut self, client: ClientId, halt: u64, now: Duration) {
+        if let Some(client) = self.clients.get_mut(&client).filter(|_| halt == self.halted.0) {
+            (client.calm_until, client.seen) = (now, halt);
+        }
+    }
+
+    /// A frame that begins a motion would be taken from this client now.
+    ///
+    /// # Errors
+    ///
+    /// [`Denied`].
+    pub fn may_move(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
+        self.may_send(client, Class::Motion, now)
     }
 
     /// Everything that the client had sent when it did not know of this halt has come.

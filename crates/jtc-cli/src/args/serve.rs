@@ -14,8 +14,8 @@ pub struct ServeArgs {
     /// A simulated controller instead of a port
     #[arg(long, env = "JTC_SIM", value_parser = FalseyValueParser::new(), conflicts_with = "port")]
     pub sim: bool,
-    /// Arm to simulate with --sim, TOML or URDF; default: the built-in one
-    #[arg(long, env = "JTC_ARM", value_name = "FILE", requires = "sim")]
+    /// Arm, TOML or URDF: the one to simulate with --sim, and that of a controller that cannot be asked for its own; default: the built-in one
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Address to listen at; beyond this computer everybody needs a token
     #[arg(long, env = "JTC_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8780")]
@@ -26,6 +26,9 @@ pub struct ServeArgs {
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
+    /// Directory that keeps trajectories by number, as files like 7-pick.csv; without it they are kept as long as the agent runs
+    #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
+    pub trajectories: Option<PathBuf>,
     #[command(flatten)]
     pub link: LinkArgs,
 }

@@ -1,13 +1,14 @@
 //! `jtc serve`: the agent that owns a port.
 
 use std::net::TcpListener;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output, Stop};
 use jtc_agent::access::{Access, Tokens, default_token_file};
-use jtc_agent::api::{Agent, logged};
-use jtc_agent::log::CommandLog;
+use jtc_agent::api::Agent;
+use jtc_agent::jobs::{Jobs, Store};
+use jtc_agent::log::{CommandLog, observer};
 use jtc_agent::{Line, Owner, serve as service};
 use jtc_client::agents::{Registered, register};
 use jtc_host::Arm;
@@ -33,6 +34,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
+    let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
             .hint("another agent may listen there: name another address with --listen")
@@ -45,14 +47,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let log = Arc::new(Mutex::new(log));
-    let own_log = log.clone();
-    let owner = Owner::new(
-        port,
-        Box::new(move |_, event| {
-            let Some((what, facts)) = logged(event) else { return };
-            own_log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
-        }),
-    );
+    let owner = Owner::new(port, observer(log.clone()));
     let registered = Registered { url: url.clone(), port: name.clone(), token_file: token_file.clone() };
     // Without it every command can still be given the address.
     let registration = register(&registered).ok().flatten();
@@ -63,7 +58,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
     let access = Access::new(tokens, listen, &args.names);
-    let agent = Agent::new(owner.line(), access, log, &name, args.sim);
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    let agent = Agent::new(owner.line(), Jobs::new(owner.line(), store, arm), access, log, &name, args.sim)?;
     let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim });
     out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
     let (line, ended) = (owner.line(), stop.clone());

@@ -88,7 +88,11 @@ impl<P: Port> Session<P> {
             match flow {
                 Flow::Continue => {}
                 Flow::Pause if status.is_executing() => unless_ended(self.pause())?,
-                Flow::Resume if status.trajectory == TrajectoryState::Pause => self.go()?,
+                Flow::Resume if status.trajectory == TrajectoryState::Pause => match self.go() {
+                    // Somebody else has just paused it: it stays so, and can be asked for again.
+                    Err(Error::Link(LinkError::Denied { .. })) => {}
+                    other => other?,
+                },
                 Flow::Speed(percent) => match self.set_speed(f64::from(percent) / 100.0) {
                     // The motion goes on as it was, and is followed.
                     Err(Error::Link(error)) if !matches!(error, LinkError::Port(_)) => {}

@@ -20,6 +20,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use extension::Extensions;
+pub use jtc_core::Payload;
 use jtc_wire::{
     DataStatus, FrameStatus, FrameType, FromDevice, Response, Status, StatusReceiver, TrajectoryState,
 };

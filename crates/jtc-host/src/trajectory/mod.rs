@@ -12,6 +12,7 @@ mod tests;
 
 use std::path::Path;
 
+pub use jtc_core::POINTS_MAX;
 use jtc_core::{JOINTS, SetPoint};
 use jtc_wire::{ACCELERATION_SCALE, Joint, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 

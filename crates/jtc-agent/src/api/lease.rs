@@ -1,0 +1,217 @@
+//! The lease of clients that have no connection of their own: who commands shows by each request that it is there.
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
+use jtc_host::ErrorKind;
+use serde_json::json;
+use utoipa::ToSchema;
+
+use super::error::{Body, Denials, Refusals};
+use super::{Agent, Caller, ErrorObject};
+use crate::access::random;
+use crate::jobs::{Commander, Unable};
+use crate::line::{Denied, Introduction, Policy, Role};
+
+/// The header with the key of a lease.
+pub(super) const KEY: &str = "lease-key";
+/// How long a lease may last without a request, s.
+const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
+/// Longest name of a client.
+const NAME_MAX: usize = 64;
+
+/// Who wants to command.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeaseRequest {
+    /// What people are to call it.
+    #[schema(max_length = 64)]
+    pub name: String,
+    /// How long the lease lasts without a request of this client, s.
+    #[serde(default = "ten")]
+    #[schema(minimum = 1, maximum = 3600)]
+    pub lasts_s: f64,
+    /// What becomes of a motion when it has lapsed.
+    #[serde(default)]
+    pub policy: Policy,
+    /// Where another client commands: ask it for the lease, and wait for it.
+    #[serde(default)]
+    pub ask: bool,
+}
+
+fn ten() -> f64 {
+    10.0
+}
+
+/// A client that may command, or waits for it.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LeaseGrant {
+    /// Goes with each request of this client, in the header `Lease-Key`. Nobody else is to know it.
+    pub key: String,
+    /// It commands; else it waits until the one who does lets it go.
+    pub held: bool,
+    /// How long it lasts without a request, s.
+    pub lasts_s: f64,
+    /// What becomes of a motion when it has lapsed.
+    pub policy: Policy,
+}
+
+/// How a lease is.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LeaseState {
+    /// This client commands.
+    pub held: bool,
+    /// Who asks for the lease.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_by: Option<String>,
+}
+
+/// A name without what would disturb a line of text.
+pub(super) fn plain(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
+}
+
+impl Caller {
+    /// What people call a client that names itself so.
+    pub(super) fn named(&self, name: &str) -> String {
+        let name = plain(name);
+        if name.is_empty() { self.peer.to_string() } else { name }
+    }
+}
+
+impl Agent {
+    /// The client that asks with a key, with its lease renewed: it commands, or it is an error.
+    pub(super) fn commander(
+        &self,
+        caller: &Caller,
+        headers: &HeaderMap,
+    ) -> Result<Arc<Commander>, ErrorObject> {
+        let (commander, lasts) = self.client(caller, headers)?;
+        let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
+        held.map_err(ErrorObject::from)?;
+        Ok(commander)
+    }
+
+    /// The client that asks with a key, and how often it does at least.
+    pub(super) fn client(
+        &self,
+        caller: &Caller,
+        headers: &HeaderMap,
+    ) -> Result<(Arc<Commander>, Duration), ErrorObject> {
+        if caller.role != Role::Operator {
+            return Err(Denied::Viewer.into());
+        }
+        let key = headers.get(KEY).and_then(|key| key.to_str().ok());
+        let next = "take the lease with POST /api/lease, and send its key in the header Lease-Key";
+        let Some(key) = key else {
+            return Err(ErrorObject::new("no-lease", "commands need a lease", next));
+        };
+        self.jobs.commander(key).ok_or_else(|| {
+            ErrorObject::new("no-lease", "this key is of no lease, or of one that lapsed long ago", next)
+        })
+    }
+}
+
+/// Takes the lease: one client commands at a time. It is renewed by every command.
+#[utoipa::path(
+    post,
+    path = "/api/lease",
+    request_body = LeaseRequest,
+    responses(
+        (status = 200, description = "This client commands, or waits for it", body = LeaseGrant),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn take(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Body(request): Body<LeaseRequest>,
+) -> Result<Json<LeaseGrant>, ErrorObject> {
+    if caller.role != Role::Operator {
+        return Err(Denied::Viewer.into());
+    }
+    let LeaseRequest { name, lasts_s, policy, ask } = request;
+    if !LASTS_S.contains(&lasts_s) {
+        let message = format!("lasts_s is {lasts_s}: 1 to 3600 s are possible");
+        return Err(ErrorObject::new("lease", message, "choose how long it may last without a request")
+            .kind(ErrorKind::Usage));
+    }
+    let name = caller.named(&name);
+    let lasts = Duration::from_secs_f64(lasts_s);
+    let key = random().map_err(|e| ErrorObject::diagnosed(&e))?;
+    let introduction = Introduction { name: name.clone(), role: caller.role, policy };
+    let Some(commander) = agent.jobs.admit(&key, introduction, lasts) else {
+        let next = "let leases go that are not needed any more with DELETE /api/lease; they are forgotten after a minute";
+        return Err(ErrorObject::new("full", "too many clients have come for the lease", next));
+    };
+    let client = commander.client;
+    let taken = agent.line.with(|line, now| match line.take_lease(client, Some(lasts), now) {
+        Err(Denied::Held { .. }) if ask => line.want_lease(client).map(|()| false),
+        taken => taken.map(|()| true),
+    });
+    agent.line.wake();
+    let held = taken.map_err(|denied| {
+        agent.jobs.dismiss(&key);
+        ErrorObject::from(denied)
+    })?;
+    agent.note(
+        "joined",
+        json!({ "client": client.0, "name": name, "role": caller.role, "from": caller.peer.to_string() }),
+    );
+    Ok(Json(LeaseGrant { key, held, lasts_s, policy }))
+}
+
+/// Renews the lease, or takes it again where nobody else has.
+#[utoipa::path(
+    put,
+    path = "/api/lease",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    responses(
+        (status = 200, description = "Whether this client commands", body = LeaseState),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn renew(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Result<Json<LeaseState>, ErrorObject> {
+    let (commander, lasts) = agent.client(&caller, &headers)?;
+    let state = agent.line.with(|line, now| {
+        let held = line.take_lease(commander.client, Some(lasts), now).is_ok();
+        let wanted = line.lease().filter(|_| held).and_then(|lease| lease.wanted_by);
+        LeaseState {
+            held,
+            wanted_by: wanted.and_then(|client| line.introduction(client)).map(|c| c.name.clone()),
+        }
+    });
+    Ok(Json(state))
+}
+
+/// Lets the lease go: to the client that has asked for it, if one has. Not while a job of this client goes on.
+#[utoipa::path(
+    delete,
+    path = "/api/lease",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    responses((status = 204, description = "It is let go"), Refusals, Denials)
+)]
+pub(super) async fn release(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Result<StatusCode, ErrorObject> {
+    let (commander, _) = agent.client(&caller, &headers)?;
+    if let Some(job) = commander.job() {
+        return Err(Unable::Busy(Some(job)).into());
+    }
+    // One that waits has none to give.
+    let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
+    agent.line.wake();
+    agent.note("left", json!({ "client": commander.client.0, "name": commander.name }));
+    if let Some(key) = headers.get(KEY).and_then(|key| key.to_str().ok()) {
+        agent.jobs.dismiss(key);
+    }
+    Ok(StatusCode::NO_CONTENT)
+}

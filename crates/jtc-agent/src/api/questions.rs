@@ -1,0 +1,79 @@
+//! What is asked of the controller itself, for all who may look.
+use axum::Json;
+use axum::extract::State;
+use jtc_host::{Error, Session, words};
+use utoipa::ToSchema;
+
+use super::error::{Denials, Refusals};
+use super::objects::PayloadObject;
+use super::{Agent, ErrorObject};
+use crate::owner::ClientPort;
+
+/// Who the controller is.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct InfoObject {
+    /// Version of the extensions of its protocol; 0: it has none, and nothing else is known.
+    pub extension: u8,
+    /// Version of the firmware.
+    pub firmware: String,
+    /// Its git revision.
+    pub revision: String,
+    /// The board.
+    pub board: String,
+    /// Name of the arm in use.
+    pub arm: String,
+    /// Hash of all that decides how the arm moves.
+    pub hash: String,
+    /// Parameters that it has not been given.
+    pub missing: Vec<String>,
+    /// How often it has started.
+    pub boots: u32,
+    /// Why it started last.
+    pub boot_cause: String,
+    /// Since then, s.
+    pub uptime_s: f64,
+    /// Records lost because too many waited.
+    pub lost_records: u32,
+}
+
+impl Agent {
+    async fn ask<T: Send + 'static>(
+        &self,
+        act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, Error> + Send + 'static,
+    ) -> Result<T, ErrorObject> {
+        self.jobs.asker().call_in_turn(act).await?.map_err(|error| ErrorObject::of(&error))
+    }
+}
+
+/// Who the controller is.
+#[utoipa::path(
+    get,
+    path = "/api/info",
+    responses((status = 200, description = "What it says of itself", body = InfoObject), Refusals, Denials)
+)]
+pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>, ErrorObject> {
+    let info = agent.ask(|session| Ok(session.info()?)).await?.unwrap_or_default();
+    Ok(Json(InfoObject {
+        extension: info.version,
+        firmware: info.firmware().to_owned(),
+        revision: info.revision().to_owned(),
+        board: info.board.as_str().to_owned(),
+        arm: info.arm.as_str().to_owned(),
+        hash: format!("{:016x}", info.hash),
+        missing: words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect(),
+        boots: info.boots,
+        boot_cause: info.boot_cause.name().to_owned(),
+        uptime_s: info.uptime_ms as f64 / 1000.0,
+        lost_records: info.lost_records,
+    }))
+}
+
+/// What the arm carries at its flange, as the controller computes.
+#[utoipa::path(
+    get,
+    path = "/api/payload",
+    responses((status = 200, description = "Mass 0: nothing", body = PayloadObject), Refusals, Denials)
+)]
+pub(super) async fn payload(State(agent): State<Agent>) -> Result<Json<PayloadObject>, ErrorObject> {
+    Ok(Json(agent.ask(Session::payload).await?.into()))
+}

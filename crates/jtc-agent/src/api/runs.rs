@@ -1,0 +1,265 @@
+//! Runs and moves: jobs, and what becomes of them.
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
+use jtc_host::ErrorKind;
+use serde_json::json;
+use utoipa::ToSchema;
+
+use super::error::{Body, Denials, Number, Refusals};
+use super::{Agent, Caller, ErrorObject};
+use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
+use crate::line::Policy;
+
+/// A run of a trajectory that is kept.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunRequest {
+    /// Its number.
+    #[schema(minimum = 1, maximum = 99)]
+    pub trajectory: u16,
+    /// Where the arm stands elsewhere it is moved to the first point, at half of the limits at most.
+    #[serde(default)]
+    pub approach: bool,
+    /// % of the trajectory's own speed.
+    #[serde(default = "hundred")]
+    #[schema(minimum = 1, maximum = 1000)]
+    pub speed_percent: f64,
+    /// How often it is run.
+    #[serde(default = "one")]
+    #[schema(minimum = 1, maximum = 1000000)]
+    pub repeat: u32,
+    /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
+    #[serde(default)]
+    pub policy: Option<Policy>,
+    /// The controller cannot be asked for its limits, and those that are built into it are safe for this arm.
+    #[serde(default)]
+    pub accept_device_limits: bool,
+}
+
+/// A move from where the arm stands.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MoveRequest {
+    /// rad, base to wrist.
+    #[schema(min_items = 6, max_items = 6)]
+    pub to_rad: [f64; 6],
+    /// % of what the limits allow.
+    #[serde(default = "hundred")]
+    #[schema(minimum = 1, maximum = 100)]
+    pub speed_percent: f64,
+    /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
+    #[serde(default)]
+    pub policy: Option<Policy>,
+    /// The controller cannot be asked for its limits, and those that are built into it are safe for this arm.
+    #[serde(default)]
+    pub accept_device_limits: bool,
+}
+
+fn hundred() -> f64 {
+    100.0
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// A job: something that takes its time.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct JobObject {
+    /// Its number.
+    pub number: u64,
+    /// What it does.
+    pub what: String,
+    /// Who asked for it.
+    pub client: String,
+    /// `running`, `finished`, `stopped` or `failed`.
+    pub stage: String,
+    /// Motions that were finished, approaches not counted.
+    pub runs: u32,
+    /// Figures of its last motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub result: Option<ResultObject>,
+    /// Why it failed, or was not begun.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorObject>,
+}
+
+/// Figures of a motion.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ResultObject {
+    /// While the trajectory was executed, s.
+    pub executed_s: f64,
+    /// Joints, from the base.
+    #[schema(min_items = 6, max_items = 6)]
+    pub joints: Vec<JointResult>,
+}
+
+/// Figures of a joint.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct JointResult {
+    /// As in the arm file.
+    pub name: String,
+    /// Root mean square of the position error, mrad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_error_mrad: Option<f64>,
+    /// Largest absolute error, mrad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_error_mrad: Option<f64>,
+    /// Largest absolute torque, N·m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_torque_nm: Option<f64>,
+    /// The limit, N·m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_limit_nm: Option<f64>,
+    /// Largest absolute speed, rad/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_velocity_rad_s: Option<f64>,
+}
+
+impl From<Job> for JobObject {
+    fn from(job: Job) -> Self {
+        let Job { number, what, client, stage, done, error } = job;
+        let result = done.summary.map(|summary| ResultObject {
+            executed_s: summary.executed_s,
+            joints: summary
+                .joints
+                .into_iter()
+                .map(|joint| JointResult {
+                    name: joint.name,
+                    rms_error_mrad: joint.rms_error_mrad,
+                    max_error_mrad: joint.max_error_mrad,
+                    peak_torque_nm: joint.peak_torque_nm,
+                    torque_limit_nm: joint.torque_limit_nm,
+                    peak_velocity_rad_s: joint.peak_velocity_rad_s,
+                })
+                .collect(),
+        });
+        Self { number, what, client, stage: stage.name().to_owned(), runs: done.runs, result, error }
+    }
+}
+
+/// Runs a trajectory: a job. It is checked from where the arm stands, uploaded, executed and followed.
+#[utoipa::path(
+    post,
+    path = "/api/runs",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    request_body = RunRequest,
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn begin_run(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    Body(request): Body<RunRequest>,
+) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+    let RunRequest { trajectory: number, approach, speed_percent, repeat, policy, accept_device_limits } =
+        request;
+    within("repeat", f64::from(repeat), 1e6)?;
+    within("speed_percent", speed_percent, 1000.0)?;
+    let stored = agent.jobs.store.get(number).ok_or_else(|| {
+        let next =
+            "keep one with PUT /api/trajectories/{number}; GET /api/trajectories lists those that there are";
+        ErrorObject::new(
+            "no-trajectory",
+            format!("no trajectory has the number {number} (1 to {NUMBER_MAX})"),
+            next,
+        )
+        .kind(ErrorKind::Usage)
+    })?;
+    let what = format!("run of trajectory {number}, {}", stored.name);
+    let course = Course::Along(stored.trajectory.clone());
+    begin(
+        &agent,
+        &caller,
+        &headers,
+        what,
+        policy,
+        Order { course, approach, speed_percent, repeat, accept_device_limits },
+    )
+}
+
+/// Moves the arm from where it stands to joint positions: a job.
+#[utoipa::path(
+    post,
+    path = "/api/moves",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    request_body = MoveRequest,
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn begin_move(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    Body(request): Body<MoveRequest>,
+) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+    let MoveRequest { to_rad, speed_percent, policy, accept_device_limits } = request;
+    within("speed_percent", speed_percent, 100.0)?;
+    let what = format!("move to {}", to_rad.map(|q| q.to_string()).join(", "));
+    let course = Course::To(to_rad);
+    let order = Order { course, approach: false, speed_percent, repeat: 1, accept_device_limits };
+    begin(&agent, &caller, &headers, what, policy, order)
+}
+
+/// From 1 on, and no more than that.
+fn within(name: &str, value: f64, most: f64) -> Result<(), ErrorObject> {
+    if (1.0..=most).contains(&value) {
+        return Ok(());
+    }
+    let message = format!("{name} is {value}: 1 to {most} are possible");
+    Err(ErrorObject::new("request", message, "GET /openapi.json describes each request")
+        .kind(ErrorKind::Usage))
+}
+
+fn begin(
+    agent: &Agent,
+    caller: &Caller,
+    headers: &HeaderMap,
+    what: String,
+    policy: Option<Policy>,
+    order: Order,
+) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+    let commander = agent.commander(caller, headers)?;
+    let job = agent.jobs.begin(&commander, what.clone(), move |task, session| run(task, session, &order))?;
+    // Only now: a job that goes on keeps its own.
+    if let Some(policy) = policy {
+        agent.line.with(|line, _| line.set_policy(commander.client, policy));
+    }
+    agent.note(
+        "job",
+        json!({ "client": commander.client.0, "job": job.number, "what": what, "policy": policy }),
+    );
+    Ok((StatusCode::ACCEPTED, Json(job.into())))
+}
+
+/// The last jobs, oldest first.
+#[utoipa::path(
+    get,
+    path = "/api/jobs",
+    responses((status = 200, description = "Those that are remembered", body = Vec<JobObject>), Refusals)
+)]
+pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
+    Json(agent.jobs.list().into_iter().map(JobObject::from).collect())
+}
+
+/// A job, while it goes on and afterwards.
+#[utoipa::path(
+    get,
+    path = "/api/jobs/{number}",
+    params(("number" = u64, Path, description = "Number of the job")),
+    responses(
+        (status = 200, description = "How it is", body = JobObject),
+        (status = 404, description = "There is none", body = ErrorObject),
+        Refusals
+    )
+)]
+pub(super) async fn job(
+    State(agent): State<Agent>,
+    Number(number): Number<u64>,
+) -> Result<Json<JobObject>, ErrorObject> {
+    agent
+        .jobs
+        .job(number)
+        .map(|job| Json(job.into()))
+        .ok_or_else(|| ErrorObject::nothing("job", number, "/api/jobs"))
+}

@@ -1,0 +1,233 @@
+//! Trajectories by number: kept, checked, listed.
+use axum::extract::{FromRequest as _, Request, State};
+use axum::http::StatusCode;
+use axum::{Extension, Json};
+use jtc_host::check::Verdict;
+use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session};
+use jtc_wire::Joint;
+use serde_json::json;
+use utoipa::ToSchema;
+
+use super::error::{Body, Denials, Number, Refusals};
+use super::{Agent, Caller, ErrorObject};
+use crate::jobs::Stored;
+use crate::line::{Denied, Role};
+use crate::owner::ClientPort;
+
+/// A trajectory to keep.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrajectoryRequest {
+    /// What people are to call it.
+    #[schema(max_length = 64)]
+    pub name: String,
+    /// A file's text in any form that jtc traj run takes but recordings: CSV with a time column and joints, JSON, or a ROS JointTrajectory.
+    pub text: String,
+    /// Its numbers are degrees.
+    #[serde(default)]
+    pub degrees: bool,
+}
+
+/// A trajectory that is kept.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct TrajectoryObject {
+    /// Its number.
+    pub number: u16,
+    /// What people call it.
+    pub name: String,
+    /// Points.
+    pub points: usize,
+    /// ms between two points.
+    pub step_ms: u16,
+    /// s.
+    pub duration_s: f64,
+    /// What was derived or left out when it was read.
+    pub notes: Vec<String>,
+}
+
+impl From<&Stored> for TrajectoryObject {
+    fn from(stored: &Stored) -> Self {
+        let Stored { number, name, trajectory, notes } = stored;
+        Self {
+            number: *number,
+            name: name.clone(),
+            points: trajectory.points.len(),
+            step_ms: trajectory.step_ms,
+            duration_s: trajectory.duration_s(),
+            notes: notes.clone(),
+        }
+    }
+}
+
+/// What a check found.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct CheckObject {
+    /// Nothing forbids to run it from its first point.
+    pub passed: bool,
+    /// s.
+    pub duration_s: f64,
+    /// What is wrong, worst first.
+    pub problems: Vec<ProblemObject>,
+}
+
+/// A thing that is wrong with a trajectory.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ProblemObject {
+    /// In words, with value, limit and place.
+    pub message: String,
+    /// Which joint; missing: the trajectory as a whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<u8>,
+    /// Point, from 0, where it is worst.
+    pub point: usize,
+    /// Time along the path, s.
+    pub time_s: f64,
+    /// Worst value; missing where it is no number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Its limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
+    /// It does not forbid to run the trajectory.
+    pub warning: bool,
+}
+
+impl From<&Verdict> for CheckObject {
+    fn from(verdict: &Verdict) -> Self {
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        let problems = verdict.problems.iter().map(|problem| ProblemObject {
+            message: problem.to_string(),
+            joint: problem.joint.map(Joint::number),
+            point: problem.point,
+            time_s: problem.time_s,
+            value: finite(problem.value),
+            limit: finite(problem.limit),
+            warning: problem.warning,
+        });
+        Self { passed: verdict.is_ok(), duration_s: verdict.duration_s, problems: problems.collect() }
+    }
+}
+
+/// Only operators change what others may run.
+fn operator(caller: &Caller) -> Result<(), ErrorObject> {
+    if caller.role == Role::Operator { Ok(()) } else { Err(Denied::Viewer.into()) }
+}
+
+/// The trajectories that are kept.
+#[utoipa::path(
+    get,
+    path = "/api/trajectories",
+    responses((status = 200, description = "All of them, by number", body = Vec<TrajectoryObject>), Refusals)
+)]
+pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObject>> {
+    Json(agent.jobs.store.list().iter().map(|stored| TrajectoryObject::from(&**stored)).collect())
+}
+
+/// Keeps a trajectory under a number, in place of what had it. A run that has begun goes on with what it has.
+#[utoipa::path(
+    put,
+    path = "/api/trajectories/{number}",
+    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    request_body = TrajectoryRequest,
+    responses((status = 200, description = "What is kept", body = TrajectoryObject), Refusals, Denials)
+)]
+pub(super) async fn put(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Number(number): Number<u16>,
+    request: Request,
+) -> Result<Json<TrajectoryObject>, ErrorObject> {
+    operator(&caller)?;
+    let room = agent.bodies.acquire().await;
+    let Body(request): Body<TrajectoryRequest> = Body::from_request(request, &()).await?;
+    keep(&agent, &caller, number, request).await.inspect(|_| drop(room))
+}
+
+async fn keep(
+    agent: &Agent,
+    caller: &Caller,
+    number: u16,
+    request: TrajectoryRequest,
+) -> Result<Json<TrajectoryObject>, ErrorObject> {
+    let TrajectoryRequest { name, text, degrees } = request;
+    let name = super::lease::plain(&name);
+    let jobs = agent.jobs.clone();
+    let kept = blocking(move || jobs.store.put(number, &name, &text, degrees)).await?;
+    let stored = kept.map_err(|e| ErrorObject::diagnosed(&e))?;
+    agent.note(
+        "trajectory",
+        json!({ "number": number, "name": stored.name, "from": caller.peer.to_string() }),
+    );
+    Ok(Json(TrajectoryObject::from(&*stored)))
+}
+
+/// Keeps it no more.
+#[utoipa::path(
+    delete,
+    path = "/api/trajectories/{number}",
+    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    responses(
+        (status = 204, description = "It is gone"),
+        (status = 404, description = "There is none", body = ErrorObject),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn delete(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Number(number): Number<u16>,
+) -> Result<StatusCode, ErrorObject> {
+    operator(&caller)?;
+    let jobs = agent.jobs.clone();
+    let gone = blocking(move || jobs.store.delete(number)).await?;
+    if !gone.map_err(|e| ErrorObject::diagnosed(&e))? {
+        return Err(ErrorObject::nothing("trajectory", number, "/api/trajectories"));
+    }
+    agent.note("trajectory", json!({ "number": number, "deleted": true, "from": caller.peer.to_string() }));
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Checks a trajectory with the limits, the model and the payload of the controller, from its own first point.
+#[utoipa::path(
+    get,
+    path = "/api/trajectories/{number}/check",
+    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    responses(
+        (status = 200, description = "What the check found", body = CheckObject),
+        (status = 404, description = "There is none", body = ErrorObject),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn check(
+    State(agent): State<Agent>,
+    Number(number): Number<u16>,
+) -> Result<Json<CheckObject>, ErrorObject> {
+    let stored = agent
+        .jobs
+        .store
+        .get(number)
+        .ok_or_else(|| ErrorObject::nothing("trajectory", number, "/api/trajectories"))?;
+    let own = agent.jobs.arm().clone();
+    let asked = move |session: &mut Session<ClientPort>| -> Result<(Arm, CheckOptions), Error> {
+        let device = session.device_config()?;
+        let arm = if session.has_extensions() { session.device_arm()? } else { own };
+        Ok((arm, CheckOptions { accept_device_limits: true, device, ..CheckOptions::default() }))
+    };
+    let asked = agent.jobs.asker().call_in_turn(asked).await?;
+    let (arm, options) = asked?;
+    let start = stored.trajectory.points.first().map_or([0.0; 6], |point| point.position);
+    let checked =
+        blocking(move || CheckedTrajectory::check(&stored.trajectory, &arm, &start, &options)).await?;
+    match checked {
+        Ok(checked) => Ok(Json(CheckObject::from(checked.verdict()))),
+        Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::from(&*verdict))),
+        Err(error) => Err(ErrorObject::of(&error.into())),
+    }
+}
+
+/// What takes a while, where it keeps nobody else from being served.
+async fn blocking<T: Send + 'static>(act: impl FnOnce() -> T + Send + 'static) -> Result<T, ErrorObject> {
+    tokio::task::spawn_blocking(act).await.map_err(|_| {
+        ErrorObject::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
+    })
+}

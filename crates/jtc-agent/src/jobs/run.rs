@@ -1,0 +1,280 @@
+//! A run: waits until the arm can be moved, checks, uploads, executes and follows, and reports each step.
+use std::time::{Duration, Instant};
+
+use jtc_host::check::ProblemKind;
+use jtc_host::error::Facts;
+use jtc_host::plan::{self, Planner};
+use jtc_host::report::Summary;
+use jtc_host::session::{Flow, Outcome};
+use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Session, Trajectory};
+use jtc_wire::{Joint, Status, TrajectoryState};
+
+use super::{Happening, Task};
+use crate::api::ErrorObject;
+use crate::owner::ClientPort;
+
+/// How often is reported how far a motion is.
+const MOVING: Duration = Duration::from_secs(1);
+
+/// Where a run leads.
+#[derive(Clone, Debug)]
+pub enum Course {
+    /// Along a trajectory.
+    Along(Trajectory),
+    /// From where the arm stands to this place, rad, straight in joint space where that takes no longer.
+    To([f64; 6]),
+}
+
+/// What is run, and how.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// Where it leads.
+    pub course: Course,
+    /// Where the arm stands elsewhere it is moved to the first point.
+    pub approach: bool,
+    /// % of the trajectory's own speed, or of what the limits allow.
+    pub speed_percent: f64,
+    /// How often.
+    pub repeat: u32,
+    /// The controller has no extensions, uses other limits than the agent's arm, and these are safe for it.
+    pub accept_device_limits: bool,
+}
+
+/// How far a run came.
+#[derive(Clone, Debug, Default)]
+pub struct Done {
+    /// To its end.
+    pub finished: bool,
+    /// Motions that were finished, approaches not counted.
+    pub runs: u32,
+    /// Figures of the last motion.
+    pub summary: Option<Summary>,
+}
+
+/// A run on its way.
+struct Run<'a> {
+    task: &'a Task<'a>,
+    session: &'a mut Session<ClientPort>,
+    /// The last Stop or Pause that was meant for what this run did before.
+    halt: u64,
+}
+
+/// Runs what was ordered: how far it came, and what forbids it, or ended it in a fault.
+pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<ErrorObject>) {
+    let mut done = Done::default();
+    let error = Run { task, session, halt: task.halt }.go(order, &mut done).err();
+    (done, error)
+}
+
+/// The arm that a motion is checked against, and how.
+struct Site {
+    arm: Arm,
+    options: CheckOptions,
+}
+
+impl Run<'_> {
+    fn go(&mut self, order: &Order, done: &mut Done) -> Result<(), ErrorObject> {
+        let (task, halt) = (self.task, self.halt);
+        let waits = |what| task.note(format!("waiting until {what}"));
+        let ready = self.session.ready_to_move(waits, || task.is_halted(halt));
+        let mut status = ready.map_err(|error| self.before_motion(&error))?;
+        let site = self.site(order)?;
+        let trajectory = self.trajectory(order, &site, &status)?;
+        closed(&trajectory, order, &site)?;
+        for n in 1..=order.repeat.max(1) {
+            let mut checked = site.check(&trajectory, &status);
+            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
+                let way = site.approach(&trajectory, &status, order.speed_percent)?;
+                if !self.motion("approach", &way, &site, done)? {
+                    return Ok(());
+                }
+                // From where the approach ended, not from where it should have.
+                status = self.fresh_status()?;
+                checked = site.check(&trajectory, &status);
+            }
+            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
+            let checked = checked.map_err(|e| {
+                let error = ErrorObject::of(&e.into());
+                if elsewhere { error.next("ask for the run with approach: true") } else { error }
+            })?;
+            if !self.motion("motion", &checked, &site, done)? {
+                return Ok(());
+            }
+            done.runs = n;
+            task.journal.write(Happening::Finished { job: task.job, runs: n });
+            if n < order.repeat {
+                status = self.fresh_status()?;
+            }
+        }
+        done.finished = true;
+        Ok(())
+    }
+
+    fn fresh_status(&mut self) -> Result<Status, ErrorObject> {
+        self.session.fresh_status().map_err(|e| ErrorObject::of(&e.into()))
+    }
+
+    /// The arm of the controller, where it can be asked; else that of the agent.
+    fn site(&mut self, order: &Order) -> Result<Site, ErrorObject> {
+        let mut ask = || -> Result<Site, Error> {
+            let device = self.session.device_config()?;
+            let arm = if self.session.has_extensions() {
+                self.session.device_arm()?
+            } else {
+                self.task.arm.clone()
+            };
+            let accept_device_limits = order.accept_device_limits;
+            Ok(Site {
+                arm,
+                options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() },
+            })
+        };
+        ask().map_err(|error| ErrorObject::of(&error))
+    }
+
+    /// What is run.
+    fn trajectory(&self, order: &Order, site: &Site, status: &Status) -> Result<Trajectory, ErrorObject> {
+        match &order.course {
+            Course::Along(trajectory) if order.speed_percent == 100.0 => Ok(trajectory.clone()),
+            Course::Along(trajectory) => {
+                plan::at_speed(trajectory, order.speed_percent).map_err(|e| ErrorObject::diagnosed(&e))
+            }
+            Course::To(place) => {
+                let (config, friction) =
+                    (site.arm.config_on_device(&site.options.device), site.arm.friction());
+                let planner = Planner {
+                    model: Some(&site.arm.model),
+                    friction: friction.as_ref(),
+                    speed_pct: order.speed_percent,
+                    ..Planner::new(&config)
+                };
+                let planned = planner.to(&status.positions(), place);
+                let planned = planned.map_err(|e| ErrorObject::diagnosed(&e).message(e.of_move()))?;
+                planned.notes.into_iter().for_each(|text| self.task.note(text));
+                Ok(planned.trajectory)
+            }
+        }
+    }
+
+    /// Uploads and executes one motion. False: it was stopped.
+    fn motion(
+        &mut self,
+        phase: &str,
+        checked: &CheckedTrajectory,
+        site: &Site,
+        done: &mut Done,
+    ) -> Result<bool, ErrorObject> {
+        let (task, halt) = (self.task, self.halt);
+        let Task { job, journal, wishes, .. } = *task;
+        let phase = || phase.to_owned();
+        journal.write(Happening::Checked {
+            job,
+            phase: phase(),
+            duration_s: checked.trajectory().duration_s(),
+            points: checked.trajectory().points.len(),
+            warnings: checked.verdict().warnings().map(ToString::to_string).collect(),
+        });
+        let mut shown = 0;
+        let uploaded = self.session.upload(checked, |progress| {
+            let (segments_done, segments) = (progress.segments_done, progress.segments);
+            // A tenth of it at a time.
+            if segments_done * 10 >= (shown + 1) * segments.max(1) {
+                shown = segments_done * 10 / segments.max(1);
+                journal.write(Happening::Uploading { job, phase: phase(), segments_done, segments });
+            }
+            if task.is_halted(halt) { Flow::Cancel } else { Flow::Continue }
+        });
+        let report = uploaded.map_err(|error| self.before_motion(&error))?;
+        let (time_s, bytes, retries) = (report.time_s, report.bytes, report.retries);
+        journal.write(Happening::Uploaded { job, phase: phase(), time_s, bytes, retries });
+        // Somebody who stopped an arm that stood still meant that it is to stand.
+        if task.is_halted(halt) {
+            return Err(task.stopped());
+        }
+        let duration_s = checked.trajectory().duration_s();
+        journal.write(Happening::Executing { job, phase: phase(), duration_s });
+        let (mut reported, mut seen) = (Instant::now(), halt);
+        let run = self.session.run(checked, |status| {
+            if status.trajectory == TrajectoryState::Pause {
+                // That one did what it was meant for. One that came too late for this motion is meant for the next.
+                seen = task.line.last_halt();
+            }
+            if reported.elapsed() >= MOVING && status.is_executing() {
+                reported = Instant::now();
+                journal.write(Happening::Moving { job, phase: phase(), point: status.point });
+            }
+            wishes.try_recv().unwrap_or_default()
+        });
+        self.halt = seen;
+        done.summary = Some(run.summary(&site.arm));
+        match run.outcome {
+            Ok(Outcome::Finished(_)) => Ok(true),
+            Ok(Outcome::Stopped(_)) => Ok(false),
+            Err(error) => Err(self.before_motion(&error)),
+        }
+    }
+
+    /// Why a motion was not begun: an error, or somebody who stopped it.
+    fn before_motion(&self, error: &Error) -> ErrorObject {
+        match error {
+            Error::Cancelled => self.task.stopped(),
+            Error::Link(LinkError::Denied { .. }) if self.task.is_halted(self.halt) => self.task.stopped(),
+            error => ErrorObject::of(error),
+        }
+    }
+}
+
+impl Site {
+    fn approach(
+        &self,
+        trajectory: &Trajectory,
+        status: &Status,
+        speed_percent: f64,
+    ) -> Result<CheckedTrajectory, ErrorObject> {
+        plan::approach(trajectory, &self.arm, &status.positions(), speed_percent, &self.options)
+            .map_err(|error| approach_error(&error))
+    }
+
+    fn check(&self, trajectory: &Trajectory, status: &Status) -> Result<CheckedTrajectory, CheckError> {
+        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &self.options)
+    }
+}
+
+/// A motion that is repeated leads back to its start, or an approach does.
+fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), ErrorObject> {
+    if order.repeat <= 1 || order.approach {
+        return Ok(());
+    }
+    let Some((first, last)) = trajectory.points.first().zip(trajectory.points.last()) else { return Ok(()) };
+    let limit = site.arm.config_on_device(&site.options.device).start_tolerance_rad;
+    let away = |joint: &Joint| (last.position[joint.index()] - first.position[joint.index()]).abs();
+    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
+    let Some((joint, far)) = furthest.map(|joint| (joint, away(&joint))).filter(|(_, far)| *far > limit)
+    else {
+        return Ok(());
+    };
+    let message = format!(
+        "it ends {far:.3} rad from where it begins ({joint}), more than {limit} rad: it cannot be repeated as it is; nothing was sent"
+    );
+    let object =
+        ErrorObject::new("open-path", message, "`approach` leads back to its first point before each run");
+    let facts = Facts { joint: Some(joint), value: Some(far), limit: Some(limit), ..Facts::default() };
+    Err(object.with(&facts))
+}
+
+/// The arm stands elsewhere than at the first point.
+fn is_elsewhere(error: &CheckError) -> bool {
+    matches!(error, CheckError::Refused(verdict) if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose))
+}
+
+/// The trajectory itself may be sound: what is refused is the way to it.
+fn approach_error(error: &plan::ApproachError) -> ErrorObject {
+    let facts = match error {
+        plan::ApproachError::Check(CheckError::Refused(verdict)) => Facts::of_verdict(verdict),
+        _ => Facts::default(),
+    };
+    let message =
+        format!("the straight way from where the arm stands to the first point is refused: {error}");
+    let next = "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way";
+    ErrorObject::new("approach", message, next).with(&facts)
+}

@@ -1,0 +1,50 @@
+//! What a job has beside its client's end of the line.
+use std::sync::mpsc::Receiver;
+
+use jtc_host::Arm;
+use jtc_host::session::Flow;
+
+use super::{Happening, Journal};
+use crate::api::ErrorObject;
+use crate::owner::Line;
+
+/// The code of what somebody stopped before it moved the arm.
+pub(super) const STOPPED: &str = "stopped";
+
+/// A job on its way.
+pub struct Task<'a> {
+    /// Its number.
+    pub job: u64,
+    /// What is wished on the way.
+    pub wishes: &'a Receiver<Flow>,
+    /// Where each step is reported.
+    pub journal: &'a Journal,
+    /// Where a Stop of somebody else shows.
+    pub line: &'a Line,
+    /// The last Stop or Pause, by number, that it was asked for after.
+    pub halt: u64,
+    /// The arm of controllers that cannot be asked for theirs.
+    pub arm: &'a Arm,
+}
+
+impl Task<'_> {
+    /// Reports something in words.
+    pub fn note(&self, text: String) {
+        self.journal.write(Happening::Note { job: self.job, text });
+    }
+
+    /// Somebody has stopped or paused the arm since the one with this number.
+    pub fn is_halted(&self, since: u64) -> bool {
+        self.line.last_halt() != since
+    }
+
+    /// Somebody stopped the arm before this moved it.
+    pub fn stopped(&self) -> ErrorObject {
+        let by = self.line.with(|line, _| line.last_halt_by().0.to_owned());
+        ErrorObject::new(
+            STOPPED,
+            format!("{by} stopped or paused the arm before this moved it; nothing was started"),
+            "ask for it again when the arm may move",
+        )
+    }
+}

@@ -1,0 +1,291 @@
+//! What a program does by HTTP alone: lease, trajectories, runs, events that it can resume.
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::Served;
+use jtc_host::{Arm, plan};
+use serde_json::{Value, json};
+
+const WAIT: Duration = Duration::from_secs(60);
+
+/// A motion from the zero pose and back, at this speed, as a file.
+fn there_and_back(percent: f64) -> String {
+    let (arm, to) = (Arm::avena(), [0.3, -0.2, 0.2, 0.3, -0.2, 0.3]);
+    let way = |from: &[f64; 6], to: &[f64; 6]| {
+        plan::joint_move(from, to, &arm.config(), percent).expect("it is within the limits")
+    };
+    let (mut there, back) = (way(&[0.0; 6], &to), way(&to, &[0.0; 6]));
+    there.points.extend(back.points.into_iter().skip(1));
+    there.to_exact_csv()
+}
+
+/// A program that has the lease.
+struct Program<'a> {
+    served: &'a Served,
+    key: String,
+}
+
+impl<'a> Program<'a> {
+    fn new(served: &'a Served, name: &str, lasts_s: f64, policy: &str) -> Self {
+        let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
+        let (status, grant) = served.api("POST /api/lease", None, Some(body));
+        assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
+        Self { served, key: grant["key"].as_str().expect("a key").to_owned() }
+    }
+
+    fn ask(&self, request: &str, body: Option<Value>) -> (u16, Value) {
+        self.served.api(request, Some(&self.key), body)
+    }
+
+    /// Begins a job.
+    fn begin(&self, request: &str, body: Value) -> u64 {
+        let (status, job) = self.ask(request, Some(body));
+        assert_eq!(status, 202, "{job}");
+        job["number"].as_u64().expect("a number")
+    }
+
+    fn recover(&self) {
+        let job = self.begin("POST /api/recover", json!({ "defaults": true }));
+        let done = self.over(job);
+        assert_eq!(done["stage"], "finished", "{done}");
+    }
+
+    /// The job when it is over; the lease is renewed meanwhile.
+    fn over(&self, job: u64) -> Value {
+        over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
+    }
+}
+
+fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
+    let end = Instant::now() + WAIT;
+    while Instant::now() < end {
+        let (status, job) = served.api(&format!("GET /api/jobs/{job}"), None, None);
+        assert_eq!(status, 200);
+        if job["stage"] != "running" {
+            return job;
+        }
+        meanwhile();
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    panic!("job {job} is not over");
+}
+
+/// Waits until an event of this kind came behind a number, and returns it with its number.
+fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
+    let (end, mut last) = (Instant::now() + WAIT, after);
+    while Instant::now() < end {
+        let (_, found) = served.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
+        for event in found["events"].as_array().expect("events") {
+            let number = event["number"].as_u64().expect("a number");
+            assert_eq!(number, last + 1, "none is left out");
+            last = number;
+            if event["event"]["kind"] == kind {
+                return (number, event["event"].clone());
+            }
+        }
+    }
+    panic!("no {kind} behind {after}");
+}
+
+fn trajectory(served: &Served, number: u16, percent: f64) {
+    let body = json!({ "name": "there and back", "text": there_and_back(percent) });
+    let (status, kept) = served.api(&format!("PUT /api/trajectories/{number}"), None, Some(body));
+    assert_eq!(status, 200, "{kept}");
+}
+
+fn moves(served: &Served) -> bool {
+    served.line.with(|line, _| line.status().is_some_and(|(_, status)| status.is_executing()))
+}
+
+#[test]
+fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() {
+    let served = Served::start(921_600);
+    trajectory(&served, 7, 20.0);
+    let anna = Program::new(&served, "anna", 5.0, "continue");
+    anna.recover();
+    let (_, check) = served.api("GET /api/trajectories/7/check", None, None);
+    assert_eq!(check["passed"], true, "{check}");
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
+    let (number, _) = event(&served, 0, "executing");
+    // Another thing at the same time is refused with the job that is going on.
+    let (status, busy) = anna.ask("POST /api/gripper", Some(json!({ "on": true })));
+    assert!(
+        status == 409
+            && busy["code"] == "busy"
+            && busy["message"].as_str().is_some_and(|m| m.contains("job"))
+    );
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(anna.ask("POST /api/pause", None).0, 200);
+    // Paused, and gone on by the same one: at once, when it rests.
+    let paused = |event: &Value| event["trajectory"] == "Pause";
+    let (mut number, mut state) = event(&served, number, "state");
+    while !paused(&state) {
+        (number, state) = event(&served, number, "state");
+    }
+    assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 80 }))).0, 204);
+    assert_eq!(anna.ask("POST /api/resume", None).0, 204);
+    let done = anna.over(job);
+    assert_eq!((done["stage"].as_str(), done["runs"].as_u64()), (Some("finished"), Some(1)), "{done}");
+    let errors = done["result"]["joints"].as_array().expect("joints");
+    assert!(
+        errors.len() == 6
+            && errors.iter().all(|joint| joint["max_error_mrad"].as_f64().is_some_and(|e| e < 20.0))
+    );
+    // All of it by numbers, however often one asks.
+    let (_, all) = served.api(&format!("GET /api/events?after=0&job={job}"), None, None);
+    let kinds: Vec<&str> = all["events"]
+        .as_array()
+        .expect("events")
+        .iter()
+        .filter_map(|e| e["event"]["kind"].as_str())
+        .collect();
+    let steps = ["begun", "checked", "uploading", "uploaded", "executing", "finished", "ended"];
+    let mut at = kinds.iter();
+    for step in steps {
+        assert!(at.any(|kind| *kind == step), "{step} in {kinds:?}");
+    }
+    assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
+    assert_eq!(anna.ask("POST /api/gripper", Some(json!({ "on": true }))).0, 409);
+}
+
+#[test]
+fn somebody_else_stops_a_run_and_it_stays_so() {
+    let served = Served::start(921_600);
+    trajectory(&served, 1, 10.0);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    anna.recover();
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "repeat": 3 }));
+    let (number, _) = event(&served, 0, "executing");
+    std::thread::sleep(Duration::from_millis(300));
+    // Without a token, and without a lease.
+    assert_eq!(served.get("POST /api/pause").0, 200);
+    let (_, halt) = event(&served, number, "halt");
+    assert_eq!(halt["command"], "pause");
+    let (status, denied) = anna.ask("POST /api/resume", None);
+    assert!(
+        status == 409 && denied["message"].as_str().is_some_and(|m| m.contains("has stopped")),
+        "{denied}"
+    );
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let done = anna.over(job);
+    assert_eq!((done["stage"].as_str(), done["runs"].as_u64()), (Some("stopped"), Some(0)), "{done}");
+    assert!(!moves(&served));
+}
+
+/// An arm that is stopped while it stands, because somebody knows that it will move, does not move.
+#[test]
+fn a_run_that_was_stopped_before_it_moves_does_not_begin() {
+    let served = Served::start(57_600);
+    trajectory(&served, 1, 10.0);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    anna.recover();
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
+    event(&served, 0, "checked");
+    assert_eq!(anna.ask("POST /api/stop", None).0, 200);
+    let done = anna.over(job);
+    assert_eq!(done["stage"], "stopped", "{done}");
+    let (_, all) = served.api(&format!("GET /api/events?job={job}"), None, None);
+    assert!(
+        all["events"].as_array().expect("events").iter().all(|e| e["event"]["kind"] != "executing"),
+        "{all}"
+    );
+}
+
+#[test]
+fn a_program_that_goes_leaves_its_motion_to_its_policy() {
+    let served = Served::start(921_600);
+    trajectory(&served, 1, 15.0);
+    for (policy, stage, left) in
+        [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
+    {
+        let anna = Program::new(&served, "anna", 1.0, policy);
+        anna.recover();
+        let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
+        let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
+        event(&served, last, "executing");
+        // Nothing more comes from it. What follows does not renew its lease.
+        let begun = Instant::now();
+        let ended = || served.api(&format!("GET /api/jobs/{job}"), None, None).1;
+        let paused =
+            || served.line.with(|line, _| line.status().map(|(_, s)| s.trajectory.name().to_owned()));
+        while ended()["stage"] == "running" && (left.is_none() || paused().as_deref() != left) {
+            assert!(begun.elapsed() < WAIT, "{policy}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert_eq!(ended()["stage"], stage, "{policy}: {}", ended());
+        let (_, status) = served.api("GET /api/status", None, None);
+        assert!(status["lease"].is_null(), "{policy}: {status}");
+    }
+}
+
+#[test]
+fn the_lease_is_asked_for_given_and_lapses() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    let (status, denied) = served.api("POST /api/lease", None, Some(json!({ "name": "bob" })));
+    assert!(status == 409 && denied["message"].as_str().is_some_and(|m| m.contains("anna")), "{denied}");
+    let (status, grant) =
+        served.api("POST /api/lease", None, Some(json!({ "name": "bob", "ask": true, "lasts_s": 1.0 })));
+    assert_eq!((status, grant["held"].as_bool()), (200, Some(false)));
+    let bob = Program { served: &served, key: grant["key"].as_str().expect("a key").to_owned() };
+    let (_, state) = anna.ask("PUT /api/lease", None);
+    assert_eq!((state["held"].as_bool(), state["wanted_by"].as_str()), (Some(true), Some("bob")));
+    assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
+    assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
+    assert_eq!(bob.ask("PUT /api/lease", None).1["held"], true);
+    // It lapses, and is somebody else's then.
+    std::thread::sleep(Duration::from_millis(1300));
+    let carl = Program::new(&served, "carl", 30.0, "continue");
+    assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
+    assert_eq!(bob.ask("POST /api/gripper", Some(json!({ "on": true }))).0, 409);
+    assert_eq!(carl.ask("POST /api/gripper", Some(json!({ "on": true }))).0, 204);
+}
+
+#[test]
+fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
+    let served = Served::start(921_600);
+    let as_viewer =
+        |request: &str, body: Option<Value>| served.api_as(Some(&served.tokens.viewer), request, None, body);
+    assert_eq!(as_viewer("POST /api/lease", Some(json!({ "name": "eve" }))).0, 409);
+    let text = json!({ "name": "x", "text": there_and_back(10.0) });
+    assert_eq!(as_viewer("PUT /api/trajectories/1", Some(text.clone())).0, 409);
+    assert_eq!(as_viewer("GET /api/trajectories", None).1, json!([]));
+    for request in
+        ["GET /api/status", "GET /api/info", "GET /api/payload", "GET /api/jobs", "GET /api/events"]
+    {
+        assert_eq!(as_viewer(request, None).0, 200, "{request}");
+    }
+    // A wrong key is none, and a key without the operator's token is none either.
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    for (token, key) in [(&served.tokens.operator, "x"), (&served.tokens.viewer, anna.key.as_str())] {
+        let (status, error) = served.api_as(Some(token), "POST /api/clear", Some(key), None);
+        assert!(status == 409 && error["next"].as_str().is_some_and(|next| !next.is_empty()), "{error}");
+    }
+    let (status, error) =
+        served.api("PUT /api/trajectories/1", None, Some(json!({ "name": "x", "text": "t,q1\n0,a" })));
+    assert!(
+        status == 422 && error["message"].as_str().is_some_and(|m| m.contains("line")),
+        "{status} {error}"
+    );
+    // What is wrong with a trajectory: joint, point, value and limit, as numbers.
+    let far = "t,q1,q2,q3,q4,q5,q6\n0,0,9,0,0,0,0\n1,0,9,0,0,0,0\n";
+    assert_eq!(
+        served.api("PUT /api/trajectories/2", None, Some(json!({ "name": "far", "text": far }))).0,
+        200
+    );
+    anna.recover();
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 2 }));
+    let done = anna.over(job);
+    let error = &done["error"];
+    assert_eq!(
+        (done["stage"].as_str(), error["code"].as_str(), error["joint"].as_u64()),
+        (Some("failed"), Some("check"), Some(2)),
+        "{done}"
+    );
+    assert!(
+        error["value"].as_f64().zip(error["limit"].as_f64()).is_some_and(|(value, limit)| value > limit),
+        "{error}"
+    );
+    assert!(error["cause"].as_str().is_some_and(|cause| !cause.is_empty()), "{error}");
+}

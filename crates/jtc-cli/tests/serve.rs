@@ -138,3 +138,38 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
             .ends(2);
     assert!(open.err.contains("chmod 600"), "{}", open.err);
 }
+
+/// An arm file under another name, and with gains that no frame carries.
+fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
+    let avena = include_str!("../../../arms/avena.toml");
+    let file = |name: &str, text: String| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).expect("a file");
+        path.to_str().expect("a name").to_owned()
+    };
+    [
+        file("good.toml", avena.replacen("name = \"avena\"", "name = \"other\"", 1)),
+        file("bad.toml", avena.replacen("kp = 8000.0", "kp = 1e39", 1)),
+    ]
+}
+
+/// Both simulators take an arm the same way: the controller has stored it, and one that it could not have is refused.
+#[test]
+fn an_arm_is_simulated_as_by_jtc_sim() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let [good, bad] = arm_files(&dir);
+    let agent = Agent::start(&["--sim", "--baud", "921600", "--arm", &good]);
+    assert_eq!(agent.jtc(&["--json", "info"]).ends(0).json()["arm"], "other");
+    assert_eq!(agent.jtc(&["--json", "arm", "diff", &good]).ends(0).json()["equal"], true);
+    let sim = Sim::start(&["--baud", "921600", "--arm", &good]);
+    assert_eq!(sim.json(&["info", "--baud", "921600"], 0)["arm"], "other");
+    for simulator in [&["serve", "--sim", "--listen", "127.0.0.1:0"][..], &["sim"]] {
+        let words = [simulator, &["--arm", &bad]].concat();
+        let refused = run(here(command(), &dir), &words, "").ends(2);
+        assert!(
+            refused.err.contains("bad.toml") && refused.err.contains("no number that a frame carries"),
+            "{words:?}: {}",
+            refused.err
+        );
+    }
+}

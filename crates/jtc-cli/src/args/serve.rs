@@ -14,7 +14,8 @@ pub struct ServeArgs {
     /// A simulated controller instead of a port
     #[arg(long, env = "JTC_SIM", value_parser = FalseyValueParser::new(), conflicts_with = "port")]
     pub sim: bool,
-    /// Arm, TOML or URDF: the one to simulate with --sim, and that of a controller that cannot be asked for its own; default: the built-in one
+    /// Arm, TOML or URDF: the one to simulate with --sim, which the controller has stored where the file is complete, and that of a
+    /// controller that cannot be asked for its own; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Address to listen at; beyond this computer everybody needs a token

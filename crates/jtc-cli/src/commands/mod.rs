@@ -30,6 +30,7 @@ mod run;
 mod run_report;
 mod serve;
 mod sim;
+mod simulated;
 mod status;
 mod teach;
 mod traj;

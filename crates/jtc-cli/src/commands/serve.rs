@@ -11,13 +11,13 @@ use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
 use jtc_agent::{Line, Owner, serve as service};
 use jtc_client::agents::{Registered, register};
-use jtc_host::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::LivePort;
 use jtc_sim::{SimConfig, World};
 use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
+use super::simulated::simulated;
 use crate::args::ServeArgs;
 
 /// Longest that the end of the agent waits for a motion to stop.
@@ -40,7 +40,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("another agent may listen there: name another address with --listen")
     })?;
     let listen = listener.local_addr()?;
-    let port = port(args)?;
+    let port = port(args, out)?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
     let (url, name) = (format!("http://{listen}"), port.name());
     // A relative name would be another port in another directory.
@@ -107,11 +107,11 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-fn port(args: &ServeArgs) -> Result<Box<dyn Port + Send>, Failure> {
+fn port(args: &ServeArgs, out: &Output) -> Result<Box<dyn Port + Send>, Failure> {
     if !args.sim {
         return Ok(Box::new(args.link.own()?));
     }
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-    let config = SimConfig { baud: Some(args.link.baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
+    let (_, config) = simulated(args.arm.as_deref(), None, out)?;
+    let config = SimConfig { baud: Some(args.link.baud), ..config };
     Ok(Box::new(LivePort::new(World::new(config))))
 }

@@ -21,7 +21,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use jtc_sim::{SimConfig, Support, World};
     use serde_json::json;
 
-    use super::{named_arm, run_report};
+    use super::{run_report, simulated::simulated};
     use crate::serve::{Pty, Server, Typed};
     use crate::tape::Tape;
     use cli_kit::OutputFile;
@@ -31,29 +31,14 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         Format::of(path)?; // a wrong ending is reported before anything runs
     }
     let stop = Stop::listen()?;
-    let arm = named_arm::load(args.arm.as_deref())?;
-    named_arm::note_warnings(&arm, out);
-    if arm.friction().is_none() {
-        out.note("note: the arm file gives no friction: that of the default arm is simulated");
-    }
-    if arm.rotors_given.contains(&false) {
-        out.note("note: the arm file does not give every rotor inertia: 0 is simulated for those that it leaves out");
-    }
+    let kept = args.store.as_deref().map(kept).transpose()?.flatten();
+    let (arm, config) = simulated(args.arm.as_deref(), kept, out)?;
     let faults = args.faults.as_deref().map(faults).transpose()?.unwrap_or_default();
     let inputs: Vec<&Path> = [&args.arm, &args.faults].into_iter().filter_map(|p| p.as_deref()).collect();
     let file =
         args.record.as_deref().map(|path| OutputFile::open(path, args.force.force, &inputs)).transpose()?;
-    let stored = stored(args, &arm)?;
-    let mut config = SimConfig {
-        baud: (!args.no_throttle).then_some(args.baud),
-        seed: args.seed,
-        faults,
-        ..SimConfig::new(arm.config(), &arm.parameters())
-    };
-    if stored.is_some() {
-        // What the controller knows of the arm it has as a board has it: from its memory, and from frames.
-        (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
-    }
+    let mut config =
+        SimConfig { baud: (!args.no_throttle).then_some(args.baud), seed: args.seed, faults, ..config };
     config.arm.payload = args.payload.unwrap_or_default();
     let support = config.support;
     let world = World::new(config);
@@ -85,25 +70,19 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The arm that the controller has stored: that of the file which keeps it, else the simulated one where its file is complete.
+/// The image in the file that keeps a stored arm, if there is one yet.
 #[cfg(unix)]
-fn stored(args: &SimArgs, arm: &jtc_host::arm::Arm) -> Result<Option<Vec<u8>>, Failure> {
-    let unreadable = |path: &std::path::Path, what: String| {
+fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
+    let unreadable = |what: String| {
         Failure::usage(format!("{}: {what}", path.display()))
             .hint("name another file; `jtc arm push --store` writes it")
     };
-    if let Some(path) = &args.store {
-        match std::fs::read(path) {
-            Ok(image) if jtc_wire::ArmImage::parse(&image).is_some() => return Ok(Some(image)),
-            Ok(_) => return Err(unreadable(path, "holds no stored arm".into())),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
-            Err(e) => return Err(unreadable(path, e.to_string())),
-        }
+    match std::fs::read(path) {
+        Ok(image) if jtc_wire::ArmImage::parse(&image).is_some() => Ok(Some(image)),
+        Ok(_) => Err(unreadable("holds no stored arm".into())),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(unreadable(e.to_string())),
     }
-    if args.arm.is_none() {
-        return Ok(None);
-    }
-    arm.image().map_err(Failure::usage)
 }
 
 #[cfg(unix)]

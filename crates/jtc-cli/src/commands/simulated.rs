@@ -1,0 +1,36 @@
+//! The arm that is simulated, by `jtc sim` and `jtc serve --sim` alike, and what its controller has of it.
+
+use std::path::Path;
+
+use cli_kit::{Failure, Output};
+use jtc_host::Arm;
+use jtc_sim::SimConfig;
+
+use super::named_arm;
+
+/// The arm that was named, or the built-in one, and the world around it; what the arm's file leaves open goes to stderr. The controller
+/// has stored the image `kept`, else the arm that was named where its file is complete.
+pub fn simulated(
+    path: Option<&Path>,
+    kept: Option<Vec<u8>>,
+    out: &Output,
+) -> Result<(Arm, SimConfig), Failure> {
+    let arm = named_arm::load(path)?;
+    named_arm::note_warnings(&arm, out);
+    if arm.friction().is_none() {
+        out.note("note: the arm file gives no friction: that of the default arm is simulated");
+    }
+    if arm.rotors_given.contains(&false) {
+        out.note("note: the arm file does not give every rotor inertia: 0 is simulated for those that it leaves out");
+    }
+    let stored = match (kept, path) {
+        (None, Some(path)) => arm.image().map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?,
+        (kept, _) => kept,
+    };
+    let mut config = SimConfig::new(arm.config(), &arm.parameters());
+    if stored.is_some() {
+        // What the controller knows of the arm it has as a board has it: from its memory, and from frames.
+        (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
+    }
+    Ok((arm, config))
+}

@@ -71,8 +71,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let summary = Summary::of(&run.info, &run.samples);
     let ending = Ending { outcome: "finished".into(), ..Ending::default() };
     tapes.into_iter().try_for_each(|tape| tape.finish(&ending))?;
-    let input =
-        ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None, plan: None };
+    let input = ReportInput { facts: &facts, ..ReportInput::new(&run.info, &run.samples) };
     page.write(report::html(&input)).map_err(output_lost)?;
     picture.write(report::picture_svg(&input)).map_err(output_lost)?;
     let files: Vec<String> = NAMES.iter().map(|n| file(n).display().to_string()).collect();

@@ -191,11 +191,9 @@ impl Read {
             names.push(page.name());
             let facts = self.facts();
             let input = ReportInput {
-                info: &self.info,
-                samples: &samples,
                 facts: &facts,
                 failure: self.failure.as_ref(),
-                plan: None,
+                ..ReportInput::new(&self.info, &samples)
             };
             page.write(html(&input)).map_err(output_lost)?;
         }

@@ -228,5 +228,5 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
     ];
     let samples = planner.samples(trajectory);
     let plan = Some(&planned.binding[..]);
-    html(&ReportInput { info: &info, samples: &samples, facts: &facts, failure: None, plan })
+    html(&ReportInput { facts: &facts, plan, ..ReportInput::new(&info, &samples) })
 }

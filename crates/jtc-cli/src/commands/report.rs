@@ -35,13 +35,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let failure = RunFailure::of_recording(&info, &recording.samples, &recording.ending);
-    let input = ReportInput {
-        info: &info,
-        samples: &recording.samples,
-        facts: &[],
-        failure: failure.as_ref(),
-        plan: None,
-    };
+    let input = ReportInput { failure: failure.as_ref(), ..ReportInput::new(&info, &recording.samples) };
     page_file.write(html(&input))?;
     picture_file.write(picture_svg(&input))?;
     let summary = Summary::of(&info, &recording.samples);

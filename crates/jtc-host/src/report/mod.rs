@@ -44,6 +44,13 @@ pub struct ReportInput<'a> {
     pub plan: Option<&'a [Bound]>,
 }
 
+impl<'a> ReportInput<'a> {
+    /// Of a run that did not fail, without tables.
+    pub fn new(info: &'a RecordingInfo, samples: &'a [Sample]) -> Self {
+        Self { info, samples, facts: &[], failure: None, plan: None }
+    }
+}
+
 /// Text inside of markup.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

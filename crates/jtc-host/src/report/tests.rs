@@ -80,7 +80,7 @@ fn what_is_not_known_is_none() {
 #[test]
 fn the_page_is_whole_and_needs_no_network() {
     let (info, samples) = run(10_530);
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
+    let page = html(&ReportInput::new(&info, &samples));
     assert!(!page.contains("{{"), "a mark was left");
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     assert!(!page.contains("</script> & Co"), "a name ends the script");
@@ -93,7 +93,7 @@ fn the_page_is_whole_and_needs_no_network() {
 fn an_hour_is_thinned_without_losing_its_peak() {
     let (info, mut samples) = run(400_000);
     samples[123_457].joints[2].position -= 0.05;
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
+    let page = html(&ReportInput::new(&info, &samples));
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     let error = |s: &Sample| s.joints[2].position_error();
     let peak = pack::Thinner::new(&samples).values(error).into_iter().fold(0.0, f64::max);
@@ -103,21 +103,14 @@ fn an_hour_is_thinned_without_losing_its_peak() {
 #[test]
 fn a_run_without_samples_is_still_a_page() {
     let info = RecordingInfo::default();
-    assert!(
-        html(&ReportInput { info: &info, samples: &[], facts: &[], failure: None, plan: None })
-            .contains("</html>")
-    );
-    assert!(
-        picture_svg(&ReportInput { info: &info, samples: &[], facts: &[], failure: None, plan: None })
-            .ends_with("</svg>\n")
-    );
+    assert!(html(&ReportInput::new(&info, &[])).contains("</html>"));
+    assert!(picture_svg(&ReportInput::new(&info, &[])).ends_with("</svg>\n"));
 }
 
 #[test]
 fn the_picture_is_small() {
     let (info, samples) = run(10_530);
-    let picture =
-        picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan: None });
+    let picture = picture_svg(&ReportInput::new(&info, &samples));
     assert!(picture.len() < 150_000, "{} bytes", picture.len());
     assert!(!picture.contains("NaN"));
 }
@@ -146,24 +139,12 @@ fn a_failed_run_leads_with_what_broke_first() {
     assert!(before.position_rad.is_finite() && before.torque_limit_nm == 50.0 && before.errors.is_empty());
     assert!(first.first && first.position_rad.is_nan() && first.errors == ["does not answer"]);
 
-    let page = html(&ReportInput {
-        info: &info,
-        samples: &samples,
-        facts: &[],
-        failure: Some(&failure),
-        plan: None,
-    });
+    let page = html(&ReportInput { failure: Some(&failure), ..ReportInput::new(&info, &samples) });
     let headline = page.find("FAILED 600 ms into the run: joint 3: does not answer").expect("the headline");
     assert!(headline < page.find("class=\"hero\"").unwrap(), "it leads the page");
     assert!(page.contains("<title>FAILED: "), "the title reports it");
     assert!(page.contains("<td>–</td>"), "what is not measured is no number");
-    let picture = picture_svg(&ReportInput {
-        info: &info,
-        samples: &samples,
-        facts: &[],
-        failure: Some(&failure),
-        plan: None,
-    });
+    let picture = picture_svg(&ReportInput { failure: Some(&failure), ..ReportInput::new(&info, &samples) });
     assert!(picture.contains("FAILED") && !picture.contains("tracking error at most"), "{picture}");
     assert!(!picture.contains("NaN"));
 
@@ -213,13 +194,7 @@ fn an_encoder_that_jumps_is_named_by_its_step() {
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
     assert_eq!((failure.joint.map(Joint::number), failure.moments[0].time_ms.round()), (None, 597.0));
-    let page = html(&ReportInput {
-        info: &info,
-        samples: &samples,
-        facts: &[],
-        failure: Some(&failure),
-        plan: None,
-    });
+    let page = html(&ReportInput { failure: Some(&failure), ..ReportInput::new(&info, &samples) });
     assert!(!page.contains("marked line") && !page.contains("<tr class=\"first\">"));
 }
 
@@ -257,7 +232,7 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
         assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");
         assert_eq!((of_page.rms_error_mrad, of_page.peak_temperature_c), (None, None));
     }
-    let page = |plan| html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None, plan });
+    let page = |plan| html(&ReportInput { plan, ..ReportInput::new(&info, &samples) });
     let of_plan = page(Some(&planned.binding[..]));
     let first = serde_json::to_value(planned.binding[0]).unwrap().to_string();
     assert!(of_plan.contains(&format!("\"plan\":[{first}")), "{first}");

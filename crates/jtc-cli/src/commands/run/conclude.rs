@@ -105,8 +105,7 @@ pub fn conclude(
         Err(e) => format!("{}: {e}", where_.trim_start()),
     };
     info.ending = Ending { outcome: word.into(), reason };
-    let input =
-        ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref(), plan: None };
+    let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &samples) };
     let (files, lost) = outputs.write(tape, &input);
     // A file that is lost is reported even when the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {

@@ -8,6 +8,7 @@ use jtc_wire::RawPoint;
 use super::fit::{FitError, Samples};
 use super::{Form, Loaded, Point, ScaleError, Trajectory};
 use crate::file::{FileError, Place, number, rows, short};
+use crate::waypoints;
 
 /// Columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
 const COLUMNS: usize = 1 + 3 * JOINTS;
@@ -173,9 +174,6 @@ fn column_of(name: &str) -> Option<(usize, f64)> {
     (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| (c + 1, unit))
 }
 
-/// Columns that waypoint files have, and trajectories have not.
-const OF_WAYPOINTS: [&str; 9] = ["pose", "leg", "x", "y", "z", "qx", "qy", "qz", "qw"];
-
 fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded, FileError> {
     let mut place_of = [None; COLUMNS];
     for (i, name) in header.iter().enumerate() {
@@ -186,7 +184,7 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
             )
         };
         let (column, unit) = column_of(name).ok_or_else(|| {
-            at(if OF_WAYPOINTS.contains(&name.trim()) {
+            at(if waypoints::is_column(name) {
                 "a column of waypoints, which are no trajectory yet: `jtc plan` makes one of them"
             } else {
                 "unknown column; known: t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)"

@@ -19,7 +19,7 @@ use jtc_wire::{ACCELERATION_SCALE, Joint, POSITION_SCALE, RawPoint, VELOCITY_SCA
 pub use overshoot::{Overshoot, overshoot_words};
 pub use segments::UploadOptions;
 
-use crate::file::{FileError, read_text};
+use crate::file::{FileError, UNITS_KNOWN, read_text};
 
 /// One point of a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -118,8 +118,7 @@ impl Loaded {
     /// The same numbers as degrees, degrees/s and degrees/s²; an error where the file names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
-            let form = "the units of this file are known: its numbers are not taken as degrees; leave --deg out (and JTC_DEG, where it is set)";
-            return Err(FileError::form(form));
+            return Err(FileError::form(UNITS_KNOWN));
         }
         for point in &mut self.trajectory.points {
             for channel in [&mut point.position, &mut point.velocity, &mut point.acceleration] {

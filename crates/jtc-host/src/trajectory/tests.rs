@@ -108,6 +108,16 @@ points:
 ---
 ";
 
+/// Every column that waypoints have and trajectories have not is known as one of theirs.
+#[test]
+fn columns_of_waypoints_are_known_as_such() {
+    for name in "pose leg x y z qx qy qz qw roll pitch yaw x_m roll_deg".split(' ') {
+        let text = problem(&format!("t,{name}\n0,0\n"));
+        assert!(text.contains(name) && text.contains("`jtc plan` makes one"), "{text}");
+    }
+    assert!(problem("t,q7\n0,0\n").contains("unknown column"));
+}
+
 #[test]
 fn joint_trajectories_are_read_in_the_order_of_their_names() {
     let loaded = parse(ROS).unwrap();

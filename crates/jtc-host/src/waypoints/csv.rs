@@ -78,6 +78,11 @@ fn column(name: &str) -> Option<(Column, f64)> {
     (1..=JOINTS).contains(&joint).then_some((Column::Joint(joint - 1), unit))
 }
 
+/// Whether waypoint files have a column of this name.
+pub(crate) fn is_column(name: &str) -> bool {
+    column(name).is_some()
+}
+
 fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
     let mut header = Header { names: names.iter().map(|name| short(name)).collect(), ..Header::default() };
     for (i, name) in names.iter().enumerate() {

@@ -26,10 +26,11 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
 use jtc_plan::kinematics::{self, Kinematics, LegKind, Orientation, Route, RoutePoint};
 
+pub(crate) use csv::is_column;
 pub use thinned::thinned;
 
 use crate::arm::{Arm, PoseError};
-use crate::file::{FileError, Place, read_text, short};
+use crate::file::{FileError, Place, UNITS_KNOWN, read_text, short};
 use crate::plan::PlanError;
 
 /// Most waypoints of a file.
@@ -195,8 +196,7 @@ impl WaypointFile {
     /// A file that names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
-            let problem = "the units of this file are known: its numbers are not taken as degrees; leave --deg out (and JTC_DEG, where it is set)";
-            return Err(FileError::form(problem).in_file(&self.path));
+            return Err(FileError::form(UNITS_KNOWN).in_file(&self.path));
         }
         for waypoint in &mut self.waypoints {
             match &mut waypoint.target {

@@ -1,6 +1,7 @@
 //! Straight legs between waypoints, with rounded corners.
 use jtc_wire::Joint;
 
+use crate::distance::distance;
 use crate::path::{Path, PathPoint, Waypointed};
 use crate::{JOINTS, JointVec, PlanError, thin};
 
@@ -318,9 +319,4 @@ fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanErr
         given.push(corners.len() - 1);
     }
     Ok((corners, given))
-}
-
-/// Of the joint that moves most, rad.
-pub(crate) fn distance(a: &JointVec, b: &JointVec) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }

@@ -1,6 +1,6 @@
 //! Fewer waypoints on the same way.
 use crate::JointVec;
-use crate::blend::distance;
+use crate::distance::distance;
 
 /// Share of the blend that waypoints may be apart which are left out: the line between them is then within the blend of one of them.
 const GAP_SHARE: f64 = 0.9;

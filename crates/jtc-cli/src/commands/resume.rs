@@ -2,8 +2,9 @@
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::error::MotionError;
+use jtc_host::plan::furthest_joint;
 use jtc_host::{Error, Session};
-use jtc_wire::{Joint, Status, TrajectoryState};
+use jtc_wire::{Status, TrajectoryState};
 use serde_json::json;
 
 use super::job::Job;
@@ -47,15 +48,13 @@ fn check_rest(
     let paused_s = f64::from(status.point) * 1e-3;
     let place = job.trajectory.at_ms(status.point).unwrap_or_default().position;
     let here = status.positions();
-    let away = |joint: &Joint| (here[joint.index()] - place[joint.index()]).abs();
     let beyond = paused_s > job.trajectory.duration_s();
-    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
-    if let Some(joint) = furthest.filter(|joint| beyond || away(joint) > job.config.start_tolerance_rad) {
+    let (joint, away) = furthest_joint(&place, &here);
+    if beyond || away > job.config.start_tolerance_rad {
         let message = format!(
             "the motion is paused at {paused_s:.3} s of its path, and the arm is not where {} is then ({joint} is {:.3} rad away); \
              nothing was sent",
-            job.words,
-            away(&joint)
+            job.words, away
         );
         return Err(Failure::new(ErrorKind::Refused, "other-trajectory", message)
             .hint("name the trajectory that is paused, with the --speed that it was run at; `jtc traj stop` ends it"));

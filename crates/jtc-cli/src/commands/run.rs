@@ -11,13 +11,14 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::check::ProblemKind;
+use jtc_host::plan::furthest_joint;
 use jtc_host::port::Port;
 use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::Summary;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Error, Session};
-use jtc_wire::{Joint, Status};
+use jtc_wire::Status;
 
 use super::job::{Job, stem, typed};
 use super::run_report;
@@ -149,9 +150,8 @@ fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failur
     }
     let ends = job.trajectory.points.first().zip(job.trajectory.points.last());
     let gap = |(first, last): (&jtc_host::Point, &jtc_host::Point)| {
-        let away = |joint: &Joint| (last.position[joint.index()] - first.position[joint.index()]).abs();
-        let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)))?;
-        Some((furthest, away(&furthest))).filter(|(_, far)| *far > job.config.start_tolerance_rad)
+        Some(furthest_joint(&first.position, &last.position))
+            .filter(|(_, far)| *far > job.config.start_tolerance_rad)
     };
     match ends.and_then(gap) {
         Some((joint, far)) if course.repeat > 1 && !course.approach => {

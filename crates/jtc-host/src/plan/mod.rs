@@ -30,7 +30,7 @@ mod tests;
 use jtc_core::{Config, Friction, JOINTS};
 use jtc_dynamics::ArmModel;
 use jtc_plan::{ArmDynamics, Limits, Motion};
-pub use jtc_plan::{Waypoint, kinematics};
+pub use jtc_plan::{Waypoint, furthest_joint, kinematics};
 use jtc_wire::Joint;
 use serde::Serialize;
 

@@ -1,11 +1,10 @@
 //! Routes: sections that are straight in joint space, and sections on which the flange keeps to lines and arcs.
 use jtc_dynamics::JointVec;
-use jtc_wire::Joint;
 
 use super::target::one;
 use super::{FlangePath, Kinematics, Leg, PoseError, Target};
 use crate::path::Waypointed;
-use crate::{BlendedPath, Path, PathPoint, PlanError};
+use crate::{BlendedPath, Path, PathPoint, PlanError, furthest_joint};
 
 /// How far from the joint positions of a waypoint the arm may be where a line that leads there ends, rad.
 const SAME: f64 = 1e-5;
@@ -306,16 +305,12 @@ fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<
 
 /// Whether the arm is at the joint positions wanted, and not in another configuration.
 fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
-    let away = |joint: &Joint| (reached[joint.index()] - wanted[joint.index()]).abs();
-    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
-    match furthest {
-        Some(joint) if away(&joint) > SAME => Err(PoseError::Configuration {
-            joint,
-            value: reached[joint.index()],
-            wanted: wanted[joint.index()],
-        }),
-        _ => Ok(()),
+    let (joint, away) = furthest_joint(reached, wanted);
+    if away > SAME {
+        let (value, wanted) = (reached[joint.index()], wanted[joint.index()]);
+        return Err(PoseError::Configuration { joint, value, wanted });
     }
+    Ok(())
 }
 
 impl Path for Route {

@@ -204,6 +204,14 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
+    /// Takes in what has arrived, and forgets what was recorded and denied of earlier frames, of which some may have arrived only now.
+    fn forget_the_past(&mut self) -> Result<(), LinkError> {
+        self.catch_up()?;
+        self.records.clear();
+        self.port.take_denial();
+        Ok(())
+    }
+
     fn read(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         let mut buffer = [0; 4096];
         let n = self.port.read(&mut buffer, timeout)?;
@@ -266,10 +274,7 @@ impl<P: Port> Session<P> {
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let mut bad = None;
-        // What was denied before was another one.
-        self.port.take_denial();
-        self.catch_up()?;
-        self.records.clear();
+        self.forget_the_past()?;
         for attempt in 0..self.timeouts.tries {
             self.statistics.retries += u64::from(attempt > 0);
             self.write(frame)?;

@@ -217,8 +217,7 @@ impl<P: Port> Session<P> {
         if segments > SEGMENTS_MAX {
             return Err(refused(DataStatus::TooManySegments));
         }
-        self.catch_up()?;
-        self.records.clear();
+        self.forget_the_past()?;
         let (baud, start) = (self.port.baud(), self.port.now());
         let mut up = Upload::new(points, step_ms, options, baud, start)?;
         loop {

@@ -1,6 +1,7 @@
 //! Sessions with the whole simulated controller, and with one that answers by script.
 
 mod checked;
+mod denied;
 mod imported;
 mod link;
 mod recover;

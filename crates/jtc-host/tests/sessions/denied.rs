@@ -1,0 +1,86 @@
+//! A session on a line that is shared with others: whose refusal a refusal is.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use jtc_host::port::test::ScriptedPort;
+use jtc_host::session::Flow;
+use jtc_host::{
+    Arm, CheckOptions, CheckedTrajectory, Error, LinkError, Port, PortError, Session, UploadError,
+};
+use jtc_wire::{DataStatus, FrameStatus, Response, Status};
+
+/// Denials that arrive with the next bytes that are read: of frames before, and of the frame that was written last.
+#[derive(Clone, Default)]
+struct Denials(Rc<RefCell<Option<&'static str>>>);
+
+/// A line on which every frame is refused.
+struct SharedLine<P> {
+    port: P,
+    arriving: Denials,
+    denied: Option<String>,
+}
+
+impl<P: Port> Port for SharedLine<P> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        let n = self.port.read(buffer, timeout)?;
+        self.denied = self.arriving.0.take().map(str::to_owned).or(self.denied.take());
+        Ok(n)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.port.write_all(bytes)
+    }
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+    fn baud(&self) -> Option<u32> {
+        self.port.baud()
+    }
+    fn take_denial(&mut self) -> Option<String> {
+        self.denied.take()
+    }
+}
+
+/// A session on such a line; `own` is denied with each frame.
+fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
+    let arriving = Denials::default();
+    let denials = arriving.clone();
+    let device = ScriptedPort::new(None, move |_, bytes: &[u8]| {
+        let &[_, frame_type, ..] = bytes else { return Vec::new() };
+        if let Some(reason) = own {
+            denials.0.replace(Some(reason));
+        }
+        let (status, data) = (FrameStatus::NoError, DataStatus::NotAllowed);
+        let response = Response { frame_type, status, data, length: bytes.len() as u16 };
+        Status { response, ..Status::default() }.emit().to_vec()
+    });
+    (Session::new(SharedLine { port: device, arriving: arriving.clone(), denied: None }), arriving)
+}
+
+/// A denial that comes late is not taken for one of the frame that is sent next.
+#[test]
+fn a_late_denial_is_not_that_of_the_next_frame() {
+    let (mut s, arriving) = session(None);
+    let refused = |error: LinkError| assert!(matches!(error, LinkError::Refused { .. }), "{error}");
+    refused(s.gripper(true).unwrap_err());
+    arriving.0.replace(Some("of a frame before"));
+    refused(s.gripper(true).unwrap_err());
+    arriving.0.replace(Some("of a frame before"));
+    let options = CheckOptions::default();
+    let checked =
+        CheckedTrajectory::check(&super::motion(0.1, 50.0), &Arm::avena(), &[0.0; 6], &options).unwrap();
+    let error = s.upload(&checked, |_| Flow::Continue).unwrap_err();
+    assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");
+}
+
+/// One that comes with the refusal is.
+#[test]
+fn a_denial_is_that_of_the_frame_before_it() {
+    let (mut s, _) = session(Some("another one commands"));
+    let error = s.gripper(true).unwrap_err();
+    assert!(
+        matches!(&error, LinkError::Denied { reason, .. } if reason == "another one commands"),
+        "{error}"
+    );
+}

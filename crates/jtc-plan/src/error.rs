@@ -15,7 +15,7 @@ pub enum PlanError {
         count: usize,
     },
     /// A position that is no number.
-    #[error("waypoint {waypoint}, {joint}: {value} is no position")]
+    #[error("waypoint {waypoint}, {}", self.what())]
     NotFinite {
         /// From 1.
         waypoint: usize,
@@ -25,7 +25,7 @@ pub enum PlanError {
         value: f64,
     },
     /// A position outside the limits.
-    #[error("waypoint {waypoint}, {joint}: {value} rad is outside {min}..{max} rad")]
+    #[error("waypoint {waypoint}, {}", self.what())]
     Position {
         /// The one that is outside, or the one before the place that is; from 1.
         waypoint: usize,
@@ -94,11 +94,7 @@ pub enum PlanError {
         shortest: f64,
     },
     /// The torque does not suffice however slow the motion is.
-    #[error(
-        "waypoint {waypoint}, {joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
-        if *.holding { "holding the arm there" } else { "the slowest motion from there" },
-        100.0 * limit / whole
-    )]
+    #[error("waypoint {waypoint}, {}", self.what())]
     Torque {
         /// Where, or the one before the place where; from 1.
         waypoint: usize,
@@ -150,6 +146,23 @@ impl PlanError {
             | Self::Blend { .. }
             | Self::Path { .. }
             | Self::NoTimeLaw { .. } => None,
+        }
+    }
+
+    /// The message without the waypoint that it begins with, where the joint or the flange is wrong at one.
+    pub fn what(&self) -> String {
+        match self {
+            Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is no position"),
+            Self::Position { joint, value, min, max, .. } => {
+                format!("{joint}: {value} rad is outside {min}..{max} rad")
+            }
+            Self::Torque { joint, torque, limit, whole, holding, .. } => format!(
+                "{joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
+                if *holding { "holding the arm there" } else { "the slowest motion from there" },
+                100.0 * limit / whole
+            ),
+            Self::Flange(PoseError::Waypoint { source, .. }) => source.to_string(),
+            _ => self.to_string(),
         }
     }
 

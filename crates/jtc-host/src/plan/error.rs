@@ -85,23 +85,18 @@ impl PlanError {
         use jtc_plan::PlanError as Of;
         use kinematics::PoseError as Pose;
         let Self::Plan(error) = self else { return self.to_string() };
-        let place = if error.waypoint() == Some(1) { "where the arm stands, " } else { "" };
+        let what = error.what();
         match error {
-            Of::NotFinite { joint, value, .. } => format!("{place}{joint}: {value} is no position"),
-            Of::Position { joint, value, min, max, .. } => {
-                format!("{place}{joint}: {value} rad is outside {min}..{max} rad")
-            }
-            Of::Torque { joint, torque, limit, whole, holding, .. } => format!(
-                "{place}{joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
-                if *holding { "holding the arm there" } else { "the slowest motion from there" },
-                100.0 * limit / whole
-            ),
-            Of::Flange(Pose::Waypoint { waypoint: 1, source }) => format!("where the arm stands: {source}"),
-            Of::Flange(Pose::Waypoint { source, .. }) => source.to_string(),
             Of::Flange(Pose::Leg { distance, length, source, .. }) => {
                 format!("{distance:.4} m of {length:.4} m along the line: {source}")
             }
-            other => other.to_string(),
+            Of::Flange(Pose::Waypoint { waypoint: 1, .. }) => format!("where the arm stands: {what}"),
+            Of::NotFinite { waypoint: 1, .. }
+            | Of::Position { waypoint: 1, .. }
+            | Of::Torque { waypoint: 1, .. } => {
+                format!("where the arm stands, {what}")
+            }
+            _ => what,
         }
     }
 }

@@ -7,10 +7,12 @@ mod kind;
 mod likeness;
 #[cfg(feature = "mcap")]
 pub mod mcap;
+mod user_folder;
 mod whole;
 
 pub use diagnosis::{Diagnose, Diagnosis};
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;
 pub use likeness::{likeness, nearest};
+pub use user_folder::user_folder;
 pub use whole::write_whole;

@@ -133,8 +133,7 @@ impl Tokens {
 
 /// The token file of this user, where none is named.
 pub fn default_token_file() -> Option<PathBuf> {
-    let dir = |name: &str| std::env::var_os(name).filter(|dir| !dir.is_empty()).map(PathBuf::from);
-    let state = dir("XDG_STATE_HOME").or_else(|| Some(dir("HOME")?.join(".local/state")))?;
+    let state = host_kit::user_folder("XDG_STATE_HOME", ".local/state")?;
     Some(state.join("openjtc").join("tokens.toml"))
 }
 

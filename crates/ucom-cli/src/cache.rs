@@ -1,6 +1,7 @@
 //! What is remembered of boards, and what their words mean (D-11), as the command line names it.
 
 use cli_kit::Failure;
+use host_kit::user_folder;
 use std::path::{Path, PathBuf};
 
 use ucom_host::files::SignalTable;
@@ -32,8 +33,6 @@ impl CacheArgs {
 
     /// Where things are remembered; `None` when there is no place for them.
     fn directory(&self) -> Option<PathBuf> {
-        let base = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-        let of_user = || base("XDG_CACHE_HOME").or_else(|| base("HOME").map(|home| home.join(".cache")));
-        self.cache.clone().or_else(|| of_user().map(|dir| dir.join("ucom")))
+        self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }
 }

@@ -8,6 +8,7 @@ use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::{Duration, Instant};
 
 use jtc_host::{Port, PortError};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::http::HeaderValue;
 use tungstenite::http::header::AUTHORIZATION;
@@ -17,6 +18,8 @@ use tungstenite::{Message, WebSocket};
 const CONNECTING: Duration = Duration::from_secs(5);
 /// Longest that an agent may leave a message untaken.
 const STALL: Duration = Duration::from_secs(5);
+/// What does not stand for itself in a value in an address: all but the unreserved characters (RFC 3986, 2.3).
+const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// How a client presents itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -82,9 +85,10 @@ impl AgentPort {
             stream.set_read_timeout(Some(CONNECTING))
         };
         prepare().map_err(|error: io::Error| no_agent(error.to_string()))?;
-        let mut request = format!("ws://{authority}/api/line?name={}", encoded(&options.name))
-            .into_client_request()
-            .map_err(|error| no_agent(error.to_string()))?;
+        let mut request =
+            format!("ws://{authority}/api/line?name={}", utf8_percent_encode(&options.name, RESERVED))
+                .into_client_request()
+                .map_err(|error| no_agent(error.to_string()))?;
         if let Some(token) = &options.token {
             let value = HeaderValue::from_str(&format!("Bearer {token}"))
                 .map_err(|_| no_agent("the token is no token".into()))?;
@@ -181,12 +185,6 @@ fn connect(authority: &str) -> io::Result<TcpStream> {
         }
     }
     Err(last)
-}
-
-/// A text as a value in an address.
-fn encoded(text: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
-    text.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
 }
 
 impl Port for AgentPort {

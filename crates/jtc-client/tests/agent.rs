@@ -96,6 +96,16 @@ fn the_end_of_an_agent_is_known_to_its_clients_at_once() {
 }
 
 #[test]
+fn a_client_is_known_by_the_name_that_it_gives_whatever_is_in_it() {
+    let served = Served::start(921_600);
+    let name = "Zoë & Bob: a=b?c#d/e %41+~";
+    let (mut zoe, mut other) = (served.operator(name), served.operator("other"));
+    zoe.gripper(false).expect("nobody else commands");
+    let error = other.gripper(false).expect_err("another one commands");
+    assert!(error.to_string().contains(name), "{error}");
+}
+
+#[test]
 fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     let served = Served::start(921_600);
     let (mut anna, mut bob) = (served.operator("anna"), served.operator("bob"));

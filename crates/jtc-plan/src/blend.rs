@@ -136,6 +136,11 @@ impl BlendedPath {
         self.corners[corner].half > 0.0
     }
 
+    /// Whether it stops at each corner.
+    pub(crate) fn stops_everywhere(&self) -> bool {
+        self.corners[1..self.corners.len() - 1].iter().all(|corner| corner.stop)
+    }
+
     /// The positions of the legs' ends.
     pub(crate) fn legs(&self) -> impl Iterator<Item = (JointVec, JointVec)> {
         self.corners.windows(2).map(|pair| (pair[0].position, pair[1].position))

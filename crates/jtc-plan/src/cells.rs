@@ -92,8 +92,9 @@ pub(crate) fn cells(
                 (false, false) => u,
             }
         };
+        let place = |i: usize| from + (to - from) * share(i);
         let end = |i: usize| {
-            let s = from + (to - from) * share(i);
+            let s = place(i);
             let point = section.at(if i == count { to } else { s }, side);
             checked(section, &point, s, limits)?;
             Ok::<End, PlanError>(End { point, loads: arm.map(|arm| Loads::at(&point, arm)) })
@@ -101,8 +102,7 @@ pub(crate) fn cells(
         let mut before = end(0)?;
         for i in 0..count {
             let after = end(i + 1)?;
-            let place = |i: usize| from + (to - from) * share(i) - section.from;
-            let (a, b) = (place(i), place(i + 1));
+            let (a, b) = (place(i) - section.from, place(i + 1) - section.from);
             let (p, q) = (&before.point.second, &after.point.second);
             let third = std::array::from_fn(|j| (q[j] - p[j]) / (b - a));
             cells.push(Cell { from: a, to: b, ends: [before, after], third });

@@ -65,8 +65,11 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
+        // The same motion would be planned again.
+        let is_planned =
+            |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();
-        if best.as_ref().is_none_or(|best| with_stops < best.motion.duration())
+        if best.as_ref().is_none_or(|best| !is_planned(best) && with_stops < best.motion.duration())
             && let Ok(stops) = Timed::new(all_stops, limits, arm)
             && best.as_ref().is_none_or(|best| stops.motion.duration() < best.motion.duration())
         {

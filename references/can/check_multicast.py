@@ -20,7 +20,7 @@ TIMEOUT_S = 10.0
 
 
 def echoed(bus: can.BusABC) -> can.Message:
-    """The next message that is not our own (python-can hears itself)."""
+    """The next message that is not our own (python-can receives what it sends)."""
     end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         try:

@@ -44,7 +44,7 @@ def check_kinds(port: int, rng: random.Random) -> None:
 
 
 def check_two(port: int) -> None:
-    """Two clients: each hears the other once and itself never, in order, a burst without gaps."""
+    """Two clients: each receives the other once and itself never, in order, a burst without gaps."""
     with connect(port, "can1") as one, connect(port, "can1") as two:
         def send() -> None:
             for number in range(BURST):
@@ -56,7 +56,7 @@ def check_two(port: int) -> None:
             message = received(two, TIMEOUT_S)
             assert message.arbitration_id == 0x100 and bytes(message.data) == number.to_bytes(2, "big"), message
         sender.join()
-        # A frame back: what `one` hears first is this, so none of its own came back.
+        # A frame back: what `one` receives first is this, so none of its own came back.
         two.send(can.Message(arbitration_id=0x200, is_extended_id=False))
         message = received(one, TIMEOUT_S)
         assert message.arbitration_id == 0x200 and message.dlc == 0, message

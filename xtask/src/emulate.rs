@@ -51,7 +51,7 @@ fn install_tools() -> Result<()> {
     Ok(())
 }
 
-/// Where bindgen looks for the library on Debian, or where it is told to look.
+/// Where bindgen looks for the library on Debian, or where LIBCLANG_PATH leads it.
 fn has_libclang() -> bool {
     let entries = |place: &Path| std::fs::read_dir(place).into_iter().flatten().flatten();
     let of_llvm = entries(Path::new("/usr/lib")).map(|entry| entry.path().join("lib"));

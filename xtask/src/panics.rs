@@ -62,7 +62,7 @@ impl fmt::Display for Report {
 
 /// The ways from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
 ///
-/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` tells the line behind an address.
+/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line behind an address.
 pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
     // Each reached function with the function it was reached from and the address of the branch.

@@ -129,7 +129,7 @@ pub fn apt_install(packages: &[&str]) -> Result<()> {
 pub struct Scratch(PathBuf);
 
 impl Scratch {
-    /// Made fresh; `name` tells what it is for.
+    /// Made fresh; `name` is what it is for.
     pub fn new(name: &str) -> Result<Self> {
         let path = std::env::temp_dir().join(format!("openjtc-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;

@@ -10,7 +10,7 @@ const SHOWN: (usize, usize) = (5, 4);
 /// How often a case is run whose output depends on a moment before it counts as another one.
 const TRIES: usize = 4;
 
-/// Words whose number is kept: it tells one thing from another.
+/// Words whose number is kept: it distinguishes one thing from another.
 const KEPT: [&str; 9] =
     ["joint ", "joints ", "board ", "boards ", "number ", "code ", "stop ", "certain: ", "localhost:"];
 

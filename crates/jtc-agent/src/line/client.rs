@@ -91,8 +91,8 @@ pub enum PutOut {
         "it sent more than {FRAMES_PER_S} frames a second, or more than {WAITING_MAX} bytes wait for the line"
     )]
     TooMuch,
-    /// It commanded, and nothing was heard of it for seconds.
-    #[error("it commanded, and nothing was heard of it for some seconds")]
+    /// It commanded, and nothing was received from it for seconds.
+    #[error("it commanded, and nothing was received from it for some seconds")]
     Silent,
     /// It does not read.
     #[error("it has left more than {UNREAD_MAX} bytes unread")]

@@ -1,7 +1,7 @@
 //! What goes to the device: whole frames, one after the other, a few bytes ahead of the line.
 //!
 //! Bytes that an operating system has taken cannot be taken back. So no more than [`AHEAD`] of them are ever on their way, and a Stop
-//! need not wait for the rest of a long frame: that is abandoned, and the gap behind it tells the device so (J-05).
+//! need not wait for the rest of a long frame: that is abandoned, and the device knows by the gap behind it (J-05).
 use std::time::Duration;
 
 use jtc_host::port::line_time;

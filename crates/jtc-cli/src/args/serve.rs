@@ -18,7 +18,7 @@ pub struct ServeArgs {
     /// controller that cannot be asked for its own; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Address to listen at; beyond this computer everybody needs a token
+    /// Address to listen at; beyond this computer everyone needs a token
     #[arg(long, env = "JTC_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8780")]
     pub listen: SocketAddr,
     /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several

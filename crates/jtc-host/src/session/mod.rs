@@ -73,7 +73,7 @@ pub struct Session<P> {
     last: Option<Status>,
     statistics: LinkStatistics,
     start: Duration,
-    last_heard: Duration,
+    last_received: Duration,
     observer: Option<Observer>,
     /// The trajectory that the controller holds from this session.
     uploaded: Option<CheckedTrajectory>,
@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             last: None,
             statistics: LinkStatistics::default(),
             start,
-            last_heard: start,
+            last_received: start,
             observer: None,
             uploaded: None,
             timeouts: Timeouts::default(),
@@ -248,7 +248,7 @@ impl<P: Port> Session<P> {
                 self.uploaded = None;
             }
             self.last = Some(*status);
-            self.last_heard = now;
+            self.last_received = now;
         }
         // Whoever does not look at statuses does not pile them up.
         while self.arrived.len() > 256 {
@@ -288,7 +288,7 @@ impl<P: Port> Session<P> {
                 None => {}
             }
         }
-        if self.port.now() - self.last_heard > self.timeouts.status {
+        if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })

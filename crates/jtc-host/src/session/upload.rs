@@ -342,7 +342,7 @@ impl<P: Port> Session<P> {
 
     /// No record came in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
-        if self.port.now() - self.last_heard > self.timeouts.status {
+        if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
         // All sent and complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)

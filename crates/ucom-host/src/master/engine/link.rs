@@ -91,7 +91,7 @@ impl Link {
         poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
     }
 
-    /// Hears these functions of these boards from now on, and their errors.
+    /// Receives these functions of these boards from now on, and their errors.
     pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

@@ -90,18 +90,12 @@ pub struct LivePort {
     start: Instant,
     /// Real time that was left out.
     left_out: Duration,
-    name: String,
 }
 
 impl LivePort {
     /// A port of `world`, whose time begins now.
     pub fn new(world: World) -> Self {
-        Self {
-            world,
-            start: Instant::now(),
-            left_out: Duration::ZERO,
-            name: "simulated controller".to_owned(),
-        }
+        Self { world, start: Instant::now(), left_out: Duration::ZERO }
     }
 
     /// Lets the world come up to now.
@@ -148,6 +142,6 @@ impl Port for LivePort {
     }
 
     fn name(&self) -> String {
-        self.name.clone()
+        "simulated controller".to_owned()
     }
 }

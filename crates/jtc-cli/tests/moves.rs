@@ -140,6 +140,8 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     at(&sim, [0.0; 6]);
     // As `traj run` does: only from HoldPos.
     let sim = Sim::start(&FAST);
+    let all_are_there = || sim.json(&["status"], 0)["missing_nodes"].as_array().unwrap().is_empty();
+    assert!((0..100).any(|_| all_are_there()), "the drives are brought up");
     let (moved, run) = (sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]), sim.path("motion.csv"));
     std::fs::write(&run, slow_motion(20)).unwrap();
     let run = sim.jtc(&["traj", "run", &run]);

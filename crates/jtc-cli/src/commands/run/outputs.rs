@@ -19,22 +19,13 @@ pub struct Outputs {
 impl Outputs {
     pub fn open(course: &Course) -> Result<Self, Failure> {
         let mut others: Vec<&Path> = course.inputs.iter().map(|path| path.as_path()).collect();
-        let force = course.execute.files.force.force;
-        let record = course
-            .execute
-            .files
-            .record
-            .as_deref()
-            .map(|path| OutputFile::open(path, force, &others))
-            .transpose()?;
-        others.extend(course.execute.files.record.as_deref());
-        let report = course
-            .execute
-            .files
-            .report
-            .as_deref()
-            .map(|path| OutputFile::open(path, force, &others))
-            .transpose()?;
+        let files = &course.execute.files;
+        let open = |path: Option<&Path>, others: &[&Path]| {
+            path.map(|path| OutputFile::open(path, files.force.force, others)).transpose()
+        };
+        let record = open(files.record.as_deref(), &others)?;
+        others.extend(files.record.as_deref());
+        let report = open(files.report.as_deref(), &others)?;
         Ok(Self { record, report })
     }
 

@@ -4,12 +4,19 @@ mod common;
 use std::time::Duration;
 
 use common::Served;
+use jtc_client::AgentPort;
 use jtc_host::check::CheckOptions;
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, PortError, plan};
+use jtc_host::{Arm, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, PortError, Session, plan};
 use jtc_wire::{ControllerState, TrajectoryState};
 
 const WAIT: Duration = Duration::from_secs(30);
+
+/// The controller has its parameters and holds the arm.
+fn hold(session: &mut Session<AgentPort>) {
+    session.use_defaults().expect("it takes them");
+    session.wait_ready(WAIT).expect("it holds the arm");
+}
 
 /// A motion of some seconds from the zero pose, checked.
 fn motion(percent: f64) -> CheckedTrajectory {
@@ -25,8 +32,7 @@ fn motion(percent: f64) -> CheckedTrajectory {
 fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
-    anna.use_defaults().expect("it takes them");
-    anna.wait_ready(WAIT).expect("it holds the arm");
+    hold(&mut anna);
     let checked = motion(5.0);
     anna.upload(&checked, |_| Flow::Continue).expect("it takes it");
     anna.execute(&checked).expect("it starts");
@@ -59,8 +65,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
 fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
     let served = Served::start(115_200);
     let mut anna = served.operator("anna");
-    anna.use_defaults().expect("it takes them");
-    anna.wait_ready(WAIT).expect("it holds the arm");
+    hold(&mut anna);
     let checked = motion(10.0);
     let url = served.url();
     let mut done = 0;
@@ -132,8 +137,7 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     let served = Served::start(921_600);
     let (mut anna, mut looks) = (served.operator("anna"), served.operator("looks"));
     looks.fresh_status().expect("it reports");
-    anna.use_defaults().expect("it takes them");
-    anna.wait_ready(WAIT).expect("it holds the arm");
+    hold(&mut anna);
     for _ in 0..8 {
         std::thread::sleep(Duration::from_millis(500));
         anna.fresh_status().expect("it reports");

@@ -146,7 +146,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
         assert!(at.any(|kind| *kind == step), "{step} in {kinds:?}");
     }
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
-    assert_eq!(anna.ask("POST /api/gripper", Some(json!({ "on": true }))).0, 409);
+    assert_eq!(anna.ask("POST /api/gripper", Some(json!({ "on": true }))).0, 403);
 }
 
 #[test]
@@ -247,9 +247,9 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
     let served = Served::start(921_600);
     let as_viewer =
         |request: &str, body: Option<Value>| served.api_as(Some(&served.tokens.viewer), request, None, body);
-    assert_eq!(as_viewer("POST /api/lease", Some(json!({ "name": "eve" }))).0, 409);
+    assert_eq!(as_viewer("POST /api/lease", Some(json!({ "name": "eve" }))).0, 403);
     let text = json!({ "name": "x", "text": there_and_back(10.0) });
-    assert_eq!(as_viewer("PUT /api/trajectories/1", Some(text.clone())).0, 409);
+    assert_eq!(as_viewer("PUT /api/trajectories/1", Some(text)).0, 403);
     assert_eq!(as_viewer("GET /api/trajectories", None).1, json!([]));
     for request in
         ["GET /api/status", "GET /api/info", "GET /api/payload", "GET /api/jobs", "GET /api/events"]
@@ -260,7 +260,7 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
     let anna = Program::new(&served, "anna", 30.0, "continue");
     for (token, key) in [(&served.tokens.operator, "x"), (&served.tokens.viewer, anna.key.as_str())] {
         let (status, error) = served.api_as(Some(token), "POST /api/clear", Some(key), None);
-        assert!(status == 409 && error["next"].as_str().is_some_and(|next| !next.is_empty()), "{error}");
+        assert!(status == 403 && error["next"].as_str().is_some_and(|next| !next.is_empty()), "{error}");
     }
     let (status, error) =
         served.api("PUT /api/trajectories/1", None, Some(json!({ "name": "x", "text": "t,q1\n0,a" })));

@@ -104,6 +104,7 @@ pub(super) async fn resume(
 #[utoipa::path(
     put,
     path = "/api/speed",
+    operation_id = "set_speed",
     params(("Lease-Key" = String, Header, description = "Key of the lease")),
     request_body = SpeedObject,
     responses((status = 204, description = "The controller changes to that speed"), Refusals, Denials)

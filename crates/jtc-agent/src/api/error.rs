@@ -93,6 +93,16 @@ impl ErrorObject {
         Self::diagnosed(error).with(&error.facts())
     }
 
+    /// Who asks may not ask for that, whatever goes on.
+    pub(super) fn forbidden(self) -> Self {
+        Self { status: StatusCode::FORBIDDEN, ..self }
+    }
+
+    /// The request itself is wrong.
+    pub(super) fn unreadable(self) -> Self {
+        Self { status: StatusCode::BAD_REQUEST, ..self }
+    }
+
     /// With joint, point, value, limit and cause.
     pub fn with(self, facts: &Facts) -> Self {
         // JSON has no word for what is no number.
@@ -137,7 +147,8 @@ impl From<Denied> for ErrorObject {
             Denied::Stopped { .. } => "wait three seconds, and ask again when the arm may move",
             Denied::NotHolder => "take the lease with POST /api/lease",
         };
-        Self::new("denied", denied.to_string(), next)
+        let object = Self::new("denied", denied.to_string(), next);
+        if denied == Denied::Viewer { object.forbidden() } else { object }
     }
 }
 
@@ -173,7 +184,7 @@ pub(super) enum Refusals {
     /// The token is missing or none of this agent's
     #[response(status = 401)]
     Token(ErrorObject),
-    /// The request comes from a page of another site, or asks for another name
+    /// The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks
     #[response(status = 403)]
     Elsewhere(ErrorObject),
     /// The request takes too long, or more than it may

@@ -11,7 +11,7 @@ use tokio::time::{Instant, MissedTickBehavior};
 use utoipa::{IntoParams, ToSchema};
 
 use super::error::{Asked, Refusals};
-use super::{Agent, Caller, StatusObject};
+use super::{Agent, Caller, ErrorObject, StatusObject};
 use crate::jobs::{EventObject, Excerpt};
 use crate::line::Role;
 
@@ -68,24 +68,30 @@ impl Agent {
 #[utoipa::path(
     get,
     path = "/api/events",
+    operation_id = "get_events",
     params(EventsRequest),
     responses((status = 200, description = "Oldest first, 500 at most", body = EventsObject), Refusals)
 )]
 pub(super) async fn events(
     State(agent): State<Agent>,
     Asked(request): Asked<EventsRequest>,
-) -> Json<EventsObject> {
+) -> Result<Json<EventsObject>, ErrorObject> {
     let EventsRequest { after, job, wait_s } = request;
-    let wait = Duration::from_secs_f64(if wait_s >= 0.0 { wait_s.min(WAIT_MAX_S) } else { 0.0 });
-    let end = Instant::now() + wait;
+    if !(0.0..=WAIT_MAX_S).contains(&wait_s) {
+        let message = format!("wait_s is {wait_s}: 0 to {WAIT_MAX_S} s are possible");
+        return Err(
+            ErrorObject::new("request", message, "ask again from `last` on to wait longer").unreadable()
+        );
+    }
+    let end = Instant::now() + Duration::from_secs_f64(wait_s);
     let mut changes = agent.jobs.journal.changes();
     loop {
         let excerpt = agent.jobs.journal.after(after, job, EVENTS_MAX);
         if !excerpt.events.is_empty() || excerpt.missed {
-            return Json(agent.events(excerpt));
+            return Ok(Json(agent.events(excerpt)));
         }
         if !matches!(tokio::time::timeout_at(end, changes.changed()).await, Ok(Ok(()))) {
-            return Json(agent.events(excerpt));
+            return Ok(Json(agent.events(excerpt)));
         }
     }
 }

@@ -106,10 +106,11 @@ impl Agent {
         let key = headers.get(KEY).and_then(|key| key.to_str().ok());
         let next = "take the lease with POST /api/lease, and send its key in the header Lease-Key";
         let Some(key) = key else {
-            return Err(ErrorObject::new("no-lease", "commands need a lease", next));
+            return Err(ErrorObject::new("no-lease", "commands need a lease", next).forbidden());
         };
         self.jobs.commander(key).ok_or_else(|| {
             ErrorObject::new("no-lease", "this key is of no lease, or of one that lapsed long ago", next)
+                .forbidden()
         })
     }
 }
@@ -118,6 +119,7 @@ impl Agent {
 #[utoipa::path(
     post,
     path = "/api/lease",
+    operation_id = "take_lease",
     request_body = LeaseRequest,
     responses(
         (status = 200, description = "This client commands, or waits for it", body = LeaseGrant),
@@ -167,6 +169,7 @@ pub(super) async fn take(
 #[utoipa::path(
     put,
     path = "/api/lease",
+    operation_id = "renew_lease",
     params(("Lease-Key" = String, Header, description = "Key of the lease")),
     responses(
         (status = 200, description = "Whether this client commands", body = LeaseState),
@@ -194,6 +197,7 @@ pub(super) async fn renew(
 #[utoipa::path(
     delete,
     path = "/api/lease",
+    operation_id = "release_lease",
     params(("Lease-Key" = String, Header, description = "Key of the lease")),
     responses((status = 204, description = "It is let go"), Refusals, Denials)
 )]

@@ -24,7 +24,8 @@ use jtc_wire::ExecCommand;
 use serde_json::json;
 use tokio::sync::Semaphore;
 use tower_http::timeout::TimeoutLayer;
-use utoipa::OpenApi;
+use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
+use utoipa::{Modify, OpenApi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -200,9 +201,21 @@ fn text(description: &utoipa::openapi::OpenApi) -> String {
                        operator's from elsewhere. A Stop or a Pause is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(ErrorObject))
+    components(schemas(ErrorObject)),
+    modifiers(&Bearer),
+    security((), ("token" = []))
 )]
 struct Description;
+
+/// A token, which those on the same computer need for commands alone.
+struct Bearer;
+
+impl Modify for Bearer {
+    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
+        let scheme = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
+        description.components.get_or_insert_default().add_security_scheme("token", scheme);
+    }
+}
 
 fn described() -> OpenApiRouter<Agent> {
     let trajectories = OpenApiRouter::new()
@@ -238,6 +251,7 @@ fn described() -> OpenApiRouter<Agent> {
 #[utoipa::path(
     get,
     path = "/api/status",
+    operation_id = "get_status",
     responses((status = 200, description = "What the controller reports", body = StatusObject), Refusals)
 )]
 async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>) -> Json<StatusObject> {

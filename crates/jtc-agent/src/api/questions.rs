@@ -49,6 +49,7 @@ impl Agent {
 #[utoipa::path(
     get,
     path = "/api/info",
+    operation_id = "get_info",
     responses((status = 200, description = "What it says of itself", body = InfoObject), Refusals, Denials)
 )]
 pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>, ErrorObject> {
@@ -72,6 +73,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
 #[utoipa::path(
     get,
     path = "/api/payload",
+    operation_id = "get_payload",
     responses((status = 200, description = "Mass 0: nothing", body = PayloadObject), Refusals, Denials)
 )]
 pub(super) async fn payload(State(agent): State<Agent>) -> Result<Json<PayloadObject>, ErrorObject> {

@@ -143,6 +143,7 @@ impl From<Job> for JobObject {
 #[utoipa::path(
     post,
     path = "/api/runs",
+    operation_id = "run",
     params(("Lease-Key" = String, Header, description = "Key of the lease")),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
@@ -183,6 +184,7 @@ pub(super) async fn begin_run(
 #[utoipa::path(
     post,
     path = "/api/moves",
+    operation_id = "move_to",
     params(("Lease-Key" = String, Header, description = "Key of the lease")),
     request_body = MoveRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
@@ -236,6 +238,7 @@ fn begin(
 #[utoipa::path(
     get,
     path = "/api/jobs",
+    operation_id = "list_jobs",
     responses((status = 200, description = "Those that are remembered", body = Vec<JobObject>), Refusals)
 )]
 pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
@@ -246,6 +249,7 @@ pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
 #[utoipa::path(
     get,
     path = "/api/jobs/{number}",
+    operation_id = "get_job",
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
         (status = 200, description = "How it is", body = JobObject),

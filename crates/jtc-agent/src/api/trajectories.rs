@@ -117,6 +117,7 @@ fn operator(caller: &Caller) -> Result<(), ErrorObject> {
 #[utoipa::path(
     get,
     path = "/api/trajectories",
+    operation_id = "list_trajectories",
     responses((status = 200, description = "All of them, by number", body = Vec<TrajectoryObject>), Refusals)
 )]
 pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObject>> {
@@ -127,6 +128,7 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObjec
 #[utoipa::path(
     put,
     path = "/api/trajectories/{number}",
+    operation_id = "put_trajectory",
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
     request_body = TrajectoryRequest,
     responses((status = 200, description = "What is kept", body = TrajectoryObject), Refusals, Denials)
@@ -165,6 +167,7 @@ async fn keep(
 #[utoipa::path(
     delete,
     path = "/api/trajectories/{number}",
+    operation_id = "delete_trajectory",
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
     responses(
         (status = 204, description = "It is gone"),
@@ -191,6 +194,7 @@ pub(super) async fn delete(
 #[utoipa::path(
     get,
     path = "/api/trajectories/{number}/check",
+    operation_id = "check_trajectory",
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
     responses(
         (status = 200, description = "What the check found", body = CheckObject),

@@ -7,7 +7,7 @@ use jtc_host::plan::{self, Planner};
 use jtc_host::report::Summary;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Session, Trajectory};
-use jtc_wire::{Joint, Status, TrajectoryState};
+use jtc_wire::{Status, TrajectoryState};
 
 use super::{Happening, Task};
 use crate::api::ErrorObject;
@@ -247,12 +247,10 @@ fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), Err
     }
     let Some((first, last)) = trajectory.points.first().zip(trajectory.points.last()) else { return Ok(()) };
     let limit = site.arm.config_on_device(&site.options.device).start_tolerance_rad;
-    let away = |joint: &Joint| (last.position[joint.index()] - first.position[joint.index()]).abs();
-    let furthest = Joint::ALL.into_iter().max_by(|a, b| away(a).total_cmp(&away(b)));
-    let Some((joint, far)) = furthest.map(|joint| (joint, away(&joint))).filter(|(_, far)| *far > limit)
-    else {
+    let (joint, far) = plan::furthest_joint(&first.position, &last.position);
+    if far <= limit {
         return Ok(());
-    };
+    }
     let message = format!(
         "it ends {far:.3} rad from where it begins ({joint}), more than {limit} rad: it cannot be repeated as it is; nothing was sent"
     );

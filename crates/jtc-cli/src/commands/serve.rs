@@ -11,12 +11,14 @@ use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
 use jtc_agent::{Line, Owner, serve as service};
 use jtc_client::agents::{Registered, register};
+use jtc_host::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::LivePort;
 use jtc_sim::{SimConfig, World};
 use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
+use super::named_arm;
 use super::simulated::simulated;
 use crate::args::ServeArgs;
 
@@ -40,7 +42,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("another agent may listen there: name another address with --listen")
     })?;
     let listen = listener.local_addr()?;
-    let port = port(args, out)?;
+    let (port, arm) = port(args, out)?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
     let (url, name) = (format!("http://{listen}"), port.name());
     // A relative name would be another port in another directory.
@@ -58,7 +60,6 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
     let access = Access::new(tokens, listen, &args.names);
-    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
     let agent = Agent::new(owner.line(), Jobs::new(owner.line(), store, arm), access, log, &name, args.sim)?;
     let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim });
     out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
@@ -107,11 +108,16 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-fn port(args: &ServeArgs, out: &Output) -> Result<Box<dyn Port + Send>, Failure> {
+/// The port, and the arm of a controller that cannot be asked for its own.
+fn port(args: &ServeArgs, out: &Output) -> Result<(Box<dyn Port + Send>, Arm), Failure> {
     if !args.sim {
-        return Ok(Box::new(args.link.own()?));
+        let arm = named_arm::load(args.arm.as_deref())?;
+        if args.arm.is_some() {
+            named_arm::note_warnings(&arm, out);
+        }
+        return Ok((Box::new(args.link.own()?), arm));
     }
-    let (_, config) = simulated(args.arm.as_deref(), None, out)?;
+    let (arm, config) = simulated(args.arm.as_deref(), None, out)?;
     let config = SimConfig { baud: Some(args.link.baud), ..config };
-    Ok(Box::new(LivePort::new(World::new(config))))
+    Ok((Box::new(LivePort::new(World::new(config))), arm))
 }

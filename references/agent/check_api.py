@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 
 DESCRIPTION = pathlib.Path(__file__).parents[2] / "docs" / "openapi.json"
 SCRIPTS = pathlib.Path(sys.executable).parent
@@ -183,15 +184,23 @@ def programs(jtc, directory):
 
 
 def requests_of_all_kinds(jtc, directory):
-    with agent(jtc, directory) as (url, token, _):
-        command = [SCRIPTS / "schemathesis", "run", DESCRIPTION, "--url", url, "--seed", str(SEED)]
-        command += ["-H", f"Authorization: Bearer {token}", "--max-examples", "30", "--request-timeout", "15"]
-        command += ["--phases", "examples,coverage,fuzzing"]
-        # A body of the right form may be no trajectory, and a payload no body.
-        command += ["--exclude-checks", "positive_data_acceptance"]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=directory)
-        assert done.returncode == 0, done.stdout[-6000:]
-        print(f"Schemathesis, seed {SEED}:", re.search(r"\d+ generated, .*", done.stdout)[0])
+    for lease in (False, True):
+        with agent(jtc, directory) as (url, token, _):
+            command = [SCRIPTS / "schemathesis", "run", DESCRIPTION, "--url", url, "--seed", str(SEED)]
+            command += ["-H", f"Authorization: Bearer {token}", "--max-examples", "30"]
+            command += ["--request-timeout", "15", "--phases", "examples,coverage,fuzzing"]
+            # A body of the right form may be no trajectory, and a payload no body.
+            command += ["--exclude-checks", "positive_data_acceptance"]
+            if lease:
+                # Whoever has the lease gets further; it cannot be tried without its key then.
+                body = json.dumps({"name": "everything", "lasts_s": 3600.0}).encode()
+                headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+                request = urllib.request.Request(f"{url}/api/lease", body, headers)
+                key = json.load(urllib.request.urlopen(request))["key"]
+                command += ["-H", f"Lease-Key: {key}", "--exclude-path", "/api/lease"]
+            done = subprocess.run(command, capture_output=True, text=True, cwd=directory)
+            assert done.returncode == 0, done.stdout[-6000:]
+            print(f"Schemathesis, seed {SEED}, lease {lease}:", re.search(r"\d+ generated, .*", done.stdout)[0])
 
 
 def main():

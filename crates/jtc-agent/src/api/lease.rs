@@ -26,8 +26,7 @@ const NAME_MAX: usize = 64;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaseRequest {
-    /// What people are to call it.
-    #[schema(max_length = 64)]
+    /// What people are to call it: the first 64 characters.
     pub name: String,
     /// How long the lease lasts without a request of this client, s.
     #[serde(default = "ten")]

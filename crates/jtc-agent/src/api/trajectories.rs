@@ -18,8 +18,7 @@ use crate::owner::ClientPort;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectoryRequest {
-    /// What people are to call it.
-    #[schema(max_length = 64)]
+    /// What people are to call it: the first 64 characters.
     pub name: String,
     /// A file's text in any form that jtc traj run takes but recordings: CSV with a time column and joints, JSON, or a ROS JointTrajectory.
     pub text: String,

@@ -8,6 +8,7 @@ pub mod line;
 pub mod log;
 pub mod owner;
 pub mod serve;
+pub mod tls;
 
 pub use line::{ClientId, Denied, Introduction, Lease, LineEvent, Policy, Role, SharedLine};
 pub use owner::{ClientPort, Line, Owner};

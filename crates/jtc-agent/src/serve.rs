@@ -9,8 +9,10 @@ use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use tokio::net::TcpStream;
+use rustls::ServerConfig;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::Semaphore;
+use tokio_rustls::TlsAcceptor;
 
 /// How often is looked whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -19,7 +21,7 @@ const CONNECTIONS_MAX: usize = 256;
 /// Longest that the head of a request may take.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 
-/// Serves `router` at `listener` until `ended` is true. Blocks.
+/// Serves `router` at `listener`, with TLS where it is given, until `ended` is true. Blocks.
 ///
 /// # Errors
 ///
@@ -27,6 +29,7 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 pub fn serve(
     router: Router,
     listener: TcpListener,
+    tls: Option<Arc<ServerConfig>>,
     ended: impl Fn() -> bool + Send + 'static,
 ) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
@@ -39,7 +42,7 @@ pub fn serve(
             }
         };
         tokio::select! {
-            () = accept(router, &listener) => Ok(()),
+            () = accept(router, &listener, tls.map(TlsAcceptor::from)) => Ok(()),
             () = end => Ok(()),
         }
     });
@@ -49,7 +52,7 @@ pub fn serve(
 }
 
 /// Takes connections for ever.
-async fn accept(router: Router, listener: &tokio::net::TcpListener) {
+async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<TlsAcceptor>) {
     let (here, elsewhere) = (Semaphore::new(CONNECTIONS_MAX), Semaphore::new(CONNECTIONS_MAX));
     let (here, elsewhere) = (Arc::new(here), Arc::new(elsewhere));
     loop {
@@ -61,17 +64,25 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener) {
         let room = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
         // Without room it is closed at once.
         let Ok(permit) = room.clone().try_acquire_owned() else { continue };
-        let router = router.clone().layer(Extension(ConnectInfo(peer)));
+        let (router, tls) = (router.clone().layer(Extension(ConnectInfo(peer))), tls.clone());
         tokio::spawn(async move {
-            serve_connection(router, stream).await;
+            // A status of 175 bytes is not to wait for more.
+            let _ = stream.set_nodelay(true);
+            match tls {
+                None => serve_connection(router, stream).await,
+                // Whoever does not shake hands, or not in time, gets no word.
+                Some(tls) => {
+                    if let Ok(Ok(stream)) = tokio::time::timeout(HEAD_TIME, tls.accept(stream)).await {
+                        serve_connection(router, stream).await;
+                    }
+                }
+            }
             drop(permit);
         });
     }
 }
 
-async fn serve_connection(router: Router, stream: TcpStream) {
-    // A status of 175 bytes is not to wait for more.
-    let _ = stream.set_nodelay(true);
+async fn serve_connection(router: Router, stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static) {
     let served = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD_TIME)

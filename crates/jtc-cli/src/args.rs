@@ -74,6 +74,9 @@ pub struct LinkArgs {
     /// Token file of the agent; default: that of an agent of this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
+    /// Certificates, PEM, that an agent at https:// is trusted by; default: its own where it runs on this computer, else those of the system
+    #[arg(long, env = "JTC_TLS_CA", value_name = "FILE", help_heading = "Link")]
+    pub tls_ca: Option<std::path::PathBuf>,
     /// Rate of the port, Bd
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200, help_heading = "Link",
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]

@@ -1,9 +1,7 @@
 //! The way to the controller: the port named, or the only one found; itself, or the agent that owns it.
-use std::path::PathBuf;
-
 use cli_kit::Failure;
 use jtc_agent::access::Tokens;
-use jtc_client::agents::{is_same_port, owner_of, registered};
+use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
 use jtc_client::{AgentPort, Options};
 use jtc_host::port::{SerialPort, only_one};
 use jtc_host::{Port, PortError, Session};
@@ -24,14 +22,28 @@ impl LinkArgs {
 
     /// Opens the port, or the line of the agent that owns it.
     pub fn open(&self) -> Result<LinkPort, Failure> {
+        self.open_with(None)
+    }
+
+    /// The same; `policy` is what becomes of a motion when this program goes, which needs an agent.
+    pub fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
         let name = self.name()?;
-        if name.starts_with("http://") {
+        if is_agent(&name) {
             let agent = registered().into_iter().find(|agent| agent.url == name.trim_end_matches('/'));
-            let options = self.options(agent.map(|agent| agent.token_file))?;
+            let options = self.options(agent.as_ref(), policy)?;
             return Ok(Box::new(AgentPort::open(&name, &options)?));
         }
-        let Some(agent) = owner_of(&name) else { return Ok(Box::new(SerialPort::open(&name, self.baud)?)) };
-        let port = AgentPort::open(&agent.url, &self.options(Some(agent.token_file))?)?;
+        let Some(agent) = owner_of(&name) else {
+            if let Some(policy) = policy.filter(|policy| *policy != "continue") {
+                let what = format!(
+                    "--when-gone {policy} needs an agent: over {name} a motion goes on without this program"
+                );
+                return Err(Failure::nothing_sent(Failure::usage(what))
+                    .hint(format!("`jtc serve --port {name}` is one")));
+            }
+            return Ok(Box::new(SerialPort::open(&name, self.baud)?));
+        };
+        let port = AgentPort::open(&agent.url, &self.options(Some(&agent), policy)?)?;
         if !is_same_port(&port.hello().port, &name) {
             let what = format!("{}: the agent there has {}, not {name}", agent.url, port.hello().port);
             return Err(
@@ -42,10 +54,11 @@ impl LinkArgs {
     }
 
     /// How this program presents itself to an agent. A token goes to agents of this user only, and where its file was named.
-    fn options(&self, token_file: Option<PathBuf>) -> Result<Options, Failure> {
-        let file = self.token_file.clone().or(token_file);
-        let token = file.map(|file| Tokens::load(&file)).transpose()?.map(|tokens| tokens.operator);
-        Ok(Options { name: who(), token })
+    fn options(&self, agent: Option<&Registered>, policy: Option<&'static str>) -> Result<Options, Failure> {
+        let file = self.token_file.as_ref().or(agent.map(|agent| &agent.token_file));
+        let token = file.map(|file| Tokens::load(file)).transpose()?.map(|tokens| tokens.operator);
+        let certificates = self.tls_ca.clone().or_else(|| agent?.certificate.clone());
+        Ok(Options { name: who(), token, policy, certificates })
     }
 
     /// A conversation over it.
@@ -56,7 +69,7 @@ impl LinkArgs {
     /// The serial port itself, for the one who is to own it.
     pub fn own(&self) -> Result<SerialPort, Failure> {
         let name = self.name()?;
-        if name.starts_with("http://") {
+        if is_agent(&name) {
             let what = format!("{name} is the address of an agent, and no port that another could own");
             return Err(Failure::usage(what).hint("name a serial port; `jtc ports` lists them"));
         }
@@ -75,4 +88,9 @@ fn who() -> String {
         Ok(user) if !user.is_empty() => format!("{user}: jtc {command}"),
         _ => format!("jtc {command}"),
     }
+}
+
+/// It is the address of an agent, and no port of this computer.
+fn is_agent(name: &str) -> bool {
+    name.starts_with("http://") || name.starts_with("https://")
 }

@@ -9,12 +9,15 @@ use std::path::{Path, PathBuf};
 /// An agent of this computer.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Registered {
-    /// Its address, `http://HOST:PORT`.
+    /// Its address, `http://HOST:PORT` or `https://HOST:PORT`.
     pub url: String,
     /// The port that it owns.
     pub port: String,
     /// Where its tokens are.
     pub token_file: PathBuf,
+    /// Its certificate, where it speaks TLS.
+    #[serde(default)]
+    pub certificate: Option<PathBuf>,
 }
 
 /// The file of an agent, locked while the agent is there; it goes with it.

@@ -2,9 +2,11 @@
 #![forbid(unsafe_code)]
 
 pub mod agents;
+mod tls;
 
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs as _};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use jtc_host::{Port, PortError};
@@ -12,7 +14,8 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::http::HeaderValue;
 use tungstenite::http::header::AUTHORIZATION;
-use tungstenite::{Message, WebSocket};
+use tungstenite::stream::MaybeTlsStream;
+use tungstenite::{Connector, Message, WebSocket, client_tls_with_config};
 
 /// Longest time for a connection and its first message.
 const CONNECTING: Duration = Duration::from_secs(5);
@@ -28,6 +31,10 @@ pub struct Options {
     pub name: String,
     /// Token; `None`: what can be had without one.
     pub token: Option<String>,
+    /// What becomes of its motion without it: `continue`, which is also the default, `pause` or `stop`.
+    pub policy: Option<&'static str>,
+    /// Certificates, as PEM, that an agent at `https://` is trusted by; `None`: those of the system.
+    pub certificates: Option<PathBuf>,
 }
 
 /// The first message of an agent.
@@ -54,7 +61,7 @@ enum Notice {
 
 /// A line that an agent owns, as a port.
 pub struct AgentPort {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<MaybeTlsStream<TcpStream>>,
     url: String,
     hello: Hello,
     start: Instant,
@@ -64,19 +71,24 @@ pub struct AgentPort {
 }
 
 impl AgentPort {
-    /// Connects to an agent at `http://HOST:PORT`.
+    /// Connects to an agent at `http://HOST:PORT`, or at `https://HOST:PORT` with TLS.
     ///
     /// # Errors
     ///
     /// [`PortError::NoAgent`] where none answers there, [`PortError::NotLetIn`] where it does not let this client in.
     pub fn open(url: &str, options: &Options) -> Result<Self, PortError> {
         let no_agent = |what: String| PortError::NoAgent { url: url.to_owned(), what };
-        let authority = url
-            .strip_prefix("http://")
+        let (secure, rest) = match (url.strip_prefix("https://"), url.strip_prefix("http://")) {
+            (Some(rest), _) => (true, Some(rest)),
+            (None, rest) => (false, rest),
+        };
+        let authority = rest
             .map(|rest| rest.trim_end_matches('/'))
             .filter(|rest| !rest.is_empty() && !rest.contains('/'))
-            .ok_or_else(|| no_agent("an agent's address is http://HOST:PORT".into()))?;
-        let with_port = if has_port(authority) { authority.to_owned() } else { format!("{authority}:80") };
+            .ok_or_else(|| no_agent("an agent's address is http://HOST:PORT or https://HOST:PORT".into()))?;
+        let (scheme, port) = if secure { ("wss", 443) } else { ("ws", 80) };
+        let with_port =
+            if has_port(authority) { authority.to_owned() } else { format!("{authority}:{port}") };
         let stream = connect(&with_port).map_err(|error| no_agent(error.to_string()))?;
         let end = Instant::now() + CONNECTING;
         let prepare = || {
@@ -85,16 +97,23 @@ impl AgentPort {
             stream.set_read_timeout(Some(CONNECTING))
         };
         prepare().map_err(|error: io::Error| no_agent(error.to_string()))?;
-        let mut request =
-            format!("ws://{authority}/api/line?name={}", utf8_percent_encode(&options.name, RESERVED))
-                .into_client_request()
-                .map_err(|error| no_agent(error.to_string()))?;
+        let name = utf8_percent_encode(&options.name, RESERVED);
+        let policy = options.policy.map_or(String::new(), |policy| format!("&policy={policy}"));
+        let mut request = format!("{scheme}://{authority}/api/line?name={name}{policy}")
+            .into_client_request()
+            .map_err(|error| no_agent(error.to_string()))?;
         if let Some(token) = &options.token {
             let value = HeaderValue::from_str(&format!("Bearer {token}"))
                 .map_err(|_| no_agent("the token is no token".into()))?;
             request.headers_mut().insert(AUTHORIZATION, value);
         }
-        let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
+        let connector = match secure {
+            true => tls::connector(options.certificates.as_deref())
+                .map_err(|error| no_agent(error.to_string()))?,
+            false => Connector::Plain,
+        };
+        let connected = client_tls_with_config(request, stream, None, Some(connector));
+        let (socket, _) = connected.map_err(|error| match error {
             tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response)) => {
                 let body = response.body().as_deref().unwrap_or_default();
                 let message = serde_json::from_slice::<serde_json::Value>(body)
@@ -135,12 +154,12 @@ impl AgentPort {
 
     /// One message, if one comes in this time; false when none does.
     fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
-        let stream = self.socket.get_mut();
-        let set = if timeout.is_zero() {
-            stream.set_nonblocking(true)
-        } else {
+        let set = tls::socket(self.socket.get_mut()).and_then(|stream| {
+            if timeout.is_zero() {
+                return stream.set_nonblocking(true);
+            }
             stream.set_nonblocking(false).and_then(|()| stream.set_read_timeout(Some(timeout)))
-        };
+        });
         set.map_err(|error| self.gone(&error.into()))?;
         let message = self.socket.read();
         match message {
@@ -211,7 +230,9 @@ impl Port for AgentPort {
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.socket.get_mut().set_nonblocking(false).map_err(|error| self.gone(&error.into()))?;
+        tls::socket(self.socket.get_mut())
+            .and_then(|stream| stream.set_nonblocking(false))
+            .map_err(|error| self.gone(&error.into()))?;
         self.socket.send(Message::Binary(bytes.to_vec().into())).map_err(|error| self.gone(&error))
     }
 

@@ -39,7 +39,8 @@ fn a_socket_of_another_site_gets_no_end_of_the_line() {
     let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key];
     let evil = [&upgrade[..], &["Origin: http://evil.example"]].concat();
     assert_eq!(served.ask("GET /api/line", &evil).0, 403);
-    let wrong = Options { name: "x".into(), token: Some("0123456789abcdefghij0123".into()) };
+    let wrong =
+        Options { name: "x".into(), token: Some("0123456789abcdefghij0123".into()), ..Options::default() };
     let error = AgentPort::open(&served.url(), &wrong).err().expect("it is not let in");
     assert!(matches!(error, PortError::NotLetIn { .. }), "{error}");
 }

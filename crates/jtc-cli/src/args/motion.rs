@@ -175,6 +175,9 @@ pub struct ContinueArgs {
 /// What every command takes that executes a motion.
 #[derive(Args, Clone, Debug)]
 pub struct ExecuteArgs {
+    /// What becomes of the motion when this program is killed or loses its agent: through `jtc serve` alone
+    #[arg(long, env = "JTC_WHEN_GONE", value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
+    pub when_gone: Option<String>,
     #[command(flatten)]
     pub link: LinkArgs,
     #[command(flatten)]
@@ -231,4 +234,11 @@ pub enum TeachCommand {
         #[arg(long, env = "JTC_TOLERANCE", value_name = "RAD", requires = "waypoints")]
         tolerance: Option<f64>,
     },
+}
+
+impl ExecuteArgs {
+    /// The policy in the word of the agent.
+    pub fn policy(&self) -> Option<&'static str> {
+        ["continue", "pause", "stop"].into_iter().find(|word| self.when_gone.as_deref() == Some(word))
+    }
 }

@@ -30,6 +30,12 @@ pub struct ServeArgs {
     /// Directory that keeps trajectories by number, as files like 7-pick.csv; without it they are kept as long as the agent runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
+    /// Certificate chain, PEM: the agent speaks TLS
+    #[arg(long, env = "JTC_TLS_CERT", value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+    /// Private key of that certificate, PEM; no other user may read it
+    #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
     #[command(flatten)]
     pub link: LinkArgs,
 }

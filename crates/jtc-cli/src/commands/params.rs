@@ -20,8 +20,12 @@ pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
         }
         ParamsCommand::UseDefaults(link) => use_defaults(link, out),
         ParamsCommand::Show { files, port, baud } => {
-            let link =
-                port.as_ref().map(|p| LinkArgs { port: Some(p.clone()), token_file: None, baud: *baud });
+            let link = port.as_ref().map(|p| LinkArgs {
+                port: Some(p.clone()),
+                token_file: None,
+                tls_ca: None,
+                baud: *baud,
+            });
             show(files, link.as_ref(), out)
         }
     }

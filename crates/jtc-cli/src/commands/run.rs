@@ -178,7 +178,7 @@ fn drive(
     }
     let outputs = Outputs::open(course).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out, progress)?;
-    let mut session = course.execute.link.session()?;
+    let mut session = Session::new(course.execute.link.open_with(course.execute.policy())?);
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     match_device(&mut session, job, course, out)?;

@@ -9,7 +9,7 @@ use jtc_agent::access::{Access, Tokens, default_token_file};
 use jtc_agent::api::Agent;
 use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
-use jtc_agent::{Line, Owner, serve as service};
+use jtc_agent::{Line, Owner, serve as service, tls};
 use jtc_client::agents::{Registered, register};
 use jtc_host::Arm;
 use jtc_host::port::Port;
@@ -37,6 +37,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
     let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
+    let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
+    let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
             .hint("another agent may listen there: name another address with --listen")
@@ -44,17 +46,22 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let listen = listener.local_addr()?;
     let (port, arm) = port(args, out)?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
-    let (url, name) = (format!("http://{listen}"), port.name());
+    let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
     // A relative name would be another port in another directory.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let log = Arc::new(Mutex::new(log));
     let owner = Owner::new(port, observer(log.clone()));
-    let registered = Registered { url: url.clone(), port: name.clone(), token_file: token_file.clone() };
+    let registered = Registered {
+        url: url.clone(),
+        port: name.clone(),
+        token_file: std::path::absolute(&token_file)?,
+        certificate: args.tls_cert.as_deref().map(std::path::absolute).transpose()?,
+    };
     // Without it every command can still be given the address.
     let registration = register(&registered).ok().flatten();
-    if !listen.ip().is_loopback() {
-        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it");
+    if !listen.ip().is_loopback() && tls.is_none() {
+        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
     }
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
@@ -65,7 +72,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
     let (line, ended) = (owner.line(), stop.clone());
     let lost = owner.line();
-    service::serve(agent.router(), listener, move || ended.asked() || lost.lost().is_some())?;
+    service::serve(agent.router(), listener, tls, move || ended.asked() || lost.lost().is_some())?;
     drop(registration);
     let gone = line.lost();
     if gone.is_none() {

@@ -34,6 +34,11 @@ pub struct Served {
 impl Served {
     /// Of a simulated arm on a line at this rate.
     pub fn start(baud: u32) -> Self {
+        Self::start_with(baud, None)
+    }
+
+    /// The same, with TLS where it is given.
+    pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
@@ -50,7 +55,8 @@ impl Served {
         let ended = Arc::new(AtomicBool::new(false));
         let end = ended.clone();
         let thread = std::thread::spawn(move || {
-            serve::serve(agent.router(), listener, move || end.load(Ordering::Relaxed)).expect("it serves");
+            serve::serve(agent.router(), listener, tls, move || end.load(Ordering::Relaxed))
+                .expect("it serves");
             owner.end();
         });
         Self { address, tokens, line, log: log_path, ended, thread: Some(thread), _dir: dir }
@@ -66,7 +72,7 @@ impl Served {
     }
 
     pub fn session(&self, name: &str, token: Option<&String>) -> Session<AgentPort> {
-        let options = Options { name: name.into(), token: token.cloned() };
+        let options = Options { name: name.into(), token: token.cloned(), ..Options::default() };
         Session::new(AgentPort::open(&self.url(), &options).expect("it is let in"))
     }
 

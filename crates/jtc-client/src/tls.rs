@@ -1,0 +1,50 @@
+//! TLS of a client: whose certificates are trusted.
+use std::io;
+use std::net::TcpStream;
+use std::path::Path;
+use std::sync::Arc;
+
+use rustls::pki_types::CertificateDer;
+use rustls::pki_types::pem::PemObject as _;
+use rustls::{ClientConfig, RootCertStore};
+use tungstenite::Connector;
+use tungstenite::stream::MaybeTlsStream;
+
+/// Trusts the certificates of this file, or those of the system.
+///
+/// # Errors
+///
+/// The file holds none, or the system has none.
+pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
+    let mut roots = RootCertStore::empty();
+    let certificates: Vec<CertificateDer<'static>> = match file {
+        Some(path) => {
+            let wrong = |error| io::Error::other(format!("{}: {error}", path.display()));
+            CertificateDer::pem_file_iter(path).map_err(wrong)?.collect::<Result<_, _>>().map_err(wrong)?
+        }
+        None => rustls_native_certs::load_native_certs().certs,
+    };
+    // Of the many that a system has some may be none.
+    let (added, _) = roots.add_parsable_certificates(certificates);
+    if added == 0 {
+        let whose = file.map_or("the system".into(), |path| path.display().to_string());
+        return Err(io::Error::other(format!("{whose} has no certificate to trust")));
+    }
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let config = ClientConfig::builder_with_provider(provider)
+        .with_safe_default_protocol_versions()
+        .map_err(io::Error::other)?
+        .with_root_certificates(roots)
+        .with_no_client_auth();
+    Ok(Connector::Rustls(Arc::new(config)))
+}
+
+/// The socket under it.
+pub fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut TcpStream> {
+    match stream {
+        MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
+        MaybeTlsStream::Plain(stream) => Ok(stream),
+        // Nothing else is made here.
+        _ => Err(io::ErrorKind::Unsupported.into()),
+    }
+}

@@ -1,4 +1,6 @@
 //! Reading MCAP files, those too whose writer was killed.
+use std::io::{ErrorKind, Read};
+
 use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -6,22 +8,23 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// Longest record that is read, bytes: memory is allocated for the length that a damaged file states, before the bytes are found missing.
 const MAX_RECORD: usize = 1 << 26;
 
-/// Shows channels, messages and metadata of a file, those in chunks too, and returns whether the file was completed.
+/// Shows channels, messages and metadata of a file, those in chunks too, and returns whether the file was completed. It is read from
+/// its beginning to its end, in small pieces: no more of it than a record is in memory.
 /// Attachments and indices are passed over unread: the library panics at damaged ones. What is wrong behind the data is
 /// no error, as an index stands there.
 ///
 /// # Errors
 ///
-/// The first record that cannot be read, or that `see` refuses; what came before it was shown.
+/// The first record that cannot be read, or that `see` refuses; what came before it was shown. An error of `file` itself.
 pub fn each_record<E: From<McapError>>(
-    file: &[u8],
+    mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
 ) -> Result<bool, E> {
     // A file that was cut off has no end.
     let options =
         LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut rest, mut whole) = (file, false);
+    let mut whole = false;
     while let Some(event) = reader.next_event() {
         let event = match event {
             Err(_) if whole => break,
@@ -29,10 +32,13 @@ pub fn each_record<E: From<McapError>>(
         };
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
-                let (piece, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(piece.len()).copy_from_slice(piece);
-                reader.notify_read(piece.len());
-                rest = later;
+                let read = loop {
+                    match file.read(reader.insert(wanted)) {
+                        Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                        read => break read.map_err(McapError::Io)?,
+                    }
+                };
+                reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
                 see(mcap::parse_record(opcode, data)?)?;
@@ -91,7 +97,7 @@ mod tests {
 
     #[test]
     fn what_the_caller_refuses_is_its_error() {
-        let refused = each_record(&written(2), |_| Err(McapError::BadIndex));
+        let refused = each_record(written(2).as_slice(), |_| Err(McapError::BadIndex));
         assert!(matches!(refused, Err(McapError::BadIndex)));
     }
 }

@@ -9,7 +9,7 @@ use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
 use jtc_host::recording::{Ending, RecordingInfo, SampleSink};
-use jtc_host::report::{self, Facts, ReportInput, Summary};
+use jtc_host::report::{self, Digest, Facts, ReportInput};
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::{CheckOptions, CheckedTrajectory, Sample, Session};
 use jtc_sim::{SimConfig, World};
@@ -68,10 +68,11 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
             ],
         },
     ];
-    let summary = Summary::of(&run.info, &run.samples);
+    let digest = Digest::of(&run.samples);
+    let summary = digest.summary(&run.info);
     let ending = Ending { outcome: "finished".into(), ..Ending::default() };
     tapes.into_iter().try_for_each(|tape| tape.finish(&ending))?;
-    let input = ReportInput { facts: &facts, ..ReportInput::new(&run.info, &run.samples) };
+    let input = ReportInput { facts: &facts, ..ReportInput::new(&run.info, &digest) };
     page.write(report::html(&input)).map_err(output_lost)?;
     picture.write(report::picture_svg(&input)).map_err(output_lost)?;
     let files: Vec<String> = NAMES.iter().map(|n| file(n).display().to_string()).collect();

@@ -6,7 +6,7 @@ use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use jtc_host::arm::Arm;
 use jtc_host::log::{FlightLog, Replayed, Story, Tick};
 use jtc_host::recording::{Ending, Format, RecordingInfo, write_with_log};
-use jtc_host::report::{Facts, ReportInput, RunFailure, html};
+use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html};
 use jtc_wire::{Hash, LogState};
 use serde_json::{Value, json};
 
@@ -190,10 +190,11 @@ impl Read {
         if let Some(page) = files.report {
             names.push(page.name());
             let facts = self.facts();
+            let digest = Digest::of(&samples);
             let input = ReportInput {
                 facts: &facts,
                 failure: self.failure.as_ref(),
-                ..ReportInput::new(&self.info, &samples)
+                ..ReportInput::new(&self.info, &digest)
             };
             page.write(html(&input)).map_err(output_lost)?;
         }

@@ -7,7 +7,7 @@ use jtc_core::Config;
 use jtc_host::arm::Arm;
 use jtc_host::plan::kinematics::Route;
 use jtc_host::plan::{Bound, PlanError, Planned, Planner, Waypoint, furthest_aside};
-use jtc_host::report::{Facts, ReportInput, html};
+use jtc_host::report::{Digest, Facts, ReportInput, html};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_wire::Joint;
 use serde_json::json;
@@ -226,7 +226,7 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
         Facts { title: "Plan".into(), rows: rows.collect() },
         Facts { title: "What binds for how long".into(), rows: Joint::ALL.map(of_joint).into() },
     ];
-    let samples = planner.samples(trajectory);
+    let digest = Digest::of(&planner.samples(trajectory));
     let plan = Some(&planned.binding[..]);
-    html(&ReportInput { facts: &facts, plan, ..ReportInput::new(&info, &samples) })
+    html(&ReportInput { facts: &facts, plan, ..ReportInput::new(&info, &digest) })
 }

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
-use jtc_host::recording::Recording;
-use jtc_host::report::{ReportInput, RunFailure, Summary, html, picture_svg};
+use jtc_host::recording::scan;
+use jtc_host::report::{Digest, ReportInput, html, picture_svg};
 use serde_json::json;
 
 use super::job::stem;
@@ -22,7 +22,8 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let force = args.force.force;
     let page_file = OutputFile::open(&page, force, &inputs)?;
     let picture_file = OutputFile::open(&picture, force, &[&inputs[..], &[page.as_path()]].concat())?;
-    let recording = Recording::read(&args.file)?;
+    let mut digest = Digest::new();
+    let recording = scan(&args.file, |sample| digest.push(sample))?;
     if let Some(cut) = &recording.cut {
         out.note(format!("note: {}: {cut}", args.file.display()));
     }
@@ -34,15 +35,15 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         // A CSV file holds no limits.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
-    let failure = RunFailure::of_recording(&info, &recording.samples, &recording.ending);
-    let input = ReportInput { failure: failure.as_ref(), ..ReportInput::new(&info, &recording.samples) };
+    let failure = digest.failure(&info, &recording.ending);
+    let input = ReportInput { failure: failure.as_ref(), ..ReportInput::new(&info, &digest) };
     page_file.write(html(&input))?;
     picture_file.write(picture_svg(&input))?;
-    let summary = Summary::of(&info, &recording.samples);
+    let summary = digest.summary(&info);
     let value = json!({
         "recorded_s": summary.recorded_s,
         "executed_s": summary.executed_s,
-        "samples": recording.samples.len(),
+        "samples": digest.samples(),
         "cut": recording.cut,
         "joints": summary.joints,
         "failure": failure,

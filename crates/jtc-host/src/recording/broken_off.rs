@@ -231,7 +231,7 @@ mod tests {
             sample
         };
         let ending = Ending { outcome: outcome.into(), reason: String::new() };
-        Recording::new(None, ending, points.iter().map(sample).collect(), None)
+        Recording { info: None, ending, samples: points.iter().map(sample).collect(), cut: None }
     }
 
     #[test]
@@ -269,7 +269,12 @@ mod tests {
         let whole = [(0, Execute), (5_000, Execute), (9_990, Execute), (10_000, Finish)];
         let joined = |parts: &[Recording], outcome: &str| {
             let samples = parts.iter().flat_map(|part| part.samples.clone()).collect();
-            Recording::new(None, Ending { outcome: outcome.into(), reason: String::new() }, samples, None)
+            Recording {
+                info: None,
+                ending: Ending { outcome: outcome.into(), reason: String::new() },
+                samples,
+                cut: None,
+            }
         };
         let run = || recording(&whole, "");
         // Statuses come every 40 ms, and the end of a run may be in none of them.

@@ -1,12 +1,13 @@
 //! CSV files: a header with units, then one row a sample; an unknown value is an empty field. The end of a run that was not finished stands in
 //! lines that begin with `#`, behind all rows: readers that know no comments have the whole table before them.
 
-use std::io::Write;
+use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
 
+use jtc_core::JOINTS;
 use jtc_wire::{Code, NodeState};
 
-use super::{Ending, Recording, RecordingError, Writer};
+use super::{Ending, Found, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
 /// A number of a joint: column name after `q1_`…, and how to reach it.
@@ -110,81 +111,201 @@ fn number(row: &mut String, value: f64) {
     }
 }
 
-/// Reads rows back; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
-pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
-    let text = String::from_utf8_lossy(bytes);
-    // Every line that was written whole has its end.
-    let whole = text.rfind('\n').map_or(0, |end| end + 1);
-    let (rows, rest) = if whole == 0 { (&*text, "") } else { text.split_at(whole) };
-    let mut lines = rows.lines().enumerate();
-    let fail = |line, column: Option<&str>, problem| RecordingError::Line {
-        path: PathBuf::new(),
-        line,
-        column: column.map(str::to_owned),
-        problem,
-    };
-    let Some((_, header)) = lines.next() else {
-        return Err(fail(1, None, "the file is empty"));
-    };
-    let names: Vec<&str> = header.split(',').map(str::trim).collect();
-    if !names.contains(&"time_s") {
-        return Err(fail(1, None, "no recording: its header has no column time_s"));
+/// Longest line that is read: ours have some 1,500 bytes.
+const LINE_MAX: u64 = 1 << 20;
+
+/// Where the values of a column go.
+#[derive(Clone, Copy)]
+enum Target {
+    Time,
+    State,
+    Trajectory,
+    Point,
+    Errors,
+    CanCurrent,
+    /// Joint, and its place in [`COLUMNS`].
+    Value(usize, usize),
+    Node(usize),
+    Internal(usize),
+    /// Not known: passed over.
+    Other,
+}
+
+impl Target {
+    fn of(name: &str) -> Self {
+        match name {
+            "time_s" => Self::Time,
+            "state" => Self::State,
+            "tes" => Self::Trajectory,
+            "point" => Self::Point,
+            "errors" => Self::Errors,
+            "can_current" => Self::CanCurrent,
+            _ => Self::of_joint(name).unwrap_or(Self::Other),
+        }
     }
-    let mut samples = Vec::new();
-    let mut ending = Ending::default();
-    for (i, row) in lines.filter(|(_, row)| !row.trim().is_empty()) {
-        if row.starts_with('#') {
-            for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
-                if let Some(text) = row.strip_prefix(head) {
-                    *value = text.trim().to_owned();
-                }
+
+    fn of_joint(name: &str) -> Option<Self> {
+        let (number, column) = name.strip_prefix('q')?.split_once('_')?;
+        let joint = number.parse::<usize>().ok()?.checked_sub(1).filter(|joint| *joint < JOINTS)?;
+        match column {
+            "fsm" => Some(Self::Node(joint)),
+            "internal" => Some(Self::Internal(joint)),
+            _ => Some(Self::Value(joint, COLUMNS.iter().position(|(known, _)| *known == column)?)),
+        }
+    }
+
+    /// Puts the text of a field there; `None` where it is no number.
+    fn put(self, sample: &mut Sample, field: &[u8]) -> Option<()> {
+        match self {
+            Self::Time => sample.time_s = decimal(field)?,
+            Self::State => sample.state = Code::new(whole(field)?),
+            Self::Trajectory => sample.trajectory = Code::new(whole(field)?),
+            Self::Point => sample.point = whole(field)?,
+            Self::Errors => sample.errors = whole(field)?,
+            Self::CanCurrent => sample.can_current = whole(field)?,
+            Self::Value(joint, column) => {
+                let value = if field.is_empty() { f64::NAN } else { decimal(field)? };
+                let (joint, (_, place)) = (sample.joints.get_mut(joint)?, COLUMNS.get(column)?);
+                *place(joint) = value;
             }
+            Self::Node(joint) => sample.joints.get_mut(joint)?.state = NodeState::new(whole(field)?),
+            Self::Internal(joint) => sample.joints.get_mut(joint)?.internal = whole(field)?,
+            Self::Other => {}
+        }
+        Some(())
+    }
+}
+
+fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
+    std::str::from_utf8(field).ok()?.parse().ok()
+}
+
+/// A number as [`str::parse`] reads it, faster where it is as short as ours are: digits that a float holds exactly, divided by a power of
+/// ten that it holds exactly, are rounded once (Clinger 1990).
+fn decimal(field: &[u8]) -> Option<f64> {
+    const POWERS: [f64; 16] =
+        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+    let (negative, digits) = match field {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    let (mut number, mut decimals) = (0_u64, None);
+    // 15 digits are below 2⁵³.
+    if digits.len() <= 16 && digits.first().is_some_and(u8::is_ascii_digit) {
+        for (i, byte) in digits.iter().enumerate() {
+            match byte {
+                b'0'..=b'9' => number = 10 * number + u64::from(byte - b'0'),
+                b'.' if decimals.is_none() => decimals = Some(digits.len() - 1 - i),
+                _ => return whole(field),
+            }
+        }
+        if decimals.is_some() || digits.len() <= 15 {
+            let value = number as f64 / POWERS.get(decimals.unwrap_or(0))?;
+            return Some(if negative { -value } else { value });
+        }
+    }
+    whole(field)
+}
+
+/// The lines of a file, of which the last may be without its end.
+struct Lines<R> {
+    file: R,
+    line: Vec<u8>,
+    number: usize,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The next line without its end, and whether it has one; `None` behind the last.
+    fn next(&mut self) -> Result<Option<(&[u8], bool)>, RecordingError> {
+        self.line.clear();
+        self.number += 1;
+        let read = (&mut self.file).take(LINE_MAX).read_until(b'\n', &mut self.line)?;
+        let ended = self.line.pop_if(|last| *last == b'\n').is_some();
+        if !ended && read as u64 == LINE_MAX {
+            return Err(failure(self.number, None, "no line of a recording is as long"));
+        }
+        self.line.pop_if(|last| ended && *last == b'\r');
+        Ok((read > 0).then_some((&self.line, ended)))
+    }
+}
+
+fn failure(line: usize, column: Option<&str>, problem: &'static str) -> RecordingError {
+    RecordingError::Line { path: PathBuf::new(), line, column: column.map(str::to_owned), problem }
+}
+
+/// Reads rows back, one after the other; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
+pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<Found, RecordingError> {
+    let mut lines = Lines { file, line: Vec::new(), number: 0 };
+    let Some((header, _)) = lines.next()? else {
+        return Err(failure(1, None, "the file is empty"));
+    };
+    let header = String::from_utf8_lossy(header).into_owned();
+    let columns: Vec<(&str, Target)> =
+        header.split(',').map(str::trim).map(|name| (name, Target::of(name))).collect();
+    if !columns.iter().any(|(_, target)| matches!(target, Target::Time)) {
+        return Err(failure(1, None, "no recording: its header has no column time_s"));
+    }
+    let mut ending = Ending::default();
+    let (mut in_motion, mut within_line) = (false, false);
+    while let Some((row, ended)) = lines.next()? {
+        let row = row.trim_ascii();
+        if !ended {
+            // Every line that was written whole has its end.
+            within_line = !row.is_empty();
+            break;
+        }
+        if row.is_empty() {
+            continue;
+        }
+        if row.starts_with(b"#") {
+            take_comment(&mut ending, &String::from_utf8_lossy(row));
             continue;
         }
         let mut sample = Sample::default();
-        let mut fields = row.split(',');
-        for name in &names {
-            let field =
-                fields.next().ok_or_else(|| fail(i + 1, Some(name), "the row ends before this column"))?;
-            put(&mut sample, name, field.trim()).ok_or_else(|| fail(i + 1, Some(name), "not a number"))?;
+        let mut fields = row.split(|byte| *byte == b',');
+        for (name, target) in &columns {
+            let problem = match fields.next() {
+                None => "the row ends before this column",
+                Some(field) if target.put(&mut sample, field.trim_ascii()).is_none() => "not a number",
+                Some(_) => continue,
+            };
+            return Err(failure(lines.number, Some(name), problem));
         }
-        samples.push(sample);
+        in_motion = sample.is_operating();
+        see(&sample);
     }
-    let in_motion = samples.last().is_some_and(Sample::is_operating);
-    let cut = if !rest.trim().is_empty() {
+    let cut = if within_line {
         Some("the file breaks off within a line")
     } else if in_motion && ending.outcome.is_empty() {
         Some("the file breaks off while the arm moves")
     } else {
         None
     };
-    Ok(Recording::new(None, ending, samples, cut.map(str::to_owned)))
+    Ok(Found { info: None, ending, cut: cut.map(str::to_owned) })
 }
 
-fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {
-    match name {
-        "time_s" => sample.time_s = field.parse().ok()?,
-        "state" => sample.state = Code::new(field.parse().ok()?),
-        "tes" => sample.trajectory = Code::new(field.parse().ok()?),
-        "point" => sample.point = field.parse().ok()?,
-        "errors" => sample.errors = field.parse().ok()?,
-        "can_current" => sample.can_current = field.parse().ok()?,
-        _ => {
-            let joint = name.strip_prefix('q').and_then(|n| n.split_once('_'));
-            let Some((number, column)) = joint else { return Some(()) };
-            let index = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
-            let Some(joint) = index.and_then(|i| sample.joints.get_mut(i)) else { return Some(()) };
-            match column {
-                "fsm" => joint.state = NodeState::new(field.parse().ok()?),
-                "internal" => joint.internal = field.parse().ok()?,
-                _ => {
-                    let Some((_, value)) = COLUMNS.iter().find(|(c, _)| *c == column) else {
-                        return Some(());
-                    };
-                    *value(joint) = if field.is_empty() { f64::NAN } else { field.parse().ok()? };
-                }
-            }
+/// How the run ended.
+fn take_comment(ending: &mut Ending, row: &str) {
+    for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
+        if let Some(text) = row.strip_prefix(head) {
+            *value = text.trim().to_owned();
         }
     }
-    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn numbers_are_read_as_the_standard_library_reads_them(
+            text in prop_oneof!["-?[0-9]{1,9}(\\.[0-9]{0,9})?", "[-+.eE0-9]{0,20}", "-?[0-9]{1,3}(\\.[0-9]{0,12})?", "NaN|inf|-inf"],
+        ) {
+            let (read, standard) = (decimal(text.as_bytes()), text.parse::<f64>().ok());
+            prop_assert_eq!(read.map(f64::to_bits), standard.map(f64::to_bits), "{}", text);
+        }
+    }
 }

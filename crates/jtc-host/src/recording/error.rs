@@ -48,6 +48,13 @@ pub enum RecordingError {
         /// What the reader found.
         problem: String,
     },
+    /// Messages of an MCAP file stand far from the order of their times.
+    Disorder {
+        /// The file.
+        path: PathBuf,
+        /// Log time of the first that comes too late, s.
+        time_s: f64,
+    },
     /// A message of a known topic that is shorter than its schema.
     Message {
         /// The file.
@@ -72,6 +79,7 @@ impl RecordingError {
         | RecordingError::Io { path, .. }
         | RecordingError::Line { path, .. }
         | RecordingError::Mcap { path, .. }
+        | RecordingError::Disorder { path, .. }
         | RecordingError::Message { path, .. }) = &mut self;
         *path = file.to_owned();
         self
@@ -107,6 +115,11 @@ impl fmt::Display for RecordingError {
                 write!(f, ": {problem}")
             }
             RecordingError::Mcap { path, problem } => write!(f, "{}: {problem}", path.display()),
+            RecordingError::Disorder { path, time_s } => write!(
+                f,
+                "{}: the message of {time_s:.3} s stands far behind later ones: the file is not in the order of time",
+                path.display()
+            ),
             RecordingError::Message { path, topic, time_s } => {
                 write!(
                     f,
@@ -132,6 +145,9 @@ impl Diagnose for RecordingError {
         let next = match self {
             Self::UnknownFormat { .. } | Self::BuiltWithout { .. } => "",
             Self::Io { .. } => "check the name and the rights of the file",
+            Self::Disorder { .. } => {
+                "`mcap sort FILE -o SORTED.mcap` (the MCAP project's command) puts it in order"
+            }
             Self::Empty { .. } | Self::Line { .. } | Self::Mcap { .. } | Self::Message { .. } => {
                 "recordings are written by `jtc traj run FILE --record run.mcap`, `jtc move --record` and `jtc sim --record`"
             }

@@ -1,7 +1,7 @@
 //! MCAP files with ROS 2 schemas, in CDR.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::io::{Seek, Write};
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -11,9 +11,10 @@ use mcap::records::{self, MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
-use super::{Ending, Recording, RecordingError, RecordingInfo, Writer, schema};
+use super::gather::{Gatherer, Late};
+use super::{Ending, Found, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
-use crate::trajectory::Loaded;
+use crate::trajectory::{Loaded, Trajectory};
 
 /// Name of the metadata record with the [`RecordingInfo`].
 const METADATA: &str = "openjtc";
@@ -101,9 +102,9 @@ impl<W: Write + Seek> McapWriter<W> {
 }
 
 /// The log of a flight recorder in a file; none in a recording of something else.
-pub(super) fn read_log(bytes: &[u8]) -> Result<Option<Vec<u8>>, RecordingError> {
+pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingError> {
     let (mut channel, mut log) = (None, None);
-    let read = each_record(bytes, |record| {
+    let read = each_record(file, |record| {
         match record {
             records::Record::Channel(found) if found.topic == LOG_TOPIC => channel = Some(found.id),
             records::Record::Message { header, data } if Some(header.channel_id) == channel => {
@@ -196,50 +197,88 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     }
 }
 
-/// A sample in the making, and which of its messages have come.
-type Gathered = (Sample, BTreeSet<u16>);
+/// Topics that a sample is made of; a bit of what has come stands for each.
+const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC];
 
-/// Reads what [`McapWriter`] wrote, as far as the file is whole; messages of other topics are passed over.
-pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
-    let mut info: Option<RecordingInfo> = None;
+/// What a channel of a file carries.
+#[derive(Clone, Copy)]
+enum Carries {
+    /// Messages of samples, by their place in [`SAMPLE_TOPICS`].
+    Sample(u8),
+    Trajectory,
+    Then,
+    Other,
+}
+
+impl Carries {
+    fn of(topic: &str) -> Self {
+        match SAMPLE_TOPICS.iter().position(|known| *known == topic) {
+            Some(i) => Self::Sample(i as u8),
+            None if topic == TRAJECTORY_TOPIC => Self::Trajectory,
+            None if topic == THEN_TOPIC => Self::Then,
+            None => Self::Other,
+        }
+    }
+}
+
+/// The description at the beginning of a file; none where it breaks off before.
+///
+/// What wrote the file anew may have put it to the end: it is looked for as far as the file goes.
+pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
+    let mut info = None;
+    let mut see = |record: records::Record<'_>| match record {
+        records::Record::Metadata(metadata) if metadata.name == METADATA => {
+            info = Some(RecordingInfo::from_map(&metadata.metadata));
+            // No more of the file is wanted.
+            Err(RecordingError::Empty { path: PathBuf::new() })
+        }
+        _ => Ok(()),
+    };
+    let _ = each_record(file, &mut see);
+    info
+}
+
+/// Reads what [`McapWriter`] wrote, as far as the file is whole; messages of other topics are passed over. Samples go to `see`, in the
+/// order of their times; `room` of them wait for messages of theirs that stand later in the file. `info` is that of [`read_info`].
+pub(super) fn scan(
+    file: impl Read,
+    mut info: Option<RecordingInfo>,
+    room: usize,
+    see: &mut dyn FnMut(&Sample),
+) -> Result<Found, RecordingError> {
     let mut ending: Option<Ending> = None;
     let (mut commanded, mut then) = (None, None);
-    let mut topics = BTreeMap::new();
-    let mut samples: BTreeMap<u64, Gathered> = BTreeMap::new();
-    let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
-        time_ns.saturating_sub(info.as_ref().map_or(0, |i| i.start_unix_ns)) as f64 * 1e-9
-    };
-    let read = each_record(bytes, |record| {
+    let mut channels: BTreeMap<u16, Carries> = BTreeMap::new();
+    let mut gatherer = Gatherer::new(room);
+    let start_ns = info.as_ref().map_or(0, |info| info.start_unix_ns);
+    let seconds = |time_ns: u64| time_ns.saturating_sub(start_ns) as f64 * 1e-9;
+    let mut give = |time_ns: u64, sample: Sample| see(&Sample { time_s: seconds(time_ns), ..sample });
+    let read = each_record(file, |record| {
         match record {
-            records::Record::Metadata(metadata) if metadata.name == METADATA => {
-                info = Some(RecordingInfo::from_map(&metadata.metadata));
-            }
             records::Record::Metadata(metadata) if metadata.name == END => {
                 ending = Some(RecordingInfo::from_map(&metadata.metadata).ending);
             }
             records::Record::Channel(channel) => {
-                topics.insert(channel.id, channel.topic);
+                channels.insert(channel.id, Carries::of(&channel.topic));
             }
             records::Record::Message { header, data } => {
                 let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
-                let topic = topics.get(&header.channel_id).ok_or(unknown)?;
-                if topic == LOG_TOPIC {
-                    return Ok(());
+                match *channels.get(&header.channel_id).ok_or(unknown)? {
+                    Carries::Sample(topic) => {
+                        let time_s = seconds(header.log_time);
+                        let late = |Late| RecordingError::Disorder { path: PathBuf::new(), time_s };
+                        let sample = gatherer.at(header.log_time, 1 << topic, &mut give).map_err(late)?;
+                        let topic = SAMPLE_TOPICS[usize::from(topic)];
+                        decode(topic, &data, sample).ok_or_else(|| RecordingError::Message {
+                            path: PathBuf::new(),
+                            topic: topic.to_owned(),
+                            time_s,
+                        })?;
+                    }
+                    Carries::Trajectory => commanded = trajectory(&data),
+                    Carries::Then => then = trajectory(&data),
+                    Carries::Other => {}
                 }
-                if topic == TRAJECTORY_TOPIC || topic == THEN_TOPIC {
-                    let read =
-                        std::str::from_utf8(&data).ok().and_then(|text| Loaded::parse(text, None).ok());
-                    let of = if topic == THEN_TOPIC { &mut then } else { &mut commanded };
-                    *of = read.map(|read| Arc::new(read.trajectory));
-                    return Ok(());
-                }
-                let (sample, came) = samples.entry(header.log_time).or_default();
-                decode(topic, &data, sample).ok_or_else(|| RecordingError::Message {
-                    path: PathBuf::new(),
-                    topic: topic.clone(),
-                    time_s: seconds(&info, header.log_time),
-                })?;
-                came.insert(header.channel_id);
             }
             _ => {}
         }
@@ -248,21 +287,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let cut = match read {
         Ok(true) => None,
         Ok(false) => Some("the file was not completed".to_owned()),
-        Err(e) if samples.is_empty() => return Err(e),
+        Err(e) if gatherer.is_empty() => return Err(e),
         Err(RecordingError::Mcap { problem, .. }) => Some(format!("the file breaks off: {problem}")),
         Err(e) => return Err(e),
     };
-    if cut.is_some() {
-        // Its last sample may be without some of its messages.
-        let most = samples.values().map(|(_, came)| came.len()).max().unwrap_or(0);
-        if samples.last_key_value().is_some_and(|(_, (_, came))| came.len() < most) {
-            samples.pop_last();
-        }
-    }
-    let samples = samples
-        .into_iter()
-        .map(|(time_ns, (sample, _))| Sample { time_s: seconds(&info, time_ns), ..sample })
-        .collect();
+    gatherer.finish(cut.is_some(), &mut give);
     if let Some(info) = &mut info {
         (info.commanded, info.then) = (commanded, then);
         if let Some(ending) = &ending {
@@ -270,7 +299,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         }
     }
     let ending = ending.or_else(|| info.as_ref().map(|i| i.ending.clone())).unwrap_or_default();
-    Ok(Recording::new(info, ending, samples, cut))
+    Ok(Found { info, ending, cut })
+}
+
+fn trajectory(data: &[u8]) -> Option<Arc<Trajectory>> {
+    let read = std::str::from_utf8(data).ok().and_then(|text| Loaded::parse(text, None).ok());
+    read.map(|read| Arc::new(read.trajectory))
 }
 
 fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {

@@ -13,6 +13,8 @@ mod broken_off;
 mod cdr;
 mod csv;
 mod error;
+#[cfg(feature = "mcap")]
+mod gather;
 mod info;
 mod live;
 #[cfg(feature = "mcap")]
@@ -25,7 +27,7 @@ mod schema;
 mod tests;
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufRead, BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 pub use broken_off::{BrokenOff, NothingLeft, Resumption};
@@ -207,11 +209,11 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     if Format::of(path)? != Format::Mcap {
         return Ok(None);
     }
-    let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
+    let file = open(path)?;
     #[cfg(feature = "mcap")]
-    return mcap::read_log(&bytes).map_err(|e| e.at(path));
+    return mcap::read_log(file).map_err(|e| e.at(path));
     #[cfg(not(feature = "mcap"))]
-    return Ok(bytes.is_empty().then_some(bytes));
+    return Ok(drop(file)).map(|()| None);
 }
 
 /// A recording that was read back.
@@ -228,35 +230,80 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a file that [`Recorder`] wrote.
+    /// Reads a file that [`Recorder`] wrote, with all of its samples.
     ///
     /// # Errors
     ///
     /// A file that cannot be read, or is no recording of ours.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let format = Format::of(path)?;
-        let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
-        if bytes.is_empty() {
-            return Err(RecordingError::Empty { path: path.to_owned() });
-        }
-        match format {
-            #[cfg(feature = "mcap")]
-            Format::Mcap => mcap::read(&bytes),
-            #[cfg(not(feature = "mcap"))]
-            Format::Mcap => Err(RecordingError::BuiltWithout { path: path.to_owned() }),
-            Format::Csv => csv::read(&bytes),
-        }
-        .map_err(|e| e.at(path))
+        let mut samples = Vec::new();
+        let Scanned { info, ending, cut, .. } = scan_with(path, usize::MAX, |sample| samples.push(*sample))?;
+        Ok(Self { info, ending, samples, cut })
     }
+}
 
-    /// The samples of a file, and where it is not whole why.
-    fn new(info: Option<RecordingInfo>, ending: Ending, samples: Vec<Sample>, why: Option<String>) -> Self {
-        let cut = why.map(|why| {
-            let upto = samples.last().map_or("it holds no sample".to_owned(), |last| {
-                format!("{} samples up to {:.3} s are whole", samples.len(), last.time_s)
-            });
-            format!("{why}; {upto}")
-        });
-        Self { info, ending, samples, cut }
+/// What a recording holds beside its samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scanned {
+    /// Arm, limits and origin; none for a CSV file, which does not carry them.
+    pub info: Option<RecordingInfo>,
+    /// How the run ended.
+    pub ending: Ending,
+    /// How many samples there were.
+    pub samples: u64,
+    /// What is missing of a file that breaks off, in words; none where it was completed.
+    pub cut: Option<String>,
+}
+
+/// Samples that wait for messages of theirs which stand later in the file: several chunks of ours.
+const ROOM: usize = 4096;
+
+/// Shows the samples of a file that [`Recorder`] wrote, oldest first; no more of it is in memory than a piece, however long it is.
+///
+/// # Errors
+///
+/// A file that cannot be read, is no recording of ours, or whose messages are far from the order of their times. Samples before that
+/// were shown.
+pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
+    scan_with(path, ROOM, see)
+}
+
+/// What a file holds beside its samples, and why it is not whole.
+struct Found {
+    info: Option<RecordingInfo>,
+    ending: Ending,
+    cut: Option<String>,
+}
+
+fn open(path: &Path) -> Result<BufReader<File>, RecordingError> {
+    let file = File::open(path).map_err(|e| RecordingError::io(path, e))?;
+    Ok(BufReader::with_capacity(1 << 18, file))
+}
+
+fn scan_with(path: &Path, room: usize, mut see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
+    let format = Format::of(path)?;
+    let mut file = open(path)?;
+    if file.fill_buf().map_err(|e| RecordingError::io(path, e))?.is_empty() {
+        return Err(RecordingError::Empty { path: path.to_owned() });
     }
+    let (mut samples, mut last_s) = (0_u64, 0.0);
+    let mut count = |sample: &Sample| {
+        (samples, last_s) = (samples + 1, sample.time_s);
+        see(sample);
+    };
+    let found = match format {
+        #[cfg(feature = "mcap")]
+        Format::Mcap => mcap::scan(file, mcap::read_info(open(path)?), room, &mut count),
+        #[cfg(not(feature = "mcap"))]
+        Format::Mcap => Err(RecordingError::BuiltWithout { path: path.to_owned() }),
+        Format::Csv => csv::scan(file, &mut count),
+    };
+    #[cfg(not(feature = "mcap"))]
+    let _ = room;
+    let Found { info, ending, cut } = found.map_err(|e| e.at(path))?;
+    let cut = cut.map(|why| match samples {
+        0 => format!("{why}; it holds no sample"),
+        n => format!("{why}; {n} samples up to {last_s:.3} s are whole"),
+    });
+    Ok(Scanned { info, ending, samples, cut })
 }

@@ -1,5 +1,6 @@
 //! What broke first in a run that failed: when, at which joint, and the values around it.
 
+use std::collections::VecDeque;
 use std::fmt::Write;
 
 use jtc_bus::GRIPPER;
@@ -65,16 +66,8 @@ impl RunFailure {
     /// The first error in the samples since a trajectory was executed; none in a run without errors.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
-        let bad = |s: &Sample| s.errors != 0 || s.state == ControllerState::Error;
-        let at = begin + samples.get(begin..)?.iter().position(bad)?;
-        let (mut causes, mut joint) = causes(&Words::of_sample(&samples[at]));
-        if joint.is_none()
-            && let Some((j, step)) = stepped(info, samples, at)
-        {
-            joint = Some(j);
-            causes.insert(0, step);
-        }
-        Some(Self::at(info, samples, at, causes, joint))
+        let at = begin + samples.get(begin..)?.iter().position(is_bad)?;
+        Some(Self::found(info, &Around::of(samples, at)))
     }
 
     /// What a recording shows of its run: an error in its samples; or what ended it, as was written down; or that its end
@@ -84,15 +77,7 @@ impl RunFailure {
             return Some(found);
         }
         let unseen = samples.last().is_some_and(Sample::is_operating);
-        let reason = match (ending.is_fault(), ending.reason.as_str()) {
-            (true, "") => "the run ended in a fault that the recording does not name".to_owned(),
-            (true, reason) => reason.to_owned(),
-            (false, _) if unseen && ending.outcome.is_empty() => {
-                "the end of the motion was not seen: the last sample is in the middle of it".to_owned()
-            }
-            (false, _) => return None,
-        };
-        Some(Self::ended_by(info, samples, reason))
+        Some(Self::ended_by(info, samples, why_it_ended(ending, unseen)?))
     }
 
     /// The first error of a log: at the sample of `time_s`, of what, and of which joint.
@@ -104,15 +89,13 @@ impl RunFailure {
         joint: Option<Joint>,
     ) -> Self {
         let at = samples.iter().position(|sample| sample.time_s >= time_s).unwrap_or(samples.len());
-        Self {
-            in_log: true,
-            ..Self::at(info, samples, at.min(samples.len().saturating_sub(1)), causes, joint)
-        }
+        let around = Around::of(samples, at.min(samples.len().saturating_sub(1)));
+        Self { in_log: true, ..Self::at(info, &around, causes, joint) }
     }
 
     /// A run that ended without an error in its samples: at the last of them, for the reason given.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
-        Self::at(info, samples, samples.len().saturating_sub(1), vec![reason], None)
+        Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }
 
     /// With what only the status knows: the errors that the drives report of themselves.
@@ -130,14 +113,22 @@ impl RunFailure {
         format!("FAILED {:.0} ms into the run: {cause}", self.at_ms)
     }
 
-    fn at(
-        info: &RecordingInfo,
-        samples: &[Sample],
-        at: usize,
-        causes: Vec<String>,
-        joint: Option<Joint>,
-    ) -> Self {
-        let start_s = start_s(samples, at);
+    /// An error that the samples show.
+    fn found(info: &RecordingInfo, around: &Around) -> Self {
+        let words = around.samples.get(around.at).map(Words::of_sample);
+        let (mut causes, mut joint) = words.map_or_else(Default::default, |words| causes(&words));
+        if joint.is_none()
+            && let Some((j, step)) = stepped(info, &around.samples, around.at)
+        {
+            joint = Some(j);
+            causes.insert(0, step);
+        }
+        Self::at(info, around, causes, joint)
+    }
+
+    fn at(info: &RecordingInfo, around: &Around, causes: Vec<String>, joint: Option<Joint>) -> Self {
+        let Around { samples, at, start_s } = around;
+        let (at, start_s) = (*at, *start_s);
         let time = |i: usize| samples.get(i).map_or(start_s, |s| s.time_s);
         let into_ms = |i: usize| (time(i) - start_s) * 1e3;
         let moment = |i: usize, joint: Joint| {
@@ -236,6 +227,102 @@ impl RunFailure {
     }
 }
 
+/// An error shows in this sample.
+fn is_bad(sample: &Sample) -> bool {
+    sample.errors != 0 || sample.state == ControllerState::Error
+}
+
+/// Why a run failed whose samples show no error; `unseen`: the last of them is in motion. `None`: it did not fail.
+fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
+    match (ending.is_fault(), ending.reason.as_str()) {
+        (true, "") => Some("the run ended in a fault that the recording does not name".to_owned()),
+        (true, reason) => Some(reason.to_owned()),
+        (false, _) if unseen && ending.outcome.is_empty() => {
+            Some("the end of the motion was not seen: the last sample is in the middle of it".to_owned())
+        }
+        (false, _) => None,
+    }
+}
+
+/// A moment, and the samples before and after it that a person wants to see.
+#[derive(Clone, Debug, Default)]
+struct Around {
+    samples: Vec<Sample>,
+    /// Which of them.
+    at: usize,
+    /// When the run began, s.
+    start_s: f64,
+}
+
+impl Around {
+    fn of(samples: &[Sample], at: usize) -> Self {
+        let from = at.saturating_sub(BEFORE);
+        let piece = samples.get(from..samples.len().min(at + AFTER + 1)).unwrap_or_default();
+        Self { samples: piece.to_vec(), at: at - from, start_s: start_s(samples, at) }
+    }
+
+    /// One more behind it, if it is near.
+    fn follow(&mut self, sample: &Sample) {
+        if self.samples.len() <= self.at + AFTER {
+            self.samples.push(*sample);
+        }
+    }
+}
+
+/// Looks for what broke first in samples that come one after the other; finds what [`RunFailure::of_recording`] finds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watch {
+    /// The last ones.
+    recent: VecDeque<Sample>,
+    /// A trajectory was executed.
+    begun: bool,
+    /// When the run began, as the last sample of a motion shows it, else the time of the first sample.
+    start_s: Option<f64>,
+    in_motion: bool,
+    /// The first error before an execution, which counts where there is none, and since then.
+    before: Option<Around>,
+    since: Option<Around>,
+}
+
+impl Watch {
+    pub(super) fn push(&mut self, sample: &Sample) {
+        for around in [&mut self.before, &mut self.since].into_iter().flatten() {
+            around.follow(sample);
+        }
+        if self.recent.len() > BEFORE {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(*sample);
+        self.begun |= sample.is_operating();
+        self.in_motion = sample.is_operating();
+        if sample.state == ControllerState::Operate {
+            self.start_s = Some(began_s(sample));
+        }
+        self.start_s.get_or_insert(sample.time_s);
+        let first = if self.begun { &mut self.since } else { &mut self.before };
+        if first.is_none() && is_bad(sample) {
+            *first = Some(now(&self.recent, self.start_s));
+        }
+    }
+
+    pub(super) fn failure(&self, info: &RecordingInfo, ending: &Ending) -> Option<RunFailure> {
+        if let Some(around) = if self.begun { &self.since } else { &self.before } {
+            return Some(RunFailure::found(info, around));
+        }
+        let reason = why_it_ended(ending, self.in_motion)?;
+        Some(RunFailure::at(info, &now(&self.recent, self.start_s), vec![reason], None))
+    }
+}
+
+/// The last of these samples, and those before it.
+fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
+    Around {
+        samples: recent.iter().copied().collect(),
+        at: recent.len().saturating_sub(1),
+        start_s: start_s.unwrap_or(0.0),
+    }
+}
+
 /// The joint whose measured position went further from one sample to the next than its velocity limit allows, around the
 /// sample `at`, where the status names no joint: words for it.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
@@ -270,9 +357,14 @@ fn begin(samples: &[Sample]) -> usize {
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {
-        Some(s) => s.time_s - f64::from(s.point) * 1e-3,
+        Some(s) => began_s(s),
         None => samples.get(begin(samples)).map_or(0.0, |s| s.time_s),
     }
+}
+
+/// When the run began that this sample is of, s.
+fn began_s(sample: &Sample) -> f64 {
+    sample.time_s - f64::from(sample.point) * 1e-3
 }
 
 /// Error words of a moment, from either source.

@@ -1,8 +1,11 @@
 //! The report of a run: figures per joint, one self-contained HTML page with interactive plots, and a small picture.
 //!
-//! [`Summary::of`] reduces samples to the figures that matter, [`html`] makes the page (it opens offline: plots, styles and
+//! [`Digest`] takes in samples one after the other, of a minute or of a day, and keeps what a report needs of them: [`Summary`] has the
+//! figures that matter, [`html`] makes the page (it opens offline: plots, styles and
 //! data are inside), [`picture_svg`] draws commanded and measured positions and the tracking error as one SVG.
 
+mod curves;
+mod digest;
 mod failure;
 mod pack;
 mod page;
@@ -11,6 +14,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
+pub use digest::Digest;
 pub use failure::{Moment, RunFailure};
 pub use page::html;
 pub use picture::picture_svg;
@@ -18,7 +22,6 @@ pub use summary::{JointSummary, Summary};
 
 use crate::plan::Bound;
 use crate::recording::RecordingInfo;
-use crate::sample::Sample;
 
 /// A titled list of facts that the page shows as a table: link statistics, settings of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,8 +37,8 @@ pub struct Facts {
 pub struct ReportInput<'a> {
     /// Arm, limits and origin of the samples.
     pub info: &'a RecordingInfo,
-    /// Oldest first.
-    pub samples: &'a [Sample],
+    /// The samples, oldest first.
+    pub digest: &'a Digest,
     /// Tables to show beside the plots.
     pub facts: &'a [Facts],
     /// What broke first, where the run failed: it leads the page.
@@ -46,8 +49,8 @@ pub struct ReportInput<'a> {
 
 impl<'a> ReportInput<'a> {
     /// Of a run that did not fail, without tables.
-    pub fn new(info: &'a RecordingInfo, samples: &'a [Sample]) -> Self {
-        Self { info, samples, facts: &[], failure: None, plan: None }
+    pub fn new(info: &'a RecordingInfo, digest: &'a Digest) -> Self {
+        Self { info, digest, facts: &[], failure: None, plan: None }
     }
 }
 

@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::pack::{Thinner, coarse, fine, runs};
-use super::{ReportInput, Summary, escape};
-use crate::sample::JointSample;
+use super::curves::Curve;
+use super::pack::{coarse, fine};
+use super::{ReportInput, escape};
 
 const PAGE: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/style.css");
@@ -55,10 +55,11 @@ fn title(input: &ReportInput<'_>) -> String {
 
 fn data(input: &ReportInput<'_>) -> Value {
     let info = input.info;
-    let thin = Thinner::new(input.samples);
-    let per_joint = |pack: fn(&[f64]) -> Value, value: fn(&JointSample) -> f64| -> Value {
-        (0..6).map(|j| pack(&thin.values(|s| value(&s.joints[j])))).collect()
+    let (digest, curves) = (input.digest, &input.digest.curves);
+    let per_joint = |pack: fn(&[f64]) -> Value, curve: Curve| -> Value {
+        (0..6).map(|j| pack(&curves.values(curve, j))).collect()
     };
+    let start_s = digest.span_s().map_or(0.0, |(first, _)| first);
     // Non-finite numbers become `null`, which the page takes for "not known".
     let joints: Value = (0..6)
         .map(|j| {
@@ -83,28 +84,28 @@ fn data(input: &ReportInput<'_>) -> Value {
         "start_unix_ms": info.start_unix_ns / 1_000_000,
         "joints": joints,
         "flange": info.flange,
-        "samples": input.samples.len(),
-        "thinned": thin.bucket(),
-        "summary": Summary::of(info, input.samples),
+        "samples": digest.samples(),
+        "thinned": curves.bucket(),
+        "summary": digest.summary(info),
         "facts": facts,
         "plan": input.plan,
-        "failure_s": input.failure.map(|f| f.time_s - input.samples.first().map_or(0.0, |s| s.time_s)),
-        "time_s": fine(&relative(&thin.times())),
-        "time_start_s": input.samples.first().map_or(0.0, |s| s.time_s),
-        "set_position_rad": per_joint(fine, |j| j.set_position),
-        "position_rad": per_joint(fine, |j| j.position),
-        "set_velocity_rad_s": per_joint(coarse, |j| j.set_velocity),
-        "set_acceleration_rad_s2": input.plan.map(|_| per_joint(coarse, |j| j.set_acceleration)),
-        "velocity_rad_s": per_joint(coarse, |j| j.velocity),
-        "error_mrad": per_joint(coarse, |j| j.position_error() * 1e3),
-        "torque_model_nm": per_joint(coarse, |j| j.torque_model),
-        "torque_pid_nm": per_joint(coarse, |j| j.torque_p + j.torque_i + j.torque_d),
-        "torque_friction_nm": per_joint(coarse, |j| j.torque_friction),
-        "torque_nm": per_joint(coarse, |j| j.torque),
-        "temperature_c": per_joint(coarse, |j| j.temperature),
-        "states": runs(input.samples, |s| u64::from(s.state.byte())),
-        "tes": runs(input.samples, |s| u64::from(s.trajectory.byte())),
-        "errors": runs(input.samples, |s| u64::from(s.errors)),
+        "failure_s": input.failure.map(|f| f.time_s - start_s),
+        "time_s": fine(&relative(&curves.times())),
+        "time_start_s": start_s,
+        "set_position_rad": per_joint(fine, Curve::SetPosition),
+        "position_rad": per_joint(fine, Curve::Position),
+        "set_velocity_rad_s": per_joint(coarse, Curve::SetVelocity),
+        "set_acceleration_rad_s2": input.plan.map(|_| per_joint(coarse, Curve::SetAcceleration)),
+        "velocity_rad_s": per_joint(coarse, Curve::Velocity),
+        "error_mrad": per_joint(coarse, Curve::Error),
+        "torque_model_nm": per_joint(coarse, Curve::TorqueModel),
+        "torque_pid_nm": per_joint(coarse, Curve::TorquePid),
+        "torque_friction_nm": per_joint(coarse, Curve::TorqueFriction),
+        "torque_nm": per_joint(coarse, Curve::Torque),
+        "temperature_c": per_joint(coarse, Curve::Temperature),
+        "states": digest.states.as_slice(),
+        "tes": digest.trajectory.as_slice(),
+        "errors": digest.errors.as_slice(),
     })
 }
 

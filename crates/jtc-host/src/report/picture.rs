@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{ReportInput, Summary, escape};
-use crate::sample::Sample;
+use super::curves::Curve;
+use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
@@ -61,13 +61,12 @@ impl Panel {
 
 /// The picture as SVG; it follows the reader's light or dark setting.
 pub fn picture_svg(input: &ReportInput<'_>) -> String {
-    let samples = input.samples;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n<style>{STYLE}</style>\n\
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"14\" fill=\"var(--paper)\"/>\n"
     );
-    if let (Some(first), Some(last)) = (samples.first(), samples.last()) {
-        let time = (first.time_s, last.time_s.max(first.time_s + 1e-3));
+    if let Some((first_s, last_s)) = input.digest.span_s() {
+        let time = (first_s, last_s.max(first_s + 1e-3));
         heading(&mut svg, input);
         for j in 0..6 {
             positions(&mut svg, input, j, time);
@@ -79,7 +78,7 @@ pub fn picture_svg(input: &ReportInput<'_>) -> String {
 }
 
 fn heading(svg: &mut String, input: &ReportInput<'_>) {
-    let summary = Summary::of(input.info, input.samples);
+    let summary = input.digest.summary(input.info);
     if let Some(failure) = input.failure {
         let text = escape(&failure.headline());
         let _ = writeln!(svg, r#"<text class="t" style="fill:#c5372c" x="32" y="42">{text}</text>"#);
@@ -102,8 +101,8 @@ fn heading(svg: &mut String, input: &ReportInput<'_>) {
 }
 
 fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f64)) {
-    let measured = thinned(input.samples, |s| s.joints[j].position);
-    let set = thinned(input.samples, |s| s.joints[j].set_position);
+    let measured = thinned(&points(input, Curve::Position, j));
+    let set = thinned(&points(input, Curve::SetPosition, j));
     let (low, high) = bounds(measured.iter().chain(&set)).unwrap_or((-1.0, 1.0));
     let room = ((high - low) * 0.08).max(0.02);
     let (column, row) = ((j % 3) as f64, (j / 3) as f64);
@@ -133,8 +132,7 @@ fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f6
 }
 
 fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
-    let lines: Vec<Vec<(f64, f64)>> =
-        (0..6).map(|j| extremes(input.samples, |s| s.joints[j].position_error() * 1e3)).collect();
+    let lines: Vec<Vec<(f64, f64)>> = (0..6).map(|j| extremes(&points(input, Curve::Error, j))).collect();
     let Some((low, high)) = bounds(lines.iter().flatten()) else { return };
     let reach = low.abs().max(high.abs()).max(0.1) * 1.1;
     let panel = Panel { left: 64.0, top: 418.0, width: 836.0, height: 88.0, time, value: (-reach, reach) };
@@ -157,23 +155,29 @@ fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
     }
 }
 
-fn thinned(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
-    let step = samples.len().div_ceil(POINTS).max(1);
-    let mut points: Vec<_> = samples.iter().step_by(step).map(|s| (s.time_s, value(s))).collect();
-    points.extend(samples.last().map(|s| (s.time_s, value(s))));
-    points
+/// Times and values of a curve.
+fn points(input: &ReportInput<'_>, curve: Curve, j: usize) -> Vec<(f64, f64)> {
+    let curves = &input.digest.curves;
+    curves.times().into_iter().zip(curves.values(curve, j)).collect()
+}
+
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let step = points.len().div_ceil(POINTS).max(1);
+    let mut thinned: Vec<_> = points.iter().copied().step_by(step).collect();
+    thinned.extend(points.last());
+    thinned
 }
 
 /// The lowest and the highest value of each bucket: a peak of one sample stays visible.
-fn extremes(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
-    let bucket = samples.len().div_ceil(2 * POINTS).max(1);
-    let pair = |bucket: &[Sample]| {
-        let values = bucket.iter().map(&value).filter(|v| v.is_finite());
+fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let bucket = points.len().div_ceil(2 * POINTS).max(1);
+    let pair = |bucket: &[(f64, f64)]| {
+        let values = bucket.iter().map(|point| point.1).filter(|v| v.is_finite());
         let low = values.clone().reduce(f64::min).unwrap_or(f64::NAN);
         let high = values.reduce(f64::max).unwrap_or(f64::NAN);
-        [(bucket[0].time_s, low), (bucket[bucket.len() / 2].time_s, high)]
+        [(bucket[0].0, low), (bucket[bucket.len() / 2].0, high)]
     };
-    samples.chunks(bucket).flat_map(pair).collect()
+    points.chunks(bucket).flat_map(pair).collect()
 }
 
 fn bounds<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<(f64, f64)> {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::recording::RecordingInfo;
-use crate::sample::Sample;
+use crate::sample::{JointSample, Sample};
 
 /// Figures of one joint; `None` where the source does not know them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,21 +42,9 @@ pub struct Summary {
 impl Summary {
     /// The figures over the samples in which a trajectory was executed, or over all when there is none.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
-        let executing = |s: &&Sample| s.is_operating();
-        let any = samples.iter().any(|s| executing(&s));
-        let counted: Vec<&Sample> = samples.iter().filter(|s| !any || executing(s)).collect();
-        let span = |first: Option<f64>, last: Option<f64>| last.zip(first).map_or(0.0, |(l, f)| l - f);
-        let joints = (0..6).map(|j| JointSummary::of(info, j, &counted)).collect();
-        Self {
-            recorded_s: span(samples.first().map(|s| s.time_s), samples.last().map(|s| s.time_s)),
-            executed_s: if any {
-                span(counted.first().map(|s| s.time_s), counted.last().map(|s| s.time_s))
-            } else {
-                0.0
-            },
-            samples: counted.len(),
-            joints,
-        }
+        let mut figures = Figures::default();
+        samples.iter().for_each(|sample| figures.push(sample));
+        figures.summary(info)
     }
 
     /// The joint with the largest value of `figure`, and the value.
@@ -65,31 +53,109 @@ impl Summary {
     }
 }
 
-impl JointSummary {
-    fn of(info: &RecordingInfo, j: usize, samples: &[&Sample]) -> Self {
-        let errors = || {
-            let error = |s: &&Sample| s.joints[j].position_error();
-            samples.iter().map(error).filter(|e| e.is_finite()).map(|e| e * 1e3)
-        };
-        let count = errors().count();
-        let rms = (count > 0).then(|| (errors().map(|e| e * e).sum::<f64>() / count as f64).sqrt());
-        let peak = |value: fn(&Sample, usize) -> f64| {
-            let finite = samples.iter().map(|s| value(s, j)).filter(|v| v.is_finite());
-            finite.reduce(f64::max)
-        };
-        let peak_torque_nm = peak(|s, j| s.joints[j].torque.abs());
+/// The figures of samples that come one after the other: of all, and of those of the execution, which may be still to come.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Figures {
+    /// Times of the first and of the last sample.
+    recorded: Option<(f64, f64)>,
+    /// Those before an execution; all, where there is none.
+    before: Sums,
+    executed: Sums,
+}
+
+impl Figures {
+    pub(super) fn push(&mut self, sample: &Sample) {
+        self.recorded.get_or_insert((sample.time_s, sample.time_s)).1 = sample.time_s;
+        if sample.is_operating() {
+            self.executed.push(sample);
+        } else if self.executed.samples == 0 {
+            self.before.push(sample);
+        }
+    }
+
+    pub(super) fn summary(&self, info: &RecordingInfo) -> Summary {
+        let span = |times: Option<(f64, f64)>| times.map_or(0.0, |(first, last)| last - first);
+        let any = self.executed.samples > 0;
+        let counted = if any { &self.executed } else { &self.before };
+        Summary {
+            recorded_s: span(self.recorded),
+            executed_s: span(self.executed.times),
+            samples: counted.samples,
+            joints: counted.joints.iter().enumerate().map(|(j, sums)| sums.summary(info, j)).collect(),
+        }
+    }
+}
+
+/// Sums over samples.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    samples: usize,
+    /// Of the first and of the last one.
+    times: Option<(f64, f64)>,
+    joints: [JointSums; 6],
+}
+
+impl Sums {
+    fn push(&mut self, sample: &Sample) {
+        self.samples += 1;
+        self.times.get_or_insert((sample.time_s, sample.time_s)).1 = sample.time_s;
+        for (sums, joint) in self.joints.iter_mut().zip(&sample.joints) {
+            sums.push(joint);
+        }
+    }
+}
+
+/// The highest of the values that are known.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peak(Option<f64>);
+
+impl Peak {
+    fn push(&mut self, value: f64) {
+        if value.is_finite() {
+            self.0 = Some(self.0.map_or(value, |most| most.max(value)));
+        }
+    }
+}
+
+/// Sums over the samples of a joint.
+#[derive(Clone, Copy, Debug, Default)]
+struct JointSums {
+    errors: u64,
+    squares: f64,
+    error: Peak,
+    torque: Peak,
+    velocity: Peak,
+    set_velocity: Peak,
+    temperature: Peak,
+}
+
+impl JointSums {
+    fn push(&mut self, joint: &JointSample) {
+        let error = joint.position_error();
+        if error.is_finite() {
+            let error = error * 1e3;
+            self.errors += 1;
+            self.squares += error * error;
+            self.error.push(error.abs());
+        }
+        self.torque.push(joint.torque.abs());
+        self.velocity.push(joint.velocity.abs());
+        self.set_velocity.push(joint.set_velocity.abs());
+        self.temperature.push(joint.temperature);
+    }
+
+    fn summary(&self, info: &RecordingInfo, j: usize) -> JointSummary {
         let limit = info.joints[j].torque_max_nm;
         let torque_limit_nm = (limit.is_finite() && limit > 0.0).then_some(limit);
-        Self {
+        JointSummary {
             name: info.joint_name(j),
-            rms_error_mrad: rms,
-            max_error_mrad: errors().map(f64::abs).reduce(f64::max),
-            peak_torque_nm,
+            rms_error_mrad: (self.errors > 0).then(|| (self.squares / self.errors as f64).sqrt()),
+            max_error_mrad: self.error.0,
+            peak_torque_nm: self.torque.0,
             torque_limit_nm,
-            torque_share: peak_torque_nm.zip(torque_limit_nm).map(|(t, l)| t / l),
-            peak_velocity_rad_s: peak(|s, j| s.joints[j].velocity.abs())
-                .or_else(|| peak(|s, j| s.joints[j].set_velocity.abs())),
-            peak_temperature_c: peak(|s, j| s.joints[j].temperature),
+            torque_share: self.torque.0.zip(torque_limit_nm).map(|(t, l)| t / l),
+            peak_velocity_rad_s: self.velocity.0.or(self.set_velocity.0),
+            peak_temperature_c: self.temperature.0,
         }
     }
 }

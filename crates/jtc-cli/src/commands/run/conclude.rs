@@ -6,7 +6,7 @@ use cli_kit::{ErrorKind, Failure, Output, table};
 use jtc_host::check::Verdict;
 use jtc_host::port::Port;
 use jtc_host::recording::{Ending, RecordingInfo};
-use jtc_host::report::{ReportInput, RunFailure, Summary};
+use jtc_host::report::{Digest, ReportInput, RunFailure, Summary};
 use jtc_host::session::Outcome;
 use jtc_host::{Error, MotionError, Session};
 use serde_json::{Value, json};
@@ -93,9 +93,10 @@ pub fn conclude(
     let link = session.statistics();
     let facts = [run_report::link_facts(&last.upload, &link, session.port().baud())];
     let broken = what_broke(&info, &last);
-    let (word, summary) =
-        (if cut { "stopped" } else { word(&last.outcome) }, Summary::of(&info, &last.samples));
-    let Leg { phase, upload, samples, outcome } = last;
+    let word = if cut { "stopped" } else { word(&last.outcome) };
+    let digest = Digest::of(&last.samples);
+    let summary = digest.summary(&info);
+    let Leg { phase, upload, outcome, .. } = last;
     let where_ =
         if phase == APPROACH { format!(" on the {APPROACH} to the first point") } else { String::new() };
     let reason = match &outcome {
@@ -105,7 +106,7 @@ pub fn conclude(
         Err(e) => format!("{}: {e}", where_.trim_start()),
     };
     info.ending = Ending { outcome: word.into(), reason };
-    let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &samples) };
+    let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
     // A file that is lost is reported even when the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {

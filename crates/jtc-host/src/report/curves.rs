@@ -1,0 +1,267 @@
+//! The curves of a report: every sample of a short recording, and of a longer one the extremes of pieces of equal length.
+
+use crate::sample::{JointSample, Sample};
+
+/// Points per curve; 16 000 keep the page below some 4 MB and are four times what a screen can show.
+pub(super) const POINTS_MAX: usize = 16_000;
+
+/// Values of a joint that are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Curve {
+    SetPosition,
+    Position,
+    SetVelocity,
+    SetAcceleration,
+    Velocity,
+    /// mrad.
+    Error,
+    TorqueModel,
+    TorquePid,
+    TorqueFriction,
+    Torque,
+    Temperature,
+}
+
+/// How many of them there are.
+const KINDS: usize = Curve::Temperature as usize + 1;
+const ALL: usize = 6 * KINDS;
+
+/// Those of a joint, in the order of [`Curve`].
+fn values(joint: &JointSample) -> [f64; KINDS] {
+    [
+        joint.set_position,
+        joint.position,
+        joint.set_velocity,
+        joint.set_acceleration,
+        joint.velocity,
+        joint.position_error() * 1e3,
+        joint.torque_model,
+        joint.torque_p + joint.torque_i + joint.torque_d,
+        joint.torque_friction,
+        joint.torque,
+        joint.temperature,
+    ]
+}
+
+/// A piece of the recording: when it begins, its middle, and the extremes of each curve.
+#[derive(Clone, Debug)]
+struct Bucket {
+    begin_s: f64,
+    middle_s: f64,
+    /// Above `high` where no value is known.
+    low: [f64; ALL],
+    high: [f64; ALL],
+    /// The lowest value occurs before the highest.
+    low_first: [bool; ALL],
+}
+
+impl Bucket {
+    fn new(time_s: f64) -> Self {
+        Self {
+            begin_s: time_s,
+            middle_s: time_s,
+            low: [f64::INFINITY; ALL],
+            high: [f64::NEG_INFINITY; ALL],
+            low_first: [true; ALL],
+        }
+    }
+
+    fn push(&mut self, sample: &Sample) {
+        for (j, joint) in sample.joints.iter().enumerate() {
+            for (kind, value) in values(joint).into_iter().enumerate() {
+                if !value.is_finite() {
+                    continue;
+                }
+                let i = j * KINDS + kind;
+                let first = self.low[i] > self.high[i];
+                if value < self.low[i] {
+                    (self.low[i], self.low_first[i]) = (value, first);
+                }
+                if value > self.high[i] {
+                    (self.high[i], self.low_first[i]) = (value, true);
+                }
+            }
+        }
+    }
+
+    /// With the bucket behind it, of the same length.
+    fn join(&mut self, next: &Self) {
+        self.middle_s = next.begin_s;
+        for i in 0..ALL {
+            if next.low[i] > next.high[i] {
+                continue;
+            }
+            if self.low[i] > self.high[i] {
+                (self.low[i], self.high[i], self.low_first[i]) =
+                    (next.low[i], next.high[i], next.low_first[i]);
+                continue;
+            }
+            let (lower, higher) = (next.low[i] < self.low[i], next.high[i] > self.high[i]);
+            self.low_first[i] = match (lower, higher) {
+                (true, true) => next.low_first[i],
+                (true, false) => false,
+                (false, true) => true,
+                (false, false) => self.low_first[i],
+            };
+            self.low[i] = self.low[i].min(next.low[i]);
+            self.high[i] = self.high[i].max(next.high[i]);
+        }
+    }
+}
+
+/// The curves of samples that come one after the other, in bounded memory: when there are too many buckets, each two are joined.
+#[derive(Clone, Debug)]
+pub(super) struct Curves {
+    buckets: Vec<Bucket>,
+    /// Samples of a bucket; 1: each is a point of its own.
+    width: usize,
+    /// Samples of the last bucket.
+    filled: usize,
+    last_s: f64,
+}
+
+impl Curves {
+    pub(super) fn new() -> Self {
+        Self { buckets: Vec::new(), width: 1, filled: 0, last_s: 0.0 }
+    }
+
+    pub(super) fn push(&mut self, sample: &Sample) {
+        if self.buckets.is_empty() || self.filled == self.width {
+            // Of a bucket two points are drawn, unless it is one sample.
+            while self.buckets.len() >= if self.width == 1 { POINTS_MAX } else { POINTS_MAX / 2 } {
+                self.double();
+            }
+            self.buckets.push(Bucket::new(sample.time_s));
+            self.filled = 0;
+        }
+        if let Some(bucket) = self.buckets.last_mut() {
+            if self.filled == self.width / 2 {
+                bucket.middle_s = sample.time_s;
+            }
+            bucket.push(sample);
+        }
+        self.filled += 1;
+        self.last_s = sample.time_s;
+    }
+
+    /// Joins each two buckets, which are full.
+    fn double(&mut self) {
+        for i in 0..self.buckets.len() / 2 {
+            let (first, next) = self.buckets.split_at_mut(2 * i + 1);
+            if let (Some(first), Some(next)) = (first.last_mut(), next.first()) {
+                first.join(next);
+            }
+            self.buckets.swap(i, 2 * i);
+        }
+        self.buckets.truncate(self.buckets.len() / 2);
+        self.width *= 2;
+        self.filled = self.width;
+    }
+
+    /// One in how many samples a point stands for; 1 = nothing was left out.
+    pub(super) fn bucket(&self) -> usize {
+        self.width
+    }
+
+    /// Points of each curve.
+    pub(super) fn len(&self) -> usize {
+        self.buckets.len() * if self.width == 1 { 1 } else { 2 }
+    }
+
+    /// Times of the points, s.
+    pub(super) fn times(&self) -> Vec<f64> {
+        if self.width == 1 {
+            return self.buckets.iter().map(|bucket| bucket.begin_s).collect();
+        }
+        let mut times: Vec<f64> =
+            self.buckets.iter().flat_map(|bucket| [bucket.begin_s, bucket.middle_s]).collect();
+        // What is drawn reaches to the end, also where its last piece is not whole.
+        if let Some(last) = times.last_mut().filter(|_| self.filled < self.width) {
+            *last = self.last_s;
+        }
+        times
+    }
+
+    /// Values at those times: of each bucket its extremes, in the order in which they occur. NaN where none is known.
+    pub(super) fn values(&self, curve: Curve, joint: usize) -> Vec<f64> {
+        let i = joint * KINDS + curve as usize;
+        let mut values = Vec::with_capacity(self.len());
+        for bucket in &self.buckets {
+            let (low, high) = (bucket.low[i], bucket.high[i]);
+            match (low <= high, self.width) {
+                (false, 1) => values.push(f64::NAN),
+                (false, _) => values.extend([f64::NAN; 2]),
+                (true, 1) => values.push(low),
+                (true, _) if bucket.low_first[i] => values.extend([low, high]),
+                (true, _) => values.extend([high, low]),
+            }
+        }
+        values
+    }
+}
+
+/// Pieces that are kept of a row of states; twice as many may be there before they are joined.
+const RUNS_MAX: usize = 8_192;
+
+/// How two pieces become one where there are too many of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Joined {
+    /// The value of the longer one: states.
+    Longer,
+    /// The bits of both: errors, of which none may be lost.
+    Both,
+}
+
+/// Runs of equal values as `(from_s, to_s, value)`.
+#[derive(Clone, Debug)]
+pub(super) struct Runs {
+    runs: Vec<(f64, f64, u64)>,
+    joined: Joined,
+}
+
+impl Runs {
+    pub(super) fn new(joined: Joined) -> Self {
+        Self { runs: Vec::new(), joined }
+    }
+
+    pub(super) fn push(&mut self, time_s: f64, value: u64) {
+        match self.runs.last_mut() {
+            Some((_, to, last)) if *last == value => *to = time_s,
+            Some((_, to, _)) => {
+                *to = time_s;
+                self.runs.push((time_s, time_s, value));
+            }
+            None => self.runs.push((time_s, time_s, value)),
+        }
+        if self.runs.len() > 2 * RUNS_MAX {
+            self.halve();
+        }
+    }
+
+    /// Joins each two, and those of equal values.
+    fn halve(&mut self) {
+        // The last one goes on.
+        let last = self.runs.pop();
+        let mut fewer: Vec<(f64, f64, u64)> = Vec::with_capacity(RUNS_MAX);
+        for two in self.runs.chunks(2) {
+            let (Some(&(from, middle, first)), Some(&(begin, to, second))) = (two.first(), two.last()) else {
+                continue;
+            };
+            let value = match self.joined {
+                Joined::Both => first | second,
+                Joined::Longer if to - begin > middle - from => second,
+                Joined::Longer => first,
+            };
+            match fewer.last_mut() {
+                Some((_, end, same)) if *same == value => *end = to,
+                _ => fewer.push((from, to, value)),
+            }
+        }
+        fewer.extend(last);
+        self.runs = fewer;
+    }
+
+    pub(super) fn as_slice(&self) -> &[(f64, f64, u64)] {
+        &self.runs
+    }
+}

@@ -1,10 +1,12 @@
 //! Measures what the crates reach together and prints lines `name value`; `cargo xtask bench` puts them beside the others.
 //!
-//! `figures [libm|tick|line|tracking|ucom]`: all, or one group. Everything in virtual time is the same on every run.
+//! `figures [libm|tick|line|tracking|ucom|recording]`: all, or one group. Everything in virtual time is the same on every run.
+//! `figures recording-file FILE SECONDS` writes the recording that `recording` measures, of any length.
 
 mod libm;
 mod line;
 mod path;
+mod recording;
 mod tick;
 mod tracking;
 mod ucom_bus;
@@ -12,6 +14,13 @@ mod world;
 
 fn main() -> world::Result<()> {
     let only = std::env::args().nth(1);
+    match std::env::args().skip(1).collect::<Vec<_>>().as_slice() {
+        [what, file] if what == "recording-memory" => return recording::memory(file.as_ref()),
+        [what, file, seconds] if what == "recording-file" => {
+            return recording::write(file.as_ref(), seconds.parse()?);
+        }
+        _ => {}
+    }
     let wanted = |name: &str| only.as_deref().is_none_or(|only| only == name);
     if wanted("libm") {
         libm::figures();
@@ -27,6 +36,9 @@ fn main() -> world::Result<()> {
     }
     if wanted("ucom") {
         ucom_bus::figures()?;
+    }
+    if wanted("recording") {
+        recording::figures()?;
     }
     Ok(())
 }

@@ -167,6 +167,22 @@ const ROWS: &[Row] = &[
     row("planning them / toppra", "plan.path_ms", &["plan.toppra_ms"], Target::None, "ms"),
     row("motions from point to point / Ruckig", "plan.moves_s", &["plan.ruckig_s"], Target::Share(1.01), "s"),
     row(
+        "report of an hour at 1 kHz, MCAP / unpacking the file",
+        "recording.report_mcap_hour_s",
+        &["recording.read_mcap_hour_s"],
+        Target::AtMost(15.0),
+        "s",
+    ),
+    row(
+        "report of an hour at 1 kHz, CSV / reading the file",
+        "recording.report_csv_hour_s",
+        &["recording.read_csv_hour_s"],
+        Target::AtMost(15.0),
+        "s",
+    ),
+    row("memory of a report, MCAP", "recording.report_mcap_mb", &[], Target::AtMost(100.0), "MB"),
+    row("memory of a report, CSV", "recording.report_csv_mb", &[], Target::AtMost(100.0), "MB"),
+    row(
         "tracking, worst joint / PID on straight lines",
         "tracking_worst_rms_mrad",
         &["tracking_plain_worst_rms_mrad"],

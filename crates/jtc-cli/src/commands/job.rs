@@ -7,6 +7,7 @@ use jtc_core::{Config, Friction, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, ProblemKind, Suspicion, Verdict};
 use jtc_host::plan::{self, Planner};
+use jtc_host::recording::DeviceIdentity;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use serde_json::json;
@@ -52,6 +53,8 @@ pub struct Job {
     pub config: Config,
     /// Those of the controller, once it was asked.
     pub device: Config,
+    /// Who the controller is and the hash of its arm, once it was asked and where it knows.
+    pub identity: Option<(DeviceIdentity, u64)>,
     /// File and arm, as they are typed.
     pub words: String,
     /// What is run after it, and how often.
@@ -96,6 +99,7 @@ impl Job {
             arm,
             config,
             device,
+            identity: None,
             words,
             later: None,
             speed: args.speed,
@@ -114,7 +118,19 @@ impl Job {
             units_named: true,
         };
         let (trajectory, config, device) = (Trajectory::default(), arm.config(), Config::avena());
-        Self { loaded, trajectory, arm, config, device, words, later: None, speed: 100.0, made: true }
+        let identity = None;
+        Self {
+            loaded,
+            trajectory,
+            arm,
+            config,
+            device,
+            identity,
+            words,
+            later: None,
+            speed: 100.0,
+            made: true,
+        }
     }
 
     /// The motion of this job.

@@ -78,7 +78,8 @@ impl Read {
         let mut info = run_report::info(&arm, source, "flight recorder", 0);
         let failure = story.failure(&info, &replayed.samples());
         if let Some(failure) = &failure {
-            info.ending = Ending { outcome: "fault".into(), reason: failure.causes.join(", ") };
+            info.ending =
+                Ending { outcome: "fault".into(), reason: failure.causes.join(", "), ..Ending::default() };
         }
         Ok(Self { log, replayed, story, info, failure })
     }

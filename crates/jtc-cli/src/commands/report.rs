@@ -27,6 +27,10 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     if let Some(cut) = &recording.cut {
         out.note(format!("note: {}: {cut}", args.file.display()));
     }
+    if recording.ending.lost_samples > 0 {
+        let (file, lost) = (args.file.display(), recording.ending.lost_samples);
+        out.note(format!("note: {file}: {lost} samples are missing, which the disk did not take in time"));
+    }
     let name = stem(&args.file);
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     let info = match (arm, recording.info) {
@@ -45,6 +49,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         "executed_s": summary.executed_s,
         "samples": digest.samples(),
         "cut": recording.cut,
+        "lost_samples": recording.ending.lost_samples,
         "joints": summary.joints,
         "failure": failure,
         "files": [page.display().to_string(), picture.display().to_string()],

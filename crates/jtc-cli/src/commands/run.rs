@@ -112,6 +112,7 @@ fn match_device(
 ) -> Result<(), Failure> {
     let accepted = course.accepts_device_limits();
     let info = session.info()?;
+    job.identity = info.as_ref().map(|info| (info.into(), info.hash));
     job.device = session.device_config()?;
     match info {
         None => drop(limits::accept(&job.arm, &job.device, accepted, out)?),
@@ -290,6 +291,9 @@ impl Stage<'_> {
                 let mut info = run_report::info(&job.arm, &source, &name, start_unix_ns);
                 info.commanded = Some(Arc::new(job.trajectory.clone()));
                 info.runs = Some(repeat);
+                if let Some((device, hash)) = &job.identity {
+                    (info.device, info.hash) = (Some(device.clone()), Some(*hash));
+                }
                 info.then = job.later.as_ref().map(|(later, _)| Arc::new(later.clone()));
                 let tape = outputs.begin(&info, out)?;
                 *reel = Some(Reel { info, tape, start: now });

@@ -65,7 +65,11 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     out.note(format!("ended after {time_s:.1} s of virtual time"));
     let Some(tape) = tape else { return Ok(()) };
     let name = tape.name().to_owned();
-    tape.finish(&Ending { outcome: "ended".into(), reason: "the simulator was ended".into() })?;
+    tape.finish(&Ending {
+        outcome: "ended".into(),
+        reason: "the simulator was ended".into(),
+        ..Ending::default()
+    })?;
     out.note(format!("{name}: {time_s:.1} s, each millisecond of it"));
     Ok(())
 }

@@ -29,6 +29,11 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
+/// Frames of the description: 0 is the base, 1 to 6 are behind the joints of these numbers, 7 is the flange.
+pub(crate) fn frame_name(i: usize) -> String {
+    if i > JOINTS { "flange".into() } else { format!("link_{i}") }
+}
+
 impl Arm {
     /// The list of those numbers of a joint, or of the arm, that are proposals.
     fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
@@ -135,30 +140,30 @@ impl Arm {
             let [xx, xy, xz, yy, yz, zz] = link.inertia;
             let _ = writeln!(
                 out,
-                "  <link name=\"link_{i}\">\n    <inertial>\n      {}\n      <mass value=\"{}\"/>\n      <inertia ixx=\"{xx}\" \
+                "  <link name=\"{}\">\n    <inertial>\n      {}\n      <mass value=\"{}\"/>\n      <inertia ixx=\"{xx}\" \
                  ixy=\"{xy}\" ixz=\"{xz}\" iyy=\"{yy}\" iyz=\"{yz}\" izz=\"{zz}\"/>\n    </inertial>\n  </link>",
+                frame_name(i),
                 placed(&link.origin),
                 link.mass
             );
         }
-        out.push_str("  <link name=\"flange\"/>\n");
+        let _ = writeln!(out, "  <link name=\"{}\"/>", frame_name(JOINTS + 1));
         for (i, origin) in self.model.joints.iter().enumerate() {
-            let place = placed(origin);
+            let (place, parent, child) = (placed(origin), frame_name(i), frame_name(i + 1));
             let (Some(name), Some(limit)) = (self.joint_names.get(i), self.joints.get(i)) else {
                 let _ = writeln!(
                     out,
-                    "  <joint name=\"flange_joint\" type=\"fixed\">\n    {place}\n    <parent link=\"link_{i}\"/>\n    <child \
-                     link=\"flange\"/>\n  </joint>"
+                    "  <joint name=\"flange_joint\" type=\"fixed\">\n    {place}\n    <parent link=\"{parent}\"/>\n    <child \
+                     link=\"{child}\"/>\n  </joint>"
                 );
                 continue;
             };
             let _ = writeln!(
                 out,
-                "  <joint name=\"{}\" type=\"revolute\">\n    {place}\n    <parent link=\"link_{i}\"/>\n    <child \
-                 link=\"link_{}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit lower=\"{}\" upper=\"{}\" effort=\"{}\" \
+                "  <joint name=\"{}\" type=\"revolute\">\n    {place}\n    <parent link=\"{parent}\"/>\n    <child \
+                 link=\"{child}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit lower=\"{}\" upper=\"{}\" effort=\"{}\" \
                  velocity=\"{}\"/>\n  </joint>",
                 escaped(name),
-                i + 1,
                 limit.position_min,
                 limit.position_max,
                 limit.torque_max,

@@ -29,6 +29,8 @@ use jtc_wire::SettingValue;
 pub use check::{ArmFinding, Checked};
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
+#[cfg(feature = "mcap")]
+pub(crate) use export::frame_name;
 pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
 pub use poses::{PoseError, Poses, remove_pose, save_pose};

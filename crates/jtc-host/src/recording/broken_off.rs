@@ -230,7 +230,7 @@ mod tests {
             }
             sample
         };
-        let ending = Ending { outcome: outcome.into(), reason: String::new() };
+        let ending = Ending { outcome: outcome.into(), reason: String::new(), ..Ending::default() };
         Recording { info: None, ending, samples: points.iter().map(sample).collect(), cut: None }
     }
 
@@ -271,7 +271,7 @@ mod tests {
             let samples = parts.iter().flat_map(|part| part.samples.clone()).collect();
             Recording {
                 info: None,
-                ending: Ending { outcome: outcome.into(), reason: String::new() },
+                ending: Ending { outcome: outcome.into(), reason: String::new(), ..Ending::default() },
                 samples,
                 cut: None,
             }

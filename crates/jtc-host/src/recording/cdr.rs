@@ -111,6 +111,14 @@ impl<'a> Decoder<'a> {
         self.take().map(f64::from_le_bytes)
     }
 
+    pub(super) fn string(&mut self) -> Option<&'a str> {
+        let len = self.u32()? as usize;
+        let end = self.at.checked_add(len)?;
+        let bytes = self.body.get(self.at..end)?;
+        self.at = end;
+        std::str::from_utf8(bytes.strip_suffix(&[0])?).ok()
+    }
+
     pub(super) fn skip_string(&mut self) -> Option<()> {
         let len = self.u32()? as usize;
         self.at = self.at.checked_add(len).filter(|&end| end <= self.body.len())?;

@@ -34,6 +34,7 @@ const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", 
 /// How the comments at the end begin.
 const OUTCOME: &str = "# outcome: ";
 const REASON: &str = "# reason: ";
+const LOST: &str = "# lost samples: ";
 
 /// Writes samples as rows.
 pub(super) struct CsvWriter<W: Write> {
@@ -91,12 +92,15 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), RecordingError> {
-        let Ending { outcome, reason } = &self.ending;
+        let Ending { outcome, reason, lost_samples } = &self.ending;
         if !matches!(outcome.as_str(), "" | "finished") {
             writeln!(self.out, "{OUTCOME}{outcome}")?;
             if !reason.is_empty() {
                 writeln!(self.out, "{REASON}{}", reason.replace(['\r', '\n'], " "))?;
             }
+        }
+        if *lost_samples > 0 {
+            writeln!(self.out, "{LOST}{lost_samples}")?;
         }
         Ok(self.out.flush()?)
     }
@@ -290,6 +294,9 @@ fn take_comment(ending: &mut Ending, row: &str) {
         if let Some(text) = row.strip_prefix(head) {
             *value = text.trim().to_owned();
         }
+    }
+    if let Some(text) = row.strip_prefix(LOST) {
+        ending.lost_samples = text.trim().parse().unwrap_or(0);
     }
 }
 

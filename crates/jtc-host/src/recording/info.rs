@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use jtc_core::{JOINTS, PidGains};
+use jtc_wire::Info;
+
 use crate::{Arm, Trajectory};
 
 /// One joint's name and limits.
@@ -44,12 +47,35 @@ pub struct Ending {
     pub outcome: String,
     /// Why it did not come to its end, in words.
     pub reason: String,
+    /// Samples that the disk did not take in time.
+    pub lost_samples: u64,
 }
 
 impl Ending {
     /// The run failed.
     pub fn is_fault(&self) -> bool {
         self.outcome == "fault"
+    }
+}
+
+/// The device that samples come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DeviceIdentity {
+    /// The board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Its git revision.
+    pub revision: String,
+}
+
+impl From<&Info> for DeviceIdentity {
+    fn from(info: &Info) -> Self {
+        Self {
+            board: info.board.to_string(),
+            firmware: info.firmware().to_owned(),
+            revision: info.revision().to_owned(),
+        }
     }
 }
 
@@ -68,6 +94,14 @@ pub struct RecordingInfo {
     pub joints: [JointInfo; 6],
     /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
+    /// The arm as a robot description (URDF), in MCAP files: with it they hold where each link is, too.
+    pub description: Option<Arc<str>>,
+    /// Gains, base to wrist, in MCAP files.
+    pub gains: Option<[PidGains; JOINTS]>,
+    /// Hash of all that decides how the arm moves (J-52), in MCAP files.
+    pub hash: Option<u64>,
+    /// The controller, in MCAP files; `None` where it did not report what it is.
+    pub device: Option<DeviceIdentity>,
     /// How the run ended.
     pub ending: Ending,
     /// The whole trajectory that the run is of, in MCAP files: what is needed to go on where it was broken off.
@@ -79,7 +113,7 @@ pub struct RecordingInfo {
 }
 
 impl RecordingInfo {
-    /// Names, limits and frames of an arm; source, trajectory, start time and ending are left empty.
+    /// Names, limits, gains and frames of an arm; source, trajectory, start time and ending are left empty.
     pub fn of(arm: &Arm) -> Self {
         let origin = |i: usize| {
             let o = &arm.model.joints[i];
@@ -97,6 +131,10 @@ impl RecordingInfo {
                 origin: origin(j),
             }),
             flange: origin(6),
+            description: Some(arm.to_urdf().into()),
+            gains: arm.pid,
+            // One that has no image has none.
+            hash: arm.hash().ok().flatten(),
             ..Self::default()
         }
     }

@@ -138,7 +138,7 @@ mod tests {
             let read = Recording::read(&path).unwrap();
             assert!(read.cut.unwrap().contains("0.149 s"), "{name}");
             // An observer that still holds a sink does not keep the recording open.
-            let ending = Ending { outcome: "stopped".into(), reason: "by hand".into() };
+            let ending = Ending { outcome: "stopped".into(), reason: "by hand".into(), ..Ending::default() };
             assert_eq!(live.finish(&ending).unwrap(), 150);
             let read = Recording::read(&path).unwrap();
             assert_eq!((read.samples.len(), read.ending, read.cut), (150, ending, None), "{name}");

@@ -11,6 +11,7 @@ use mcap::records::{self, MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
+use super::frames::Frames;
 use super::gather::{Gatherer, Late};
 use super::{Ending, Found, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
@@ -40,6 +41,11 @@ impl From<McapError> for RecordingError {
     }
 }
 
+/// The arm as a robot description, at the beginning.
+const DESCRIPTION_TOPIC: &str = "/robot_description";
+/// Where its links are.
+const TRANSFORMS_TOPIC: &str = "/tf";
+
 /// Writes samples as four messages each.
 pub(super) struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
@@ -49,6 +55,8 @@ pub(super) struct McapWriter<W: Write + Seek> {
     state: u16,
     names: Vec<String>,
     start_ns: u64,
+    /// Where the arm is known: its frames, and their channel.
+    frames: Option<(Frames, u16)>,
     sequence: u32,
     cdr: Encoder,
 }
@@ -73,6 +81,16 @@ impl<W: Write + Seek> McapWriter<W> {
                 MessageHeader { channel_id: channel, sequence: 0, log_time: time, publish_time: time };
             out.write_to_known_channel(&header, text.as_bytes())?;
         }
+        let frames = match &info.description {
+            Some(description) => {
+                describe(&mut out, description, info.start_unix_ns)?;
+                let text = schema::TRANSFORMS_TEXT.as_bytes();
+                let transforms = out.add_schema(schema::TRANSFORMS, "ros2msg", text)?;
+                let channel = out.add_channel(transforms, TRANSFORMS_TOPIC, "cdr", &none)?;
+                Some((Frames::of(info), channel))
+            }
+            None => None,
+        };
         Ok(Self {
             states: out.add_channel(joint, STATES_TOPIC, "cdr", &none)?,
             commands: out.add_channel(joint, COMMANDS_TOPIC, "cdr", &none)?,
@@ -81,10 +99,25 @@ impl<W: Write + Seek> McapWriter<W> {
             out,
             names: (0..6).map(|j| info.joint_name(j)).collect(),
             start_ns: info.start_unix_ns,
+            frames,
             sequence: 0,
             cdr: Encoder::default(),
         })
     }
+}
+
+/// Writes a robot description, as programs that show robots look for it.
+fn describe<W: Write + Seek>(
+    out: &mut mcap::Writer<W>,
+    description: &str,
+    time: u64,
+) -> Result<(), RecordingError> {
+    let schema = out.add_schema(schema::STRING, "ros2msg", schema::STRING_TEXT.as_bytes())?;
+    let channel_id = out.add_channel(schema, DESCRIPTION_TOPIC, "cdr", &BTreeMap::new())?;
+    let mut cdr = Encoder::default();
+    let message = cdr.start().string(description).bytes();
+    let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+    Ok(out.write_to_known_channel(&header, message)?)
 }
 
 impl<W: Write + Seek> McapWriter<W> {
@@ -175,6 +208,12 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
             self.cdr.u16(joint.internal);
         }
         self.out.write_to_known_channel(&header(self.state), self.cdr.bytes())?;
+
+        if let Some((frames, channel)) = &mut self.frames
+            && let Some(message) = frames.write(&mut self.cdr, stamp, s)
+        {
+            self.out.write_to_known_channel(&header(*channel), message)?;
+        }
         self.sequence = self.sequence.wrapping_add(1);
         Ok(())
     }
@@ -184,7 +223,8 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     }
 
     fn end(&mut self, ending: &Ending) -> Result<(), RecordingError> {
-        let pairs = [("outcome", &ending.outcome), ("reason", &ending.reason)];
+        let lost = if ending.lost_samples > 0 { ending.lost_samples.to_string() } else { String::new() };
+        let pairs = [("outcome", &ending.outcome), ("reason", &ending.reason), ("lost_samples", &lost)];
         let metadata = pairs.into_iter().filter(|(_, value)| !value.is_empty());
         let metadata = metadata.map(|(key, value)| (key.to_owned(), value.clone())).collect();
         Ok(self.out.write_metadata(&Metadata { name: END.into(), metadata })?)
@@ -207,6 +247,7 @@ enum Carries {
     Sample(u8),
     Trajectory,
     Then,
+    Description,
     Other,
 }
 
@@ -216,6 +257,7 @@ impl Carries {
             Some(i) => Self::Sample(i as u8),
             None if topic == TRAJECTORY_TOPIC => Self::Trajectory,
             None if topic == THEN_TOPIC => Self::Then,
+            None if topic == DESCRIPTION_TOPIC => Self::Description,
             None => Self::Other,
         }
     }
@@ -247,7 +289,7 @@ pub(super) fn scan(
     see: &mut dyn FnMut(&Sample),
 ) -> Result<Found, RecordingError> {
     let mut ending: Option<Ending> = None;
-    let (mut commanded, mut then) = (None, None);
+    let (mut commanded, mut then, mut description) = (None, None, None);
     let mut channels: BTreeMap<u16, Carries> = BTreeMap::new();
     let mut gatherer = Gatherer::new(room);
     let start_ns = info.as_ref().map_or(0, |info| info.start_unix_ns);
@@ -277,6 +319,9 @@ pub(super) fn scan(
                     }
                     Carries::Trajectory => commanded = trajectory(&data),
                     Carries::Then => then = trajectory(&data),
+                    Carries::Description => {
+                        description = Decoder::new(&data).and_then(|mut cdr| cdr.string().map(Arc::from));
+                    }
                     Carries::Other => {}
                 }
             }
@@ -293,7 +338,7 @@ pub(super) fn scan(
     };
     gatherer.finish(cut.is_some(), &mut give);
     if let Some(info) = &mut info {
-        (info.commanded, info.then) = (commanded, then);
+        (info.commanded, info.then, info.description) = (commanded, then, description);
         if let Some(ending) = &ending {
             info.ending = ending.clone();
         }

@@ -2,7 +2,27 @@
 
 use std::collections::BTreeMap;
 
-use super::{Ending, JointInfo, RecordingInfo};
+use jtc_core::{JOINTS, PidGains};
+
+use super::{DeviceIdentity, Ending, JointInfo, RecordingInfo};
+
+/// Keys of a joint's gains: N·m/rad, N·m/(rad·s), N·m·s/rad, and bounds of the integral of the error.
+const GAINS: [&str; 5] = ["kp", "ki", "kd", "int_min_rad_s", "int_max_rad_s"];
+
+fn listed(gains: &PidGains) -> [f64; 5] {
+    [gains.kp, gains.ki, gains.kd, gains.int_min, gains.int_max]
+}
+
+/// Those of all joints; `None` where one is missing.
+fn gains(map: &BTreeMap<String, String>) -> Option<[PidGains; JOINTS]> {
+    let mut all = [PidGains::default(); JOINTS];
+    for (i, gains) in all.iter_mut().enumerate() {
+        let value = |key: &str| map.get(&format!("joint{}_{key}", i + 1))?.parse().ok();
+        let [kp, ki, kd, int_min, int_max] = GAINS.map(value);
+        *gains = PidGains { kp: kp?, ki: ki?, kd: kd?, int_min: int_min?, int_max: int_max? };
+    }
+    Some(all)
+}
 
 impl RecordingInfo {
     /// As key-value pairs.
@@ -19,8 +39,24 @@ impl RecordingInfo {
                 put(key.into(), value.clone());
             }
         }
+        if self.ending.lost_samples > 0 {
+            put("lost_samples".into(), self.ending.lost_samples.to_string());
+        }
         if let Some(runs) = self.runs {
             put("runs".into(), runs.to_string());
+        }
+        if let Some(hash) = self.hash {
+            put("arm_hash".into(), format!("{hash:016x}"));
+        }
+        if let Some(device) = &self.device {
+            put("board".into(), device.board.clone());
+            put("firmware".into(), device.firmware.clone());
+            put("revision".into(), device.revision.clone());
+        }
+        for (i, gains) in self.gains.iter().flatten().enumerate() {
+            for (key, value) in GAINS.into_iter().zip(listed(gains)) {
+                put(format!("joint{}_{key}", i + 1), value.to_string());
+            }
         }
         for (i, joint) in self.joints.iter().enumerate() {
             let n = i + 1;
@@ -62,7 +98,19 @@ impl RecordingInfo {
             start_unix_ns: text("start_unix_ns").parse().unwrap_or(0),
             joints,
             flange: split(&text("flange_origin")),
-            ending: Ending { outcome: text("outcome"), reason: text("reason") },
+            ending: Ending {
+                outcome: text("outcome"),
+                reason: text("reason"),
+                lost_samples: text("lost_samples").parse().unwrap_or(0),
+            },
+            description: None,
+            gains: gains(map),
+            hash: u64::from_str_radix(&text("arm_hash"), 16).ok(),
+            device: map.contains_key("firmware").then(|| DeviceIdentity {
+                board: text("board"),
+                firmware: text("firmware"),
+                revision: text("revision"),
+            }),
             commanded: None,
             runs: text("runs").parse().ok(),
             then: None,

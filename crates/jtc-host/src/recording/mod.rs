@@ -1,7 +1,9 @@
 //! Recordings of a run: written as MCAP or CSV by the ending of the file name, and read back for reports.
 //!
 //! An MCAP file holds `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that
-//! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. A CSV file
+//! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. Where the arm is known,
+//! the file stands alone: its description (URDF) is on `/robot_description`, where each link is on `/tf`, and its limits, its gains, its hash and
+//! the controller's firmware are in the metadata. A CSV file
 //! has one row a sample and a header that names the units; lines that begin with `#` at its end hold how a run ended that was not
 //! finished.
 //!
@@ -13,6 +15,8 @@ mod broken_off;
 mod cdr;
 mod csv;
 mod error;
+#[cfg(feature = "mcap")]
+mod frames;
 #[cfg(feature = "mcap")]
 mod gather;
 mod info;
@@ -32,7 +36,7 @@ use std::path::{Path, PathBuf};
 
 pub use broken_off::{BrokenOff, NothingLeft, Resumption};
 pub use error::RecordingError;
-pub use info::{Ending, JointInfo, RecordingInfo};
+pub use info::{DeviceIdentity, Ending, JointInfo, RecordingInfo};
 pub use live::{FLUSH, LiveRecorder, SampleSink};
 
 use crate::sample::Sample;

@@ -32,6 +32,40 @@ float64[] effort
 "
 );
 
+/// Name of the message with a robot's description.
+pub(super) const STRING: &str = "std_msgs/msg/String";
+/// Its definition.
+pub(super) const STRING_TEXT: &str = "string data\n";
+
+/// Name of the message with transforms between frames.
+pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
+/// Its definition with the definitions it needs.
+pub(super) const TRANSFORMS_TEXT: &str = with_header!(
+    "\
+geometry_msgs/TransformStamped[] transforms
+================================================================================
+MSG: geometry_msgs/TransformStamped
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+================================================================================
+MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x 0
+float64 y 0
+float64 z 0
+float64 w 1
+"
+);
+
 /// Name of the control law's message.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
 /// Per joint, base to wrist; NaN where the source does not know a value.

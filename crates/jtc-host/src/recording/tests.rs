@@ -195,13 +195,64 @@ fn a_damaged_index_takes_nothing_away() {
 #[test]
 fn how_the_run_ended_comes_back() {
     let dir = tempfile::tempdir().unwrap();
-    let ending = Ending { outcome: "fault".into(), reason: "no status, for 2 s\nand more".into() };
+    let ending =
+        Ending { outcome: "fault".into(), reason: "no status, for 2 s\nand more".into(), lost_samples: 17 };
     let info = RecordingInfo { ending: ending.clone(), ..Default::default() };
     for name in ["a.mcap", "a.csv"] {
         let path = dir.path().join(name);
         write_all(&path, &info, &samples(3)).unwrap();
         let read = Recording::read(&path).unwrap();
         assert_eq!((read.samples.len(), read.ending.outcome.as_str()), (3, "fault"), "{name}");
+        assert_eq!(read.ending.lost_samples, 17, "{name}");
         assert_eq!(read.ending.reason.replace('\n', " "), "no status, for 2 s and more", "{name}");
     }
+}
+
+/// Messages of a file, by topic.
+fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
+    let mut topics = std::collections::BTreeMap::new();
+    let mut counts = std::collections::BTreeMap::new();
+    host_kit::mcap::each_record::<RecordingError>(File::open(path).unwrap(), |record| {
+        match record {
+            ::mcap::records::Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
+            ::mcap::records::Record::Message { header, .. } => {
+                *counts.entry(topics[&header.channel_id].clone()).or_default() += 1;
+            }
+            _ => {}
+        }
+        Ok(())
+    })
+    .unwrap();
+    counts
+}
+
+/// What the numbers mean is in the file: the arm, its gains and limits, who the controller is. Where the links are is written 50 times a
+/// second at most, however often samples come, and not where no position is known.
+#[test]
+fn a_recording_of_an_arm_stands_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let device = DeviceIdentity { board: "board".into(), firmware: "1.2.3".into(), revision: "abc".into() };
+    let info = RecordingInfo { device: Some(device), ..RecordingInfo::of(&crate::Arm::avena()) };
+    assert!(info.gains.is_some() && info.hash.is_some());
+    for (step_ms, n, transforms) in [(1, 2000, 100), (25, 80, 80), (40, 50, 50)] {
+        let path = dir.path().join(format!("every-{step_ms}.mcap"));
+        let mut written = samples(n);
+        written.iter_mut().enumerate().for_each(|(i, s)| s.time_s = 1e-3 * (i * step_ms) as f64);
+        write_all(&path, &info, &written).unwrap();
+        let counts = counted(&path);
+        assert_eq!(
+            (counts["/joint_states"], counts["/tf"], counts["/robot_description"]),
+            (n, transforms, 1)
+        );
+        let read = Recording::read(&path).unwrap();
+        assert_eq!((read.samples.len(), read.info.as_ref()), (n, Some(&info)));
+    }
+    let path = dir.path().join("unknown.mcap");
+    let mut written = samples(100);
+    written.iter_mut().flat_map(|s| &mut s.joints).for_each(|joint| joint.position = f64::NAN);
+    write_all(&path, &info, &written).unwrap();
+    assert!(!counted(&path).contains_key("/tf"));
+    // Of an arm that nobody named nothing is described.
+    write_all(&path, &RecordingInfo::default(), &samples(100)).unwrap();
+    assert_eq!(counted(&path).len(), 4);
 }

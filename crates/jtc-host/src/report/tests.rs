@@ -209,7 +209,11 @@ fn a_recording_without_its_end_is_no_success() {
     use crate::recording::Ending;
     let (info, mut samples) = run(1000);
     let of = |samples: &[Sample], outcome: &str, reason: &str| {
-        RunFailure::of_recording(&info, samples, &Ending { outcome: outcome.into(), reason: reason.into() })
+        RunFailure::of_recording(
+            &info,
+            samples,
+            &Ending { outcome: outcome.into(), reason: reason.into(), ..Ending::default() },
+        )
     };
     assert_eq!(of(&samples, "fault", "the link was lost").unwrap().causes, ["the link was lost"]);
     let unseen = of(&samples, "", "").expect("a failure");

@@ -105,7 +105,7 @@ pub fn conclude(
         Err(e) if where_.is_empty() => e.to_string(),
         Err(e) => format!("{}: {e}", where_.trim_start()),
     };
-    info.ending = Ending { outcome: word.into(), reason };
+    info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
     // A file that is lost is reported even when the run failed, but the run comes first.

@@ -7,6 +7,7 @@ pub mod jobs;
 pub mod line;
 pub mod log;
 pub mod owner;
+pub mod record;
 pub mod serve;
 pub mod tls;
 

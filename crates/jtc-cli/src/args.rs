@@ -116,7 +116,9 @@ pub enum Command {
                             agent of this user owns. Reading, stopping and pausing need no token on this computer; commanding needs the\n\
                             operator's token of the token file, which only its owner can read.\n\n\
                             Examples:\n  jtc serve --sim\n  jtc serve --port /dev/ttyUSB0\n  jtc status --port http://127.0.0.1:8780\n  \
-                            curl -X POST http://127.0.0.1:8780/api/stop"
+                            curl -X POST http://127.0.0.1:8780/api/stop\n  jtc serve --sim --record recordings --record-limit 500MB\n\n\
+                            --record writes each motion into a file of its own, NAME.part.mcap until it is over and NAME.mcap then; both are\n\
+                            readable at any time. A full disk never holds up a command: that is reported, and recording goes on when there is room."
     )]
     Serve(ServeArgs),
     /// Serial ports found, and why one cannot be used

@@ -101,7 +101,7 @@ impl SharedLine {
     }
 
     pub(super) fn note_written(&mut self, outgoing: Outgoing, abandoned: bool) {
-        let Outgoing { client, frame: HostFrame { frame_type, class, .. } } = outgoing;
+        let Outgoing { client, frame: HostFrame { frame_type, class, bytes } } = outgoing;
         let at = self.outbox.free_at();
         match class {
             Class::Halt(_) => self.halts.written(at, self.outbox.baud()),
@@ -110,7 +110,7 @@ impl SharedLine {
         }
         if class != Class::Ask && !abandoned {
             let client = if client == HALTS { OWNER } else { client };
-            self.events.push_back(LineEvent::Sent { client, frame_type, class });
+            self.events.push_back(LineEvent::Sent { client, frame_type, class, bytes });
         }
         self.sent.push_back(Sent { client, kind: frame_type as u8, abandoned, at });
     }

@@ -14,6 +14,8 @@ pub enum LineEvent {
         frame_type: FrameType,
         /// Its class.
         class: Class,
+        /// All of it.
+        bytes: Vec<u8>,
     },
     /// The device has answered a frame that changes something.
     Answered {

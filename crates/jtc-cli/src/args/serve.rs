@@ -36,6 +36,60 @@ pub struct ServeArgs {
     /// Private key of that certificate, PEM; no other user may read it
     #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
+    /// Directory for recordings: one of each motion, whoever commanded it
+    #[arg(long, env = "JTC_RECORD", value_name = "DIR")]
+    pub record: Option<PathBuf>,
+    /// Room that recordings take at most: the oldest of this directory's agents are removed first
+    #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = size)]
+    pub record_limit: u64,
     #[command(flatten)]
     pub link: LinkArgs,
+}
+
+/// Least room for recordings: some minutes.
+const SIZE_MIN: u64 = 10_000_000;
+
+/// Bytes, as `500MB`, `2 GB`, `1GiB` or a plain number.
+fn size(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor: f64 = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1024_f64.powi(2),
+        "gib" => 1024_f64.powi(3),
+        "tib" => 1024_f64.powi(4),
+        unit => {
+            return Err(format!("{unit:?} is no unit of a size: B, kB, MB, GB, TB, KiB, MiB, GiB or TiB"));
+        }
+    };
+    let number: f64 = number.parse().map_err(|_| "a size is a number and its unit, as 500MB".to_owned())?;
+    let bytes = (number * factor) as u64;
+    if bytes < SIZE_MIN { Err("recordings need 10MB at least".into()) } else { Ok(bytes) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::size;
+
+    #[test]
+    fn sizes_are_read_with_their_units() {
+        for (text, bytes) in [
+            ("2GB", 2_000_000_000),
+            ("1.5 gb", 1_500_000_000),
+            ("64MiB", 64 << 20),
+            ("10000000", 10_000_000),
+            ("50000kB", 50_000_000),
+        ] {
+            assert_eq!(size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "GB", "2 parsec", "-1GB", "9MB", "1e9", "NaN"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 }

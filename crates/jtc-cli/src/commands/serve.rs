@@ -1,7 +1,8 @@
 //! `jtc serve`: the agent that owns a port.
 
 use std::net::TcpListener;
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output, Stop};
@@ -9,6 +10,7 @@ use jtc_agent::access::{Access, Tokens, default_token_file};
 use jtc_agent::api::Agent;
 use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
+use jtc_agent::record::{Notice, Prepared};
 use jtc_agent::{Line, Owner, serve as service, tls};
 use jtc_client::agents::{Registered, register};
 use jtc_host::Arm;
@@ -44,6 +46,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("another agent may listen there: name another address with --listen")
     })?;
     let listen = listener.local_addr()?;
+    let mut recordings =
+        args.record.as_deref().map(|dir| open_recordings(dir, args.record_limit)).transpose()?;
     let (port, arm) = port(args, out)?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
@@ -51,7 +55,17 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let log = Arc::new(Mutex::new(log));
-    let owner = Owner::new(port, observer(log.clone()));
+    let witness = recordings.as_mut().and_then(Prepared::witness);
+    let mut logged = observer(log.clone());
+    let observer = move |now, event: &_| {
+        if let Some(witness) = &witness {
+            witness.see(now, event);
+        }
+        logged(now, event);
+    };
+    let owner = Owner::new(port, Box::new(observer));
+    let notify = recording_notice(&log, out);
+    let recorder = recordings.map(|begin| begin.begin(owner.line(), &name, notify)).transpose()?;
     let registered = Registered {
         url: url.clone(),
         port: name.clone(),
@@ -78,6 +92,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     if gone.is_none() {
         come_to_rest(&line, out);
     }
+    drop(recorder);
     owner.end();
     match gone {
         Some(why) => {
@@ -105,6 +120,24 @@ fn come_to_rest(line: &Line, out: &Output) {
     if !rests() {
         out.note("the arm may be moving: the controller has not reported the end of its motion");
     }
+}
+
+/// The directory for recordings, before anything else is done.
+fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
+    Prepared::open(dir, limit).map_err(|error| {
+        Failure::usage(format!("{}: {error}", dir.display())).hint("name another directory with --record DIR")
+    })
+}
+
+/// What becomes of recordings stands in the log of commands; what is wrong with them is noted, too.
+fn recording_notice(log: &Arc<Mutex<CommandLog>>, out: &Output) -> Box<dyn FnMut(Notice) + Send> {
+    let (log, out) = (log.clone(), *out);
+    Box::new(move |notice| {
+        log.lock().unwrap_or_else(PoisonError::into_inner).write(notice.what, notice.facts);
+        if let Some(warning) = notice.warning {
+            out.note(format!("warning: {warning}"));
+        }
+    })
 }
 
 /// Notes that the log of commands cannot be written.

@@ -4,6 +4,7 @@
 //! queues them and gives each to the request that waits for it.
 
 mod bench;
+mod clock;
 mod commands;
 mod extension;
 mod follow;
@@ -25,6 +26,7 @@ use jtc_wire::{
     DataStatus, FrameStatus, FrameType, FromDevice, Response, Status, StatusReceiver, TrajectoryState,
 };
 
+pub use clock::StatusClock;
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
 pub use log::LogStatus;

@@ -2,11 +2,10 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::time::Duration;
 
 use jtc_wire::Status;
 
-use super::{Flow, Outcome, Session};
+use super::{Flow, Outcome, Session, StatusClock};
 use crate::check::CheckedTrajectory;
 use crate::port::Port;
 use crate::recording::RecordingInfo;
@@ -62,61 +61,12 @@ impl<P: Port> Session<P> {
         let (trajectory, delay) = (checked.shared(), checked.delay_ticks());
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);
-        let mut clock = Clock { start: self.now(), arrived: self.now(), point: 0, time_s: 0.0 };
+        let mut clock = StatusClock::begin(self.now(), 0);
         self.observe(move |now, status| {
             let sample = Sample::following(clock.at(now, status), status, &trajectory, delay);
             observe(&sample);
             taken.borrow_mut().push(sample);
         });
         samples
-    }
-}
-
-/// Longest that a status is taken to be on its way, s.
-const DELAY_S: f64 = 0.1;
-
-/// Time of statuses: the controller's own milliseconds while it follows the path, which no delay on the way to us can blur; the time
-/// of arrival otherwise. Path time does not pass as fast at another speed (J-57): it never leaves that of arrival for long.
-struct Clock {
-    start: Duration,
-    arrived: Duration,
-    point: u32,
-    time_s: f64,
-}
-
-impl Clock {
-    fn at(&mut self, now: Duration, status: &Status) -> f64 {
-        let moved = f64::from(status.point.saturating_sub(self.point)) * 1e-3;
-        let waited = now.saturating_sub(self.arrived).as_secs_f64();
-        self.time_s += if moved > 0.0 { moved } else { waited };
-        let passed = now.saturating_sub(self.start).as_secs_f64();
-        self.time_s = self.time_s.clamp((passed - DELAY_S).max(0.0), passed + DELAY_S);
-        (self.arrived, self.point) = (now, status.point);
-        self.time_s
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn times(statuses: &[(u64, u32)]) -> Vec<f64> {
-        let mut clock =
-            Clock { start: Duration::from_secs(5), arrived: Duration::from_secs(5), point: 0, time_s: 0.0 };
-        let status = |point| Status { point, ..Status::default() };
-        statuses
-            .iter()
-            .map(|(ms, point)| clock.at(Duration::from_millis(5000 + ms), &status(*point)))
-            .collect()
-    }
-
-    #[test]
-    fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
-        // Delays do not blur it.
-        assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // At half the speed, and while it stands.
-        let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
-        assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
-        assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
     }
 }

@@ -1,0 +1,434 @@
+//! Writing recordings: a thread of its own, which a slow or full disk holds up alone.
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
+
+use jtc_host::Sample;
+use jtc_host::recording::{Ending, FLUSH, Recorder, RecordingInfo};
+use serde_json::{Value, json};
+
+use super::shelf::{Begun, Shelf};
+
+/// Samples that may wait for the disk: minutes of statuses.
+const WAITING_MAX: usize = 1 << 13;
+/// Room that samples leave to what begins and ends recordings.
+const RESERVED: usize = 64;
+/// A disk that took nothing is tried again after this time.
+const AGAIN: Duration = Duration::from_secs(5);
+
+/// What is to be written.
+enum Message {
+    Begin(Box<RecordingInfo>),
+    Sample(Box<Sample>),
+    /// How it ended, and how many samples did not get here.
+    End(Ending, u64),
+}
+
+/// Something that people want to know.
+#[derive(Clone, Debug)]
+pub struct Notice {
+    /// A word for logs.
+    pub what: &'static str,
+    /// What is known of it.
+    pub facts: Value,
+    /// For people; `None` where nothing is wrong.
+    pub warning: Option<String>,
+}
+
+/// Called with a notice, on the writer's thread.
+pub type Notify = Box<dyn FnMut(Notice) + Send>;
+
+/// The end of the queue at which samples come.
+pub struct Disk {
+    queue: SyncSender<Message>,
+    waiting: Arc<AtomicUsize>,
+    /// Samples of this recording that found no room.
+    lost: u64,
+}
+
+impl Disk {
+    fn new() -> (Self, Receiver<Message>) {
+        let (queue, messages) = sync_channel(WAITING_MAX);
+        (Self { queue, waiting: Arc::default(), lost: 0 }, messages)
+    }
+
+    /// Begins the thread that writes into `shelf`.
+    pub fn begin(shelf: Shelf, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
+        let (disk, messages) = Self::new();
+        let taken = disk.waiting.clone();
+        let writer = Writer::new(shelf, notify, AGAIN);
+        let thread = std::thread::Builder::new()
+            .name("recordings".into())
+            .spawn(move || writer.run(&messages, &taken))?;
+        Ok((disk, thread))
+    }
+
+    fn send(&mut self, message: Message, reserved: usize) -> bool {
+        if self.waiting.load(Ordering::Relaxed) + reserved >= WAITING_MAX {
+            return false;
+        }
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let sent = self.queue.try_send(message).is_ok();
+        if !sent {
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
+        }
+        sent
+    }
+
+    /// Begins a recording. Never waits, as the others.
+    pub fn open(&mut self, info: RecordingInfo) {
+        self.lost = 0;
+        self.send(Message::Begin(Box::new(info)), 0);
+    }
+
+    /// A sample of it; one that finds no room is counted.
+    pub fn write(&mut self, sample: &Sample) {
+        if !self.send(Message::Sample(Box::new(*sample)), RESERVED) {
+            self.lost += 1;
+        }
+    }
+
+    /// So many samples of it were lost before they got here.
+    pub fn lose(&mut self, samples: u64) {
+        self.lost += samples;
+    }
+
+    /// Ends it.
+    pub fn close(&mut self, ending: Ending) {
+        let lost = std::mem::take(&mut self.lost);
+        self.send(Message::End(ending, lost), 0);
+    }
+}
+
+/// A file that is being written.
+struct Open {
+    recorder: Recorder,
+    begun: Begun,
+}
+
+/// The writer's thread.
+struct Writer {
+    shelf: Shelf,
+    notify: Notify,
+    open: Option<Open>,
+    /// The recording that is to be written, also while the disk takes none.
+    wanted: Option<Box<RecordingInfo>>,
+    failed: Option<Instant>,
+    /// When it is tried again then.
+    again: Duration,
+    /// Samples that could not be written.
+    lost: u64,
+}
+
+impl Writer {
+    fn new(shelf: Shelf, notify: Notify, again: Duration) -> Self {
+        Self { shelf, notify, open: None, wanted: None, failed: None, again, lost: 0 }
+    }
+
+    fn run(mut self, messages: &Receiver<Message>, waiting: &AtomicUsize) {
+        let (mut due, mut fresh) = (Instant::now() + FLUSH, false);
+        loop {
+            match messages.recv_timeout(due.saturating_duration_since(Instant::now())) {
+                Ok(message) => {
+                    waiting.fetch_sub(1, Ordering::Relaxed);
+                    fresh = true;
+                    self.take(message);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    // Nobody announced its end.
+                    self.end(&Ending::default());
+                    return;
+                }
+            }
+            if Instant::now() >= due {
+                if std::mem::take(&mut fresh) {
+                    self.flush();
+                }
+                due = Instant::now() + FLUSH;
+            }
+        }
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Begin(info) => {
+                self.end(&Ending::default());
+                self.lost = 0;
+                self.wanted = Some(info);
+                self.begin();
+            }
+            Message::Sample(sample) => {
+                if self.open.is_none() && self.failed.is_some_and(|at| at.elapsed() >= self.again) {
+                    self.begin();
+                }
+                match self.open.as_mut().map(|open| open.recorder.write(&sample)) {
+                    Some(Ok(())) => {}
+                    None => self.lost += 1,
+                    Some(Err(error)) => {
+                        self.lost += 1;
+                        self.fail(&error.to_string());
+                    }
+                }
+            }
+            Message::End(ending, lost) => {
+                self.lost += lost;
+                self.end(&ending);
+            }
+        }
+    }
+
+    fn notice(&mut self, what: &'static str, facts: Value, warning: Option<String>) {
+        (self.notify)(Notice { what, facts, warning });
+    }
+
+    /// Removes old recordings where these take too much room.
+    fn make_room(&mut self, bytes: u64) {
+        for path in self.shelf.make_room(bytes) {
+            self.notice("recording-removed", json!({ "file": path }), None);
+        }
+    }
+
+    /// Begins the file of the recording that is wanted.
+    fn begin(&mut self) {
+        let Some(info) = &self.wanted else { return };
+        let made = self.shelf.begin(SystemTime::now()).map_err(|e| e.to_string());
+        let begun = made.and_then(|(file, begun)| {
+            // What precedes all samples is written now: a disk that takes nothing is known before them.
+            let recorder = Recorder::on(file, &begun.path, info)
+                .and_then(|mut recorder| recorder.flush().map(|()| recorder));
+            match recorder {
+                Ok(recorder) => Ok(Open { recorder, begun }),
+                Err(error) => {
+                    self.shelf.break_off(begun, 0);
+                    Err(error.to_string())
+                }
+            }
+        });
+        match begun {
+            Err(error) => self.fail(&error),
+            Ok(open) => {
+                if self.failed.take().is_some() {
+                    let file = open.begun.path.clone();
+                    let words = format!("recordings are written again, into {}", file.display());
+                    self.notice("recording-again", json!({ "file": file }), Some(words));
+                }
+                self.open = Some(open);
+                self.make_room(0);
+            }
+        }
+    }
+
+    /// The disk does not take it: reported once, until it takes something again.
+    fn fail(&mut self, error: &str) {
+        let file = self.break_off();
+        if self.failed.replace(Instant::now()).is_none() {
+            let words = format!(
+                "{error}; nothing is recorded until the disk takes it again, commands are taken all the same"
+            );
+            self.notice("recording-stopped", json!({ "file": file, "why": error }), Some(words));
+        }
+    }
+
+    /// Ends the file as it is.
+    fn break_off(&mut self) -> Option<PathBuf> {
+        let Open { recorder, begun } = self.open.take()?;
+        let (path, samples) = (begun.path.clone(), recorder.samples());
+        // It tries to complete the file, and nobody minds where that fails.
+        drop(recorder);
+        self.shelf.break_off(begun, samples);
+        Some(path)
+    }
+
+    /// Hands everything to the operating system, and begins another file where this one is long.
+    fn flush(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        if let Err(error) = open.recorder.flush() {
+            return self.fail(&error.to_string());
+        }
+        let bytes = open.begun.path.metadata().map_or(0, |found| found.len());
+        self.make_room(bytes);
+        if bytes > self.shelf.longest() {
+            let ending = Ending {
+                outcome: "continued".into(),
+                reason: "the next recording goes on with this motion".into(),
+                ..Ending::default()
+            };
+            self.complete(&ending);
+            self.begin();
+        }
+    }
+
+    /// The motion is over.
+    fn end(&mut self, ending: &Ending) {
+        self.complete(ending);
+        self.wanted = None;
+    }
+
+    /// Completes the file.
+    fn complete(&mut self, ending: &Ending) {
+        let ending = Ending { lost_samples: std::mem::take(&mut self.lost), ..ending.clone() };
+        let Some(Open { recorder, begun }) = self.open.take() else { return };
+        let samples = recorder.samples();
+        let done = recorder.finish_as(&ending).map_err(|e| e.to_string());
+        let kept = match &done {
+            Ok(_) => self.shelf.end(begun).map_err(|e| e.to_string()),
+            Err(error) => {
+                self.shelf.break_off(begun, samples);
+                Err(error.clone())
+            }
+        };
+        match kept {
+            Ok(file) => {
+                let facts = json!({
+                    "file": file, "samples": samples, "outcome": ending.outcome,
+                    "reason": ending.reason, "lost_samples": ending.lost_samples,
+                });
+                let words = format!(
+                    "{}: {} samples are missing, which the disk did not take in time",
+                    file.display(),
+                    ending.lost_samples
+                );
+                self.notice("recorded", facts, (ending.lost_samples > 0).then_some(words));
+                self.make_room(0);
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+    use std::sync::mpsc::channel;
+
+    use jtc_host::recording::Recording;
+    use jtc_wire::{ControllerState, TrajectoryState};
+
+    use super::*;
+
+    fn sample(i: u32) -> Box<Sample> {
+        Box::new(Sample {
+            time_s: f64::from(i) * 0.04,
+            state: ControllerState::Operate.into(),
+            trajectory: TrajectoryState::Execute.into(),
+            point: i,
+            ..Sample::default()
+        })
+    }
+
+    fn finished() -> Ending {
+        Ending { outcome: "finished".into(), ..Ending::default() }
+    }
+
+    /// A writer, and what it reports.
+    fn writer(shelf: Shelf) -> (Writer, Receiver<Notice>) {
+        let (notices, reported) = channel();
+        let notify = Box::new(move |notice| notices.send(notice).expect("it is awaited"));
+        (Writer::new(shelf, notify, Duration::ZERO), reported)
+    }
+
+    fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().path());
+        let mut all: Vec<PathBuf> = entries.filter(|path| path.extension().is_some()).collect();
+        all.sort();
+        all
+    }
+
+    /// A disk that takes nothing holds nobody up, and what is lost is counted; what ends a recording finds its place.
+    #[test]
+    fn what_finds_no_room_is_counted() {
+        let (mut disk, messages) = Disk::new();
+        disk.open(RecordingInfo::default());
+        (0..100_000).for_each(|i| disk.write(&sample(i)));
+        disk.lose(5);
+        disk.close(finished());
+        drop(disk);
+        let all: Vec<Message> = messages.iter().collect();
+        let samples = all.iter().filter(|message| matches!(message, Message::Sample(_))).count();
+        assert!(samples < WAITING_MAX && all.len() == samples + 2);
+        assert!(matches!(all.first(), Some(Message::Begin(_))));
+        let Some(Message::End(_, lost)) = all.last() else { panic!("it does not end") };
+        assert_eq!(*lost, 100_005 - samples as u64);
+    }
+
+    /// Every file that was made stays within the limit together with the others, and a long motion goes on in the next one: no sample is
+    /// missing or there twice.
+    #[test]
+    fn recordings_stay_within_their_limit() {
+        const LIMIT: u64 = 400_000;
+        let dir = tempfile::tempdir().unwrap();
+        let (mut writer, reported) = writer(Shelf::open(dir.path(), LIMIT).unwrap());
+        writer.take(Message::Begin(Box::default()));
+        let mut seen = std::collections::BTreeSet::new();
+        for i in 0..20_000 {
+            writer.take(Message::Sample(sample(i)));
+            if i % 50 == 49 {
+                writer.flush();
+                let bytes: u64 = files(&dir).iter().map(|path| path.metadata().unwrap().len()).sum();
+                assert!(bytes <= LIMIT, "{bytes} bytes");
+            }
+        }
+        writer.take(Message::End(finished(), 3));
+        let whole = files(&dir);
+        assert!((2..=6).contains(&whole.len()), "{whole:?}");
+        for (k, path) in whole.iter().enumerate() {
+            let recording = Recording::read(path).unwrap();
+            let last = k + 1 == whole.len();
+            assert_eq!(recording.cut, None);
+            assert_eq!(recording.ending.outcome, if last { "finished" } else { "continued" });
+            assert_eq!(recording.ending.lost_samples, if last { 3 } else { 0 });
+            assert!(recording.samples.iter().all(|sample| seen.insert(sample.point)), "one is there twice");
+        }
+        assert_eq!(seen.last(), Some(&19_999));
+        assert_eq!(seen.len() as u32, 20_000 - seen.first().unwrap(), "one is missing");
+        let notices: Vec<Notice> = reported.try_iter().collect();
+        assert!(notices.iter().any(|notice| notice.what == "recording-removed"));
+        let warned: Vec<&str> = notices.iter().filter_map(|notice| notice.warning.as_deref()).collect();
+        assert!(warned.len() == 1 && warned[0].contains("3 samples are missing"), "{warned:?}");
+    }
+
+    /// A full disk is reported once, and recording goes on when there is room, in the middle of a motion, too.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_reported_once_and_recording_goes_on() {
+        static FULL: Mutex<bool> = Mutex::new(true);
+        let dir = tempfile::tempdir().unwrap();
+        let shelf = Shelf::open(dir.path(), 1_000_000).unwrap().making(|path| {
+            let file = std::fs::File::create_new(path)?;
+            if *FULL.lock().unwrap() {
+                std::fs::File::options().write(true).open("/dev/full")
+            } else {
+                Ok(file)
+            }
+        });
+        let (mut writer, reported) = writer(shelf);
+        for _ in 0..2 {
+            writer.take(Message::Begin(Box::default()));
+            (0..100).for_each(|i| writer.take(Message::Sample(sample(i))));
+            writer.take(Message::End(finished(), 0));
+        }
+        let notices: Vec<Notice> = reported.try_iter().collect();
+        assert_eq!(notices.iter().map(|notice| notice.what).collect::<Vec<_>>(), ["recording-stopped"]);
+        assert!(notices[0].warning.as_ref().is_some_and(|w| w.contains("No space left")), "{notices:?}");
+        assert!(files(&dir).is_empty(), "a file without a sample is none: {:?}", files(&dir));
+        writer.take(Message::Begin(Box::default()));
+        (0..100).for_each(|i| writer.take(Message::Sample(sample(i))));
+        *FULL.lock().unwrap() = false;
+        (100..200).for_each(|i| writer.take(Message::Sample(sample(i))));
+        writer.take(Message::End(finished(), 0));
+        let notices: Vec<Notice> = reported.try_iter().collect();
+        let (what, warning) = (notices.iter().map(|n| n.what).collect::<Vec<_>>(), &notices[1].warning);
+        assert_eq!(what, ["recording-again", "recorded"]);
+        assert!(
+            warning.as_ref().is_some_and(|words| words.contains("100 samples are missing")),
+            "{warning:?}"
+        );
+        let recording = Recording::read(&files(&dir)[0]).unwrap();
+        assert_eq!((recording.samples.len(), recording.ending.lost_samples), (100, 100));
+    }
+}

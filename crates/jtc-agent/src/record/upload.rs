@@ -1,0 +1,165 @@
+//! The trajectory that a controller was given, put together from the frames that went to it.
+use std::sync::Arc;
+
+use jtc_host::{Point, Trajectory};
+use jtc_wire::{Command, FrameRef};
+
+/// Points that a controller takes (J-30): more are no trajectory.
+const POINTS_MAX: usize = 12_000;
+
+/// Segments in their order.
+#[derive(Clone, Default)]
+struct Assembly {
+    number: u16,
+    step_ms: u16,
+    segments: u16,
+    /// How many of them are there.
+    taken: u16,
+    /// Points before the last of these, for one that is sent again.
+    before_last: usize,
+    points: Vec<Point>,
+}
+
+/// Follows uploads.
+#[derive(Default)]
+pub struct Upload {
+    current: Option<Assembly>,
+    /// One that has begun, and whose first segment may be refused still: then the one before it stays.
+    next: Option<Assembly>,
+    whole: Option<Arc<Trajectory>>,
+}
+
+impl Upload {
+    /// A Trajectory frame has gone to the controller.
+    pub fn sent(&mut self, frame: &[u8]) {
+        let Some(Ok(Command::Trajectory(segment))) = FrameRef::new_checked(frame).map(Command::parse) else {
+            return;
+        };
+        if segment.segment == 0 {
+            self.next = Some(Assembly {
+                number: segment.trajectory,
+                step_ms: segment.step_time,
+                segments: segment.segments,
+                ..Assembly::default()
+            });
+        }
+        let Some(assembly) = self.next.as_mut().or(self.current.as_mut()) else { return };
+        let (number, step) = (segment.trajectory, segment.step_time);
+        if (number, step, segment.segments) != (assembly.number, assembly.step_ms, assembly.segments) {
+            return;
+        }
+        if segment.segment + 1 == assembly.taken {
+            // Its record did not come: it was sent again.
+            assembly.points.truncate(assembly.before_last);
+        } else if segment.segment == assembly.taken {
+            assembly.taken += 1;
+            assembly.before_last = assembly.points.len();
+        } else {
+            return;
+        }
+        if assembly.points.len() + segment.len() <= POINTS_MAX {
+            assembly.points.extend(segment.points().map(|raw| Point::from(&raw)));
+        }
+        self.whole = None;
+    }
+
+    /// The controller has answered a Trajectory frame. Records come in the order of the frames: the first behind a first segment is of that.
+    pub fn answered(&mut self, accepted: bool) {
+        if let Some(next) = self.next.take() {
+            self.whole = None;
+            if accepted {
+                self.current = Some(next);
+            }
+        }
+    }
+
+    /// What was sent is not known any more.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// What the controller has, where all of it was seen. `executes`: it runs it, which it does with nothing but a whole one.
+    pub fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
+        if executes {
+            // Its record did not come.
+            self.answered(true);
+        }
+        let current = self.current.as_ref().filter(|c| c.taken == c.segments && c.points.len() >= 2)?;
+        let whole = || Arc::new(Trajectory { step_ms: current.step_ms, points: current.points.clone() });
+        Some(self.whole.get_or_insert_with(whole).clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_wire::RawPoint;
+
+    use super::*;
+
+    /// Segments of two points each, whose positions begin at `from`.
+    fn frames(number: u16, from: i16, segments: u16) -> Vec<Vec<u8>> {
+        let segment = |i: u16| {
+            let point = |k: i16| RawPoint { position: [from + 2 * i as i16 + k; 6], ..RawPoint::default() };
+            jtc_host::frame::segment(number, i, segments, 10, &[point(0), point(1)]).expect("it fits")
+        };
+        (0..segments).map(segment).collect()
+    }
+
+    fn positions(upload: &mut Upload) -> Option<Vec<i16>> {
+        let trajectory = upload.trajectory(true)?;
+        let raw = trajectory.raw().expect("it came from the wire");
+        Some(raw.iter().map(|point| point.position[3]).collect())
+    }
+
+    #[test]
+    fn an_upload_is_put_together_from_its_frames() {
+        let mut upload = Upload::default();
+        assert_eq!(upload.trajectory(false), None);
+        for (i, frame) in frames(7, 100, 3).iter().enumerate() {
+            assert_eq!(upload.trajectory(false), None);
+            upload.sent(frame);
+            if i == 1 {
+                // The record was lost.
+                upload.sent(frame);
+            }
+            upload.answered(true);
+        }
+        assert_eq!(positions(&mut upload).unwrap(), [100, 101, 102, 103, 104, 105]);
+        // Not the whole of the next one: it cannot be executed, and is no trajectory.
+        upload.sent(&frames(8, 500, 2)[0]);
+        upload.answered(true);
+        assert_eq!(positions(&mut upload), None);
+        upload.sent(&frames(8, 500, 2)[1]);
+        assert_eq!(positions(&mut upload).unwrap(), [500, 501, 502, 503]);
+        upload.forget();
+        assert_eq!(positions(&mut upload), None);
+    }
+
+    #[test]
+    fn an_upload_that_is_refused_leaves_the_one_before_it() {
+        let mut upload = Upload::default();
+        let (old, new) = (frames(1, 0, 2), frames(2, 300, 2));
+        for frame in &old {
+            upload.sent(frame);
+        }
+        upload.answered(true);
+        upload.answered(true);
+        // In flight together; the first is refused, and so are those behind it.
+        for frame in &new {
+            upload.sent(frame);
+        }
+        upload.answered(false);
+        upload.answered(false);
+        assert_eq!(positions(&mut upload).unwrap(), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn whatever_comes_is_no_trajectory_of_a_million_points() {
+        let mut upload = Upload::default();
+        let point = [RawPoint::default(); 1500];
+        for i in 0..100 {
+            upload.sent(&jtc_host::frame::segment(0, i, 100, 1, &point).expect("it fits"));
+        }
+        assert!(upload.trajectory(true).is_none_or(|t| t.points.len() <= POINTS_MAX));
+    }
+}

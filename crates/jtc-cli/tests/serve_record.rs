@@ -1,0 +1,203 @@
+//! `jtc serve --record`: a recording of each motion, whoever commands it.
+#![cfg(unix)]
+
+mod common;
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use cli_kit::trial::{CommandOutput, run};
+use common::{command, slow_motion};
+use jtc_host::recording::Recording;
+use serde_json::Value;
+
+/// Longest that anything here takes on a slow computer.
+const LONG: Duration = Duration::from_secs(60);
+
+/// An agent of a simulated controller that records.
+struct Agent {
+    child: Child,
+    url: String,
+    dir: tempfile::TempDir,
+}
+
+impl Agent {
+    fn start() -> Self {
+        Self::start_in(tempfile::tempdir().expect("a directory"))
+    }
+
+    fn start_in(dir: tempfile::TempDir) -> Self {
+        let mut child = here(&dir)
+            .args(["--json", "serve", "--sim", "--baud", "921600", "--listen", "127.0.0.1:0", "--record"])
+            .arg(dir.path().join("recordings"))
+            .arg("--command-log")
+            .arg(dir.path().join("commands"))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("jtc serve starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        let ready: Value = serde_json::from_str(&line).expect("an object");
+        let agent = Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir };
+        agent.jtc(&["recover", "--defaults"]).ends(0);
+        agent
+    }
+
+    fn jtc(&self, words: &[&str]) -> CommandOutput {
+        run(here(&self.dir), &[words, &["--port", &self.url]].concat(), "")
+    }
+
+    fn motion(&self, points: i32) -> String {
+        let file = self.dir.path().join("motion.csv");
+        std::fs::write(&file, slow_motion(points)).expect("a file");
+        file.to_str().expect("a name").to_owned()
+    }
+
+    /// Recordings with this ending, oldest first, when there are so many.
+    fn recordings(&self, ending: &str, count: usize) -> Vec<PathBuf> {
+        let end = Instant::now() + LONG;
+        loop {
+            let found = recordings(&self.dir, ending);
+            if found.len() >= count {
+                return found;
+            }
+            assert!(Instant::now() < end, "{found:?} instead of {count} {ending}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    fn end(mut self, signal: &str) -> tempfile::TempDir {
+        Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
+        self.child.wait().expect("it ends");
+        std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory"))
+    }
+}
+
+impl Drop for Agent {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+fn here(dir: &tempfile::TempDir) -> Command {
+    let mut command = command();
+    command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
+    command
+}
+
+fn recordings(dir: &tempfile::TempDir, ending: &str) -> Vec<PathBuf> {
+    let all = std::fs::read_dir(dir.path().join("recordings")).expect("the directory");
+    let mut found: Vec<PathBuf> = all.map(|entry| entry.expect("an entry").path()).collect();
+    found.retain(|path| {
+        let name = path.file_name().and_then(|name| name.to_str()).expect("a name");
+        name.ends_with(ending) && (ending != ".mcap" || !name.ends_with(".part.mcap"))
+    });
+    found.sort();
+    found
+}
+
+fn read(path: &Path) -> Recording {
+    Recording::read(path).expect("a recording")
+}
+
+/// `jtc report` makes its page of it.
+fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
+    let words = ["--json", "report", path.to_str().expect("a name"), "--force"];
+    run(here(dir), &words, "").ends(0).json()
+}
+
+#[test]
+fn every_motion_has_a_recording_with_the_channels_of_a_run() {
+    let agent = Agent::start();
+    let own = agent.dir.path().join("own.mcap");
+    let (motion, own) = (agent.motion(20), own.to_str().expect("a name").to_owned());
+    agent.jtc(&["traj", "run", &motion, "--record", &own]).ends(0);
+    let file = agent.recordings(".mcap", 1).remove(0);
+    let (of_agent, of_run) = (read(&file), read(Path::new(&own)));
+    assert_eq!((of_agent.ending.outcome.as_str(), of_agent.cut.as_deref()), ("finished", None));
+    let (info, info_of_run) =
+        (of_agent.info.as_ref().expect("its arm"), of_run.info.as_ref().expect("its arm"));
+    assert_eq!(info.commanded, info_of_run.commanded);
+    assert_eq!(
+        (&info.joints, &info.gains, &info.hash),
+        (&info_of_run.joints, &info_of_run.gains, &info_of_run.hash)
+    );
+    assert_eq!((&info.description, &info.device), (&info_of_run.description, &info_of_run.device));
+    assert!(info.device.is_some() && info.hash.is_some() && info.start_unix_ns > 0);
+    // What was commanded at a point is the same in both; the agent has all that the run saw, and what was before.
+    let at = |recording: &Recording, point: u32| {
+        let found = recording.samples.iter().find(|s| s.is_operating() && s.point == point);
+        found.map(|s| {
+            s.joints.map(|joint| (joint.set_position, joint.set_velocity, joint.position, joint.error))
+        })
+    };
+    let moving: Vec<u32> = of_run.samples.iter().filter(|s| s.is_operating()).map(|s| s.point).collect();
+    assert!(moving.len() > 5, "{moving:?}");
+    for point in moving {
+        assert_eq!(at(&of_agent, point), at(&of_run, point), "{point}");
+    }
+    assert!(of_agent.samples.first().is_some_and(|s| !s.is_operating()));
+    assert!(of_agent.samples.is_sorted_by(|a, b| a.time_s <= b.time_s));
+    let report = is_reported(&agent.dir, &file);
+    assert!(report["joints"][0]["rms_error_mrad"].is_number() && report["failure"].is_null(), "{report}");
+    // A jog and teaching, too.
+    agent.jtc(&["jog", "1", "0.1", "--duration", "1"]).ends(0);
+    agent.jtc(&["teach", "on"]).ends(0);
+    agent.jtc(&["teach", "off"]).ends(0);
+    let files = agent.recordings(".mcap", 3);
+    let names: Vec<String> = files.iter().map(|file| read(file).info.expect("its arm").trajectory).collect();
+    assert_eq!(names, ["execution", "jog", "teaching"]);
+    for file in &files {
+        is_reported(&agent.dir, file);
+    }
+    let dir = agent.end("-TERM");
+    let log = std::fs::read_to_string(dir.path().join("commands")).expect("the log");
+    assert_eq!(log.matches("\"what\":\"recorded\"").count(), 3, "{log}");
+}
+
+#[test]
+fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
+    let agent = Agent::start();
+    let motion = agent.motion(300);
+    let mut runs = here(&agent.dir)
+        .args(["traj", "run", &motion, "--port", &agent.url])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let part = agent.recordings(".part.mcap", 1).remove(0);
+    let end = Instant::now() + LONG;
+    let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
+    // It is readable while it is written.
+    while Recording::read(&part).map_or(0, |recording| moving(&recording)) < 20 {
+        assert!(Instant::now() < end, "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let dir = agent.end("-KILL");
+    runs.wait().expect("it ends");
+    let recording = read(&part);
+    assert!(moving(&recording) >= 20 && recording.cut.is_some(), "{:?}", recording.cut);
+    let report = is_reported(&dir, &part);
+    assert!(report["cut"].as_str().is_some_and(|cut| cut.contains("whole")), "{report}");
+    assert!(
+        report["failure"]["causes"][0].as_str().is_some_and(|why| why.contains("was not seen")),
+        "{report}"
+    );
+
+    let agent = Agent::start_in(dir);
+    agent.jtc(&["traj", "run", &agent.motion(20)]).ends(0);
+    let whole = agent.recordings(".mcap", 1).remove(0);
+    assert!(part.exists() && whole.to_str().is_some_and(|name| name.ends_with("-000002.mcap")), "{whole:?}");
+    // Two agents do not share a directory.
+    let second = here(&agent.dir)
+        .args(["serve", "--sim", "--listen", "127.0.0.1:0", "--record"])
+        .arg(agent.dir.path().join("recordings"))
+        .output()
+        .expect("it ends");
+    assert_eq!(second.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&second.stderr).contains("another agent"), "{second:?}");
+}

@@ -1,15 +1,13 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-pub mod access;
 pub mod api;
 pub mod jobs;
 pub mod line;
 pub mod log;
 pub mod owner;
 pub mod record;
-pub mod serve;
-pub mod tls;
 
+pub use agent_kit::{access, serve, tls};
 pub use line::{ClientId, Denied, Introduction, Lease, LineEvent, Policy, Role, SharedLine};
 pub use owner::{ClientPort, Line, Owner};

@@ -1,4 +1,5 @@
 //! Commands that are soon over, for who has the lease.
+use agent_kit::api::{Body, Refusals};
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::{Extension, Json};
@@ -7,7 +8,7 @@ use jtc_host::{Error, ErrorKind, Session};
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::error::{Body, Denials, Refusals};
+use super::error::Denials;
 use super::objects::PayloadObject;
 use super::runs::JobObject;
 use super::{Agent, Caller, ErrorObject};

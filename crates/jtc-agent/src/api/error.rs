@@ -1,9 +1,7 @@
 //! What the API sends where something is not done: one object, whatever it was.
+use agent_kit::api::{Problem, status};
 use axum::Json;
-use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
-use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::StatusCode;
-use axum::http::request::Parts;
 use axum::response::{IntoResponse, Response};
 use jtc_host::error::Facts;
 use jtc_host::{Diagnose, Diagnosis, Error, ErrorKind};
@@ -62,13 +60,7 @@ impl ErrorObject {
 
     /// Of this kind.
     pub fn kind(self, kind: ErrorKind) -> Self {
-        let status = match kind {
-            ErrorKind::Usage => StatusCode::UNPROCESSABLE_ENTITY,
-            ErrorKind::Refused | ErrorKind::Device => StatusCode::CONFLICT,
-            ErrorKind::NoLink => StatusCode::SERVICE_UNAVAILABLE,
-            ErrorKind::Fault => StatusCode::INTERNAL_SERVER_ERROR,
-        };
-        Self { status, ..self }
+        Self { status: status(kind), ..self }
     }
 
     /// In these words.
@@ -137,6 +129,13 @@ impl From<Error> for ErrorObject {
     }
 }
 
+impl From<Problem> for ErrorObject {
+    fn from(problem: Problem) -> Self {
+        let status = problem.status();
+        Self { status, ..Self::new(problem.code, problem.message, problem.next) }
+    }
+}
+
 impl From<Denied> for ErrorObject {
     fn from(denied: Denied) -> Self {
         let next = match &denied {
@@ -174,27 +173,6 @@ impl From<Unable> for ErrorObject {
     }
 }
 
-/// What every request may be refused with.
-#[derive(IntoResponses)]
-#[expect(dead_code, reason = "describes responses")]
-pub(super) enum Refusals {
-    /// What was asked cannot be read
-    #[response(status = 400)]
-    Unreadable(ErrorObject),
-    /// The token is missing or none of this agent's
-    #[response(status = 401)]
-    Token(ErrorObject),
-    /// The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks
-    #[response(status = 403)]
-    Elsewhere(ErrorObject),
-    /// The request takes too long, or more than it may
-    #[response(status = 408)]
-    Slow,
-    /// Too many wrong tokens came
-    #[response(status = 429)]
-    Wrong(ErrorObject),
-}
-
 /// What a command may be refused with beside that.
 #[derive(IntoResponses)]
 #[expect(dead_code, reason = "describes responses")]
@@ -217,56 +195,4 @@ pub(super) enum Denials {
     /// The port is gone, or the controller is silent
     #[response(status = 503)]
     Lost(ErrorObject),
-}
-
-fn unreadable(status: StatusCode, message: String) -> ErrorObject {
-    ErrorObject { status, ..ErrorObject::new("request", message, "GET /openapi.json describes each request") }
-}
-
-/// A body of JSON.
-pub(super) struct Body<T>(pub T);
-
-impl<T, S: Send + Sync> FromRequest<S> for Body<T>
-where
-    Json<T>: FromRequest<S, Rejection = JsonRejection>,
-{
-    type Rejection = ErrorObject;
-
-    async fn from_request(request: Request, state: &S) -> Result<Self, ErrorObject> {
-        let Json(body) =
-            Json::from_request(request, state).await.map_err(|e| unreadable(e.status(), e.body_text()))?;
-        Ok(Self(body))
-    }
-}
-
-/// What stands behind the question mark.
-pub(super) struct Asked<T>(pub T);
-
-impl<T, S: Send + Sync> FromRequestParts<S> for Asked<T>
-where
-    Query<T>: FromRequestParts<S, Rejection = QueryRejection>,
-{
-    type Rejection = ErrorObject;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ErrorObject> {
-        let asked = Query::from_request_parts(parts, state).await;
-        let Query(asked) = asked.map_err(|e| unreadable(e.status(), e.body_text()))?;
-        Ok(Self(asked))
-    }
-}
-
-/// A number in the path.
-pub(super) struct Number<T>(pub T);
-
-impl<T, S: Send + Sync> FromRequestParts<S> for Number<T>
-where
-    Path<T>: FromRequestParts<S, Rejection = PathRejection>,
-{
-    type Rejection = ErrorObject;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ErrorObject> {
-        let path = Path::from_request_parts(parts, state).await;
-        let Path(number) = path.map_err(|e| unreadable(e.status(), e.body_text()))?;
-        Ok(Self(number))
-    }
 }

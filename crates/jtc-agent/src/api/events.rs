@@ -1,6 +1,8 @@
 //! What happens, as it happens: events by number, and a stream of them with what the controller reports.
 use std::time::Duration;
 
+use agent_kit::api::{Asked, Refusals};
+use agent_kit::journal::Excerpt;
 use axum::Extension;
 use axum::Json;
 use axum::extract::State;
@@ -10,9 +12,8 @@ use axum::response::{IntoResponse as _, Response};
 use tokio::time::{Instant, MissedTickBehavior};
 use utoipa::{IntoParams, ToSchema};
 
-use super::error::{Asked, Refusals};
 use super::{Agent, Caller, ErrorObject, StatusObject};
-use crate::jobs::{EventObject, Excerpt};
+use crate::jobs::{EventObject, Happening};
 use crate::line::Role;
 
 /// Longest that a request waits for an event, s.
@@ -58,8 +59,9 @@ pub struct EventsObject {
 }
 
 impl Agent {
-    fn events(&self, excerpt: Excerpt) -> EventsObject {
+    fn events(&self, excerpt: Excerpt<Happening>) -> EventsObject {
         let Excerpt { events, last, missed } = excerpt;
+        let events = events.into_iter().map(EventObject::from).collect();
         EventsObject { agent: self.id.to_string(), events, last, missed }
     }
 }

@@ -2,6 +2,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use agent_kit::access::random;
+use agent_kit::api::{Body, Refusals};
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::{Extension, Json};
@@ -9,9 +11,8 @@ use jtc_host::ErrorKind;
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::error::{Body, Denials, Refusals};
+use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
-use crate::access::random;
 use crate::jobs::{Commander, Unable};
 use crate::line::{Denied, Introduction, Policy, Role};
 
@@ -19,8 +20,6 @@ use crate::line::{Denied, Introduction, Policy, Role};
 pub(super) const KEY: &str = "lease-key";
 /// How long a lease may last without a request, s.
 const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
-/// Longest name of a client.
-const NAME_MAX: usize = 64;
 
 /// Who wants to command.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -65,19 +64,6 @@ pub struct LeaseState {
     /// Who asks for the lease.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wanted_by: Option<String>,
-}
-
-/// A name without what would disturb a line of text.
-pub(super) fn plain(name: &str) -> String {
-    name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
-}
-
-impl Caller {
-    /// What people call a client that names itself so.
-    pub(super) fn named(&self, name: &str) -> String {
-        let name = plain(name);
-        if name.is_empty() { self.peer.to_string() } else { name }
-    }
 }
 
 impl Agent {

@@ -9,15 +9,16 @@ mod runs;
 mod socket;
 mod trajectories;
 
-use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use axum::body::Body;
-use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
-use axum::response::{IntoResponse, Response};
+use agent_kit::access::{Access, TokenError, random};
+use agent_kit::api::Refusals;
+use agent_kit::gate::{Caller, Gate, let_in};
+use agent_kit::log::CommandLog;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::from_fn_with_state;
 use axum::{Extension, Json, Router};
 use jtc_host::ErrorKind;
 use jtc_wire::ExecCommand;
@@ -29,17 +30,13 @@ use utoipa::{Modify, OpenApi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::access::{Access, Refusal, Request as Asked, TokenError, random};
 use crate::jobs::Jobs;
-use crate::line::{OWNER, Role};
-use crate::log::CommandLog;
+use crate::line::OWNER;
 use crate::owner::Line;
 
 pub use error::ErrorObject;
 pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
 pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
-
-use error::Refusals;
 
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
@@ -57,8 +54,7 @@ const OPERATORS_MAX: usize = 32;
 pub struct Agent {
     line: Line,
     jobs: Arc<Jobs>,
-    access: Arc<Access>,
-    log: Arc<Mutex<CommandLog>>,
+    gate: Gate,
     /// A number of its own, by which clients know that it is another one.
     id: Arc<str>,
     port: Arc<str>,
@@ -66,13 +62,6 @@ pub struct Agent {
     viewers: Arc<Semaphore>,
     operators: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
-}
-
-/// Who asks.
-#[derive(Clone, Debug)]
-struct Caller {
-    role: Role,
-    peer: SocketAddr,
 }
 
 impl Agent {
@@ -93,8 +82,7 @@ impl Agent {
         Ok(Self {
             line,
             jobs,
-            access: Arc::new(access),
-            log,
+            gate: Gate::new(access, log),
             id: random()?.get(..8).unwrap_or_default().into(),
             port: port.into(),
             simulated,
@@ -115,12 +103,12 @@ impl Agent {
             .route("/api/stream", axum::routing::get(events::stream))
             .route("/openapi.json", axum::routing::get(openapi))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
-            .layer(from_fn_with_state(self.clone(), let_in))
+            .layer(from_fn_with_state(self.gate.clone(), let_in))
             .with_state(self)
     }
 
     fn note(&self, what: &str, facts: serde_json::Value) {
-        self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+        self.gate.note(what, facts);
     }
 
     /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
@@ -294,58 +282,4 @@ async fn pause(
     headers: HeaderMap,
 ) -> Result<Json<SentObject>, ErrorObject> {
     agent.halt(&caller, &headers, ExecCommand::Pause)
-}
-
-/// In front of every handler: who is it, and may it come in?
-async fn let_in(
-    State(agent): State<Agent>,
-    ConnectInfo(peer): ConnectInfo<SocketAddr>,
-    mut request: Request<Body>,
-    next: Next,
-) -> Response {
-    let headers = request.headers();
-    let asked = Asked {
-        peer: peer.ip(),
-        host: text_of(headers, header::HOST),
-        origin: text_of(headers, header::ORIGIN),
-        token: text_of(headers, header::AUTHORIZATION)
-            .map(|value| value.strip_prefix("Bearer ").unwrap_or("")),
-    };
-    match agent.access.role(&asked) {
-        Ok(role) => {
-            request.extensions_mut().insert(Caller { role, peer });
-            let mut response = next.run(request).await;
-            let headers = response.headers_mut();
-            headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-            headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-            headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
-            response
-        }
-        Err(refusal) => {
-            let path = request.uri().path().to_owned();
-            agent.note(
-                "refused",
-                json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() }),
-            );
-            refusal.into_response()
-        }
-    }
-}
-
-fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // One that is no text is there, and is nobody's.
-    headers.get(name).map(|value| value.to_str().unwrap_or("?"))
-}
-
-impl IntoResponse for Refusal {
-    fn into_response(self) -> Response {
-        let (status, next) = match &self {
-            Self::Host(_) => (StatusCode::FORBIDDEN, "use the address that the agent printed"),
-            Self::Origin(_) => (StatusCode::FORBIDDEN, "open the agent's own page"),
-            Self::WrongToken => (StatusCode::UNAUTHORIZED, "take the token from the agent's token file"),
-            Self::NoToken => (StatusCode::UNAUTHORIZED, "take a token from the agent's token file"),
-            Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
-        };
-        (status, Json(ErrorObject::new("not-let-in", self.to_string(), next))).into_response()
-    }
 }

@@ -1,10 +1,11 @@
 //! What is asked of the controller itself, for all who may look.
+use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;
 use jtc_host::{Error, Session, words};
 use utoipa::ToSchema;
 
-use super::error::{Denials, Refusals};
+use super::error::Denials;
 use super::objects::PayloadObject;
 use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;

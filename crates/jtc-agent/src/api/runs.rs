@@ -1,4 +1,5 @@
 //! Runs and moves: jobs, and what becomes of them.
+use agent_kit::api::{Body, Number, Refusals};
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::{Extension, Json};
@@ -6,7 +7,7 @@ use jtc_host::ErrorKind;
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::error::{Body, Denials, Number, Refusals};
+use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
 use crate::line::Policy;

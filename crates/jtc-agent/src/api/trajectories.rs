@@ -1,4 +1,5 @@
 //! Trajectories by number: kept, checked, listed.
+use agent_kit::api::{Body, Number, Refusals};
 use axum::extract::{FromRequest as _, Request, State};
 use axum::http::StatusCode;
 use axum::{Extension, Json};
@@ -8,7 +9,7 @@ use jtc_wire::Joint;
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::error::{Body, Denials, Number, Refusals};
+use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::Stored;
 use crate::line::{Denied, Role};
@@ -151,7 +152,7 @@ async fn keep(
     request: TrajectoryRequest,
 ) -> Result<Json<TrajectoryObject>, ErrorObject> {
     let TrajectoryRequest { name, text, degrees } = request;
-    let name = super::lease::plain(&name);
+    let name = agent_kit::gate::plain(&name);
     let jobs = agent.jobs.clone();
     let kept = blocking(move || jobs.store.put(number, &name, &text, degrees)).await?;
     let stored = kept.map_err(|e| ErrorObject::diagnosed(&e))?;

@@ -1,7 +1,7 @@
 //! What an agent does for clients that have no connection of their own: it keeps their end of the line, runs what they ask for, and
 //! writes down what happens, so that they can come back and read it.
 mod commander;
-mod journal;
+mod happening;
 mod run;
 mod store;
 mod task;
@@ -15,7 +15,7 @@ use jtc_host::session::Flow;
 use jtc_host::{Arm, Session};
 
 pub use commander::{Commander, Unable};
-pub use journal::{EventObject, Excerpt, Happening, Journal};
+pub use happening::{EventObject, Happening, Journal};
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
 

@@ -2,6 +2,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use agent_kit::access::Role;
 use jtc_wire::{FRAME_MAX, FRAME_MIN, Response};
 
 use super::Denied;
@@ -21,16 +22,6 @@ const REFUSALS_MAX: usize = 600;
 /// A client by number; numbers are not used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
-
-/// What a client may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Role {
-    /// Look, stop and pause.
-    Viewer,
-    /// All of it, one at a time.
-    Operator,
-}
 
 /// What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
 #[derive(

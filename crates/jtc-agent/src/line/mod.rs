@@ -16,8 +16,9 @@ use std::time::Duration;
 
 use jtc_wire::{ExecCommand, FrameType, Status, StatusReceiver, fixed};
 
+pub use agent_kit::access::Role;
 pub use class::Class;
-pub use client::{ClientId, Delivery, Introduction, Policy, PutOut, Role};
+pub use client::{ClientId, Delivery, Introduction, Policy, PutOut};
 pub use event::LineEvent;
 pub use lease::{Denied, Lease};
 

@@ -13,7 +13,15 @@ use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use subtle::ConstantTimeEq as _;
 
-use crate::line::Role;
+/// What a client may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Look, stop and pause.
+    Viewer,
+    /// All of it, one at a time.
+    Operator,
+}
 
 /// Wrong tokens from one address in a minute that are answered as such, and from all.
 const WRONG_MAX: usize = 20;
@@ -79,7 +87,11 @@ impl host_kit::Diagnose for TokenError {
 }
 
 /// 32 random bytes as text.
-pub(crate) fn random() -> Result<String, TokenError> {
+///
+/// # Errors
+///
+/// The system has no random numbers.
+pub fn random() -> Result<String, TokenError> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
     Ok(URL_SAFE_NO_PAD.encode(bytes))
@@ -138,7 +150,7 @@ pub fn default_token_file() -> Option<PathBuf> {
 }
 
 /// A new file that only its owner can read.
-pub(crate) fn private(path: &Path) -> io::Result<fs::File> {
+fn private(path: &Path) -> io::Result<fs::File> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]

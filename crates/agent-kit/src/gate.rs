@@ -1,0 +1,113 @@
+//! In front of every handler.
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{ConnectInfo, Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+use crate::access::{self, Access, Refusal, Role};
+use crate::api::Problem;
+use crate::log::CommandLog;
+
+/// Longest name of a client.
+const NAME_MAX: usize = 64;
+
+/// Who is let in, and where it is written down who was not.
+#[derive(Clone)]
+pub struct Gate {
+    access: Arc<Access>,
+    log: Arc<Mutex<CommandLog>>,
+}
+
+impl Gate {
+    /// One that lets in whom `access` does.
+    pub fn new(access: Access, log: Arc<Mutex<CommandLog>>) -> Self {
+        Self { access: Arc::new(access), log }
+    }
+
+    /// Writes a line to the log of commands.
+    pub fn note(&self, what: &str, facts: serde_json::Value) {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+    }
+}
+
+/// Who asks.
+#[derive(Clone, Debug)]
+pub struct Caller {
+    /// What it may do.
+    pub role: Role,
+    /// Where it is.
+    pub peer: SocketAddr,
+}
+
+/// A name without what would disturb a line of text.
+pub fn plain(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
+}
+
+impl Caller {
+    /// What people call a client that names itself so.
+    pub fn named(&self, name: &str) -> String {
+        let name = plain(name);
+        if name.is_empty() { self.peer.to_string() } else { name }
+    }
+}
+
+/// In front of every handler: who is it, and may it come in?
+pub async fn let_in(
+    State(gate): State<Gate>,
+    ConnectInfo(peer): ConnectInfo<SocketAddr>,
+    mut request: Request<Body>,
+    next: Next,
+) -> Response {
+    let headers = request.headers();
+    let asked = access::Request {
+        peer: peer.ip(),
+        host: text_of(headers, header::HOST),
+        origin: text_of(headers, header::ORIGIN),
+        token: text_of(headers, header::AUTHORIZATION)
+            .map(|value| value.strip_prefix("Bearer ").unwrap_or("")),
+    };
+    match gate.access.role(&asked) {
+        Ok(role) => {
+            request.extensions_mut().insert(Caller { role, peer });
+            let mut response = next.run(request).await;
+            let headers = response.headers_mut();
+            headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+            headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+            headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+            response
+        }
+        Err(refusal) => {
+            let path = request.uri().path().to_owned();
+            gate.note(
+                "refused",
+                json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() }),
+            );
+            refusal.into_response()
+        }
+    }
+}
+
+fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    // One that is no text is there, and is nobody's.
+    headers.get(name).map(|value| value.to_str().unwrap_or("?"))
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        let (status, next) = match &self {
+            Self::Host(_) => (StatusCode::FORBIDDEN, "use the address that the agent printed"),
+            Self::Origin(_) => (StatusCode::FORBIDDEN, "open the agent's own page"),
+            Self::WrongToken => (StatusCode::UNAUTHORIZED, "take the token from the agent's token file"),
+            Self::NoToken => (StatusCode::UNAUTHORIZED, "take a token from the agent's token file"),
+            Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
+        };
+        (status, Json(Problem::new("not-let-in", self.to_string(), next))).into_response()
+    }
+}

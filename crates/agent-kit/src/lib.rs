@@ -1,0 +1,10 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod access;
+pub mod api;
+pub mod gate;
+pub mod journal;
+pub mod log;
+pub mod serve;
+pub mod tls;

@@ -89,7 +89,7 @@ impl<E: Happening> Journal<E> {
         let more = found.len() > most;
         found.truncate(most);
         let last = if more { found.last().map_or(after, |event| event.number) } else { kept.last.max(after) };
-        Excerpt { events: found, last, missed: after + 1 < oldest }
+        Excerpt { events: found, last, missed: after.saturating_add(1) < oldest }
     }
 }
 

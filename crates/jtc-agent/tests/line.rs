@@ -367,3 +367,99 @@ fn a_stop_is_not_given_up_while_the_device_is_away() {
     board.run_ms(5_000);
     assert!(board.line.is_idle());
 }
+
+/// Behind a Stop only that moves the arm which was asked for after it, however long it has waited.
+#[test]
+fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
+    let mut board = Board::new(115_200);
+    let anna = operator(&mut board, "anna");
+    let bob = board.join("bob", Role::Viewer, Policy::Continue);
+    let now = board.now();
+    board.line.ask_to_move(anna, now).expect("nobody has stopped anything");
+    assert!(!board.line.is_halted(anna));
+    board.send(bob, &STOP);
+    board.run_ms(10_000);
+    assert!(board.line.is_halted(anna));
+    let before = board.arrived(FrameType::TrajSetExecStatus);
+    board.send(anna, &EXECUTE);
+    board.run_ms(1_000);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before, "it was asked for before the Stop");
+    let (_, denied) = board.take(anna);
+    assert!(denied.iter().any(|why| why.contains("bob has stopped")), "{denied:?}");
+    // Asked for anew it is sent, and what it pauses itself on its way it goes on from.
+    let now = board.now();
+    board.line.ask_to_move(anna, now).expect("it is long ago");
+    board.send(anna, &EXECUTE);
+    board.run_ms(1_000);
+    board.send(anna, &PAUSE);
+    board.run_ms(1_000);
+    board.send(anna, &EXECUTE);
+    board.run_ms(1_000);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before + 3);
+}
+
+#[test]
+fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_well() {
+    let mut board = Board::new(115_200);
+    let anna = operator(&mut board, "anna");
+    let now = board.now();
+    board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
+    board.run_ms(100);
+    let now = board.now();
+    board.line.ask_to_move(anna, now).expect("her own");
+    board.line.halt_for(None, "bob", ExecCommand::Pause, now);
+    board.run_ms(100);
+    let now = board.now();
+    board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
+    board.run_ms(100);
+    let now = board.now();
+    assert!(board.line.ask_to_move(anna, now).is_err(), "bob's counts");
+    // She comes again, and the three seconds are the same.
+    board.line.leave(anna, now);
+    let again = operator(&mut board, "anna");
+    let now = board.now();
+    assert!(board.line.ask_to_move(again, now).is_err(), "bob's counts");
+    let before = board.arrived(FrameType::TrajSetExecStatus);
+    board.send(again, &EXECUTE);
+    board.run_ms(200);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before);
+    board.run_ms(3_500);
+    let now = board.now();
+    board.line.ask_to_move(again, now).expect("it is over");
+}
+
+/// A client whose policy has ended its motion begins no other one by itself, also where somebody else has gone on with the first.
+#[test]
+fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
+    let mut board = Board::new(115_200);
+    let anna = board.join("anna", Role::Operator, Policy::Pause);
+    let now = board.now();
+    board.line.take_lease(anna, Some(Duration::from_secs(1)), now).expect("nobody has it");
+    board.line.ask_to_move(anna, now).expect("nobody has stopped anything");
+    board.send(anna, &EXECUTE);
+    board.run_ms(1_500);
+    assert!(board.line.lease().is_none());
+    board.run_ms(4_000);
+    let bob = operator(&mut board, "bob");
+    let now = board.now();
+    board.line.ask_to_move(bob, now).expect("it is long ago");
+    board.send(bob, &EXECUTE);
+    board.run_ms(200);
+    board.line.leave(bob, board.now());
+    let before = board.arrived(FrameType::TrajSetExecStatus);
+    board.send(anna, &EXECUTE);
+    board.run_ms(1_000);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before, "anna's next motion is not begun");
+}
+
+#[test]
+fn a_lease_that_lapses_goes_to_the_one_who_has_asked_for_it() {
+    let mut board = Board::new(115_200);
+    let anna = operator(&mut board, "anna");
+    let bob = operator(&mut board, "bob");
+    let now = board.now();
+    board.line.take_lease(anna, Some(Duration::from_secs(1)), now).expect("nobody has it");
+    board.line.want_lease(bob).expect("anna has it");
+    board.run_ms(1_200);
+    assert_eq!(board.line.lease().map(|lease| lease.holder), Some(bob));
+}

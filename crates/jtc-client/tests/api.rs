@@ -200,6 +200,12 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
+        // Behind the halt of the one before.
+        let halted =
+            || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": [0.0; 6] }))).1["code"] == "denied";
+        while halted() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
         anna.recover();
         let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
         let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
@@ -288,4 +294,105 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
         "{error}"
     );
     assert!(error["cause"].as_str().is_some_and(|cause| !cause.is_empty()), "{error}");
+}
+
+#[test]
+fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
+    let served = Served::start(115_200);
+    trajectory(&served, 1, 5.0);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    anna.recover();
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let zeros = [0.0; 6];
+    for (request, body) in [
+        ("POST /api/runs", json!({ "trajectory": 1 })),
+        ("POST /api/moves", json!({ "to_rad": zeros })),
+        ("POST /api/jog", json!({ "rates_rad_s": zeros })),
+        ("POST /api/teach", json!({ "on": true })),
+        ("POST /api/recover", json!({})),
+    ] {
+        let (status, denied) = anna.ask(request, Some(body));
+        assert_eq!((status, denied["code"].as_str()), (409, Some("denied")), "{request}: {denied}");
+    }
+    // Nor for one who comes again, and asking again and again does not put it off.
+    assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    let asked = Instant::now();
+    while anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": zeros }))).0 == 409 {
+        assert!(asked.elapsed() < Duration::from_secs(20), "it is put off");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    assert!(!moves(&served));
+}
+
+#[test]
+fn a_speed_that_is_none_is_refused_and_one_that_is_shows_in_the_motion() {
+    let served = Served::start(921_600);
+    trajectory(&served, 1, 10.0);
+    let anna = Program::new(&served, "anna", 30.0, "continue");
+    anna.recover();
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
+    event(&served, 0, "executing");
+    for percent in [0, 4, 101] {
+        assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": percent }))).0, 422);
+    }
+    let (_, denied) = anna.ask("POST /api/resume", None);
+    assert_eq!(denied["code"], "not-paused", "{denied}");
+    let point = || served.line.with(|line, _| line.status().map_or(0, |(_, status)| status.point));
+    assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 10 }))).0, 204);
+    std::thread::sleep(Duration::from_millis(500));
+    let (began, from) = (Instant::now(), point());
+    std::thread::sleep(Duration::from_secs(1));
+    let way = f64::from(point() - from) / 1000.0 / began.elapsed().as_secs_f64();
+    assert!(way < 0.3, "{way} of its speed");
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    assert_eq!(anna.over(job)["stage"], "stopped");
+}
+
+#[test]
+fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() {
+    let served = Served::start(921_600);
+    trajectory(&served, 1, 20.0);
+    let anna = Program::new(&served, "anna", 1.5, "stop");
+    anna.recover();
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "policy": "continue" }));
+    assert_eq!(anna.over(job)["stage"], "finished");
+    let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
+    event(&served, last, "executing");
+    assert_eq!(over(&served, job, || {})["stage"], "stopped", "by its lease's own policy");
+    // Somebody else's motion is ended by the way back.
+    std::thread::sleep(Duration::from_secs(3));
+    let bob = Program::new(&served, "bob", 30.0, "continue");
+    let job = bob.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
+    let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
+    event(&served, last, "moving");
+    drop(served.get("POST /api/pause"));
+    std::thread::sleep(Duration::from_secs(4));
+    assert_eq!(served.api("GET /api/jobs", None, None).1.as_array().map(|jobs| jobs.is_empty()), Some(false));
+    assert_eq!(bob.ask("POST /api/stop", None).0, 200);
+    assert_eq!(bob.over(job)["stage"], "stopped");
+    bob.recover();
+}
+
+#[test]
+fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    for _ in 0..40 {
+        let (status, grant) =
+            served.api("POST /api/lease", None, Some(json!({ "name": "again", "ask": true })));
+        assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
+    }
+    assert_eq!(anna.ask("PUT /api/lease", None).1["held"], true);
+    assert_eq!(served.api("POST /api/lease", None, Some(json!({ "name": "x", "lasts_s": 61 }))).0, 422);
+}
+
+#[test]
+fn numbers_at_the_end_of_all_numbers_are_answered() {
+    let served = Served::start(921_600);
+    let last = u64::MAX;
+    let (status, found) = served.api(&format!("GET /api/events?after={last}"), None, None);
+    assert_eq!((status, found["events"].clone()), (200, json!([])));
+    assert_eq!(served.api(&format!("GET /api/jobs/{last}"), None, None).0, 404);
 }

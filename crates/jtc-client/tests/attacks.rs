@@ -64,7 +64,7 @@ fn what_is_long_or_wrong_changes_nothing() {
     let host = format!("Host: {}", served.address);
     for (request, line) in [
         ("POST /api/stop", "Content-Type: text/plain"),
-        ("POST /api/lease", "X: y"),
+        ("POST /api/leases", "X: y"),
         ("GET /api/line?policy=none", "Upgrade: websocket"),
         ("GET /api/line?name=x&more=y", "Upgrade: websocket"),
     ] {

@@ -12,15 +12,18 @@ use super::error::Denials;
 use super::objects::PayloadObject;
 use super::runs::JobObject;
 use super::{Agent, Caller, ErrorObject};
-use crate::jobs::Done;
+use crate::jobs::{Commander, Done, Turn};
 use crate::owner::ClientPort;
+
+/// Slowest speed, % (J-57).
+const SPEED_MIN: u8 = 5;
 
 /// % of the speed of the trajectory.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpeedObject {
-    /// 0 to 100: 0 holds the arm on its path.
-    #[schema(minimum = 0, maximum = 100)]
+    /// 5 to 100.
+    #[schema(minimum = 5, maximum = 100)]
     pub percent: u8,
 }
 
@@ -51,8 +54,8 @@ pub struct RecoverRequest {
 }
 
 impl Agent {
-    /// Has the end of the line of the client that commands do something, and logs that it was asked for.
-    pub(super) async fn command<T, E>(
+    /// Has the end of the line of the client that commands do something that moves nothing.
+    async fn command<T, E>(
         &self,
         caller: &Caller,
         headers: &HeaderMap,
@@ -64,14 +67,59 @@ impl Agent {
         E: Into<Error> + Send + 'static,
     {
         let commander = self.commander(caller, headers)?;
-        let done = commander
-            .call(act)
-            .await
-            .map_err(ErrorObject::from)
-            .and_then(|done| done.map_err(|error| ErrorObject::of(&error.into())));
-        let why = done.as_ref().err().map(|error| error.message.clone());
-        self.note("command", json!({ "client": commander.client.0, "command": what, "why_not": why }));
-        done
+        let turn = commander.turn()?;
+        self.act(&commander, turn, what, act).await
+    }
+
+    /// The same for what may move the arm.
+    async fn motion<T, E>(
+        &self,
+        caller: &Caller,
+        headers: &HeaderMap,
+        what: &'static str,
+        act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
+    ) -> Result<T, ErrorObject>
+    where
+        T: Send + 'static,
+        E: Into<Error> + Send + 'static,
+    {
+        let (commander, turn) = self.mover(caller, headers)?;
+        self.act(&commander, turn, what, act).await
+    }
+
+    /// Does it, and logs it whether or not somebody waits for the end of it.
+    async fn act<T, E>(
+        &self,
+        commander: &Commander,
+        turn: Turn,
+        what: &'static str,
+        act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
+    ) -> Result<T, ErrorObject>
+    where
+        T: Send + 'static,
+        E: Into<Error> + Send + 'static,
+    {
+        let (agent, client) = (self.clone(), commander.client.0);
+        let logged = move |session: &mut Session<ClientPort>| {
+            let done = act(session).map_err(|error| ErrorObject::of(&error.into()));
+            let why = done.as_ref().err().map(|error| error.message.clone());
+            agent.note("command", json!({ "client": client, "command": what, "why_not": why }));
+            done
+        };
+        commander.act(turn, logged).await?
+    }
+
+    /// Wishes something of the motion that is going on. `None`: no motion of this client is going on.
+    async fn wish(&self, commander: &Commander, flow: Flow) -> Option<Result<(), ErrorObject>> {
+        let done = commander.wish(flow)?;
+        let ended = || {
+            ErrorObject::new(
+                "motion-ended",
+                "the motion had ended before this was done",
+                "GET /api/jobs shows how",
+            )
+        };
+        Some(done.await.unwrap_or_else(|_| Err(ended())))
     }
 }
 
@@ -88,16 +136,14 @@ pub(super) async fn resume(
     headers: HeaderMap,
 ) -> Result<StatusCode, ErrorObject> {
     let commander = agent.commander(&caller, &headers)?;
-    // What somebody else has just paused or stopped stays so for a while.
-    let may_move = agent.line.with(|line, now| {
-        line.go_on_after(commander.client, commander.last_halt(), now);
-        line.may_move(commander.client, now)
-    });
-    may_move.map_err(ErrorObject::from)?;
-    if commander.wish(Flow::Resume) {
-        return Ok(StatusCode::NO_CONTENT);
+    if commander.is_moving() {
+        // The job that is going on is what goes on, and nothing else of this client can be waiting.
+        agent.line.with(|line, now| line.ask_to_move(commander.client, now))?;
+        if let Some(done) = agent.wish(&commander, Flow::Resume).await {
+            return done.map(|()| StatusCode::NO_CONTENT);
+        }
     }
-    agent.command(&caller, &headers, "resume", Session::resume).await?;
+    agent.motion(&caller, &headers, "resume", Session::resume).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -116,14 +162,15 @@ pub(super) async fn speed(
     headers: HeaderMap,
     Body(SpeedObject { percent }): Body<SpeedObject>,
 ) -> Result<StatusCode, ErrorObject> {
-    if percent > 100 {
-        let message = format!("{percent} % is no speed: 0 to 100 are possible");
+    if !(SPEED_MIN..=100).contains(&percent) {
+        let message = format!("{percent} % is no speed: {SPEED_MIN} to 100 are possible");
         return Err(
             ErrorObject::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
         );
     }
-    if agent.commander(&caller, &headers)?.wish(Flow::Speed(percent)) {
-        return Ok(StatusCode::NO_CONTENT);
+    let commander = agent.commander(&caller, &headers)?;
+    if let Some(done) = agent.wish(&commander, Flow::Speed(percent)).await {
+        return done.map(|()| StatusCode::NO_CONTENT);
     }
     let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(percent) / 100.0);
     agent.command(&caller, &headers, "speed", set).await?;
@@ -144,7 +191,7 @@ pub(super) async fn jog(
     headers: HeaderMap,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
 ) -> Result<StatusCode, ErrorObject> {
-    agent.command(&caller, &headers, "jog", move |session| session.jog(&rates_rad_s)).await?;
+    agent.motion(&caller, &headers, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -162,7 +209,12 @@ pub(super) async fn teach(
     headers: HeaderMap,
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
-    agent.command(&caller, &headers, "teach", move |session| session.teach(on)).await?;
+    let act = move |session: &mut Session<ClientPort>| session.teach(on);
+    if on {
+        agent.motion(&caller, &headers, "teach", act).await?;
+    } else {
+        agent.command(&caller, &headers, "teach", act).await?;
+    }
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -257,12 +309,11 @@ pub(super) async fn recover(
     headers: HeaderMap,
     Body(RecoverRequest { defaults }): Body<RecoverRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let commander = agent.commander(&caller, &headers)?;
-    let job = agent.jobs.begin(&commander, "recover".into(), move |task, session| {
+    let (commander, turn) = agent.mover(&caller, &headers)?;
+    let job = agent.jobs.begin(&commander, turn, "recover".into(), move |task, session| {
         let source = if defaults { ParameterSource::ControllerDefaults } else { ParameterSource::None };
-        let halt = task.halt;
         let recovered =
-            session.recover_until(source, || task.is_halted(halt), |step| task.note(step.to_string()));
+            session.recover_until(source, || task.is_halted(), |step| task.note(step.to_string()));
         let error = match recovered {
             Ok(_) => None,
             Err(Error::Cancelled) => Some(task.stopped()),

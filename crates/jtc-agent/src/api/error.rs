@@ -90,6 +90,11 @@ impl ErrorObject {
         Self { status: StatusCode::FORBIDDEN, ..self }
     }
 
+    /// What was sent cannot be read.
+    pub(super) fn rejected(status: StatusCode, message: String) -> Self {
+        Self { status, ..Self::new("request", message, "GET /openapi.json describes each request") }
+    }
+
     /// The request itself is wrong.
     pub(super) fn unreadable(self) -> Self {
         Self { status: StatusCode::BAD_REQUEST, ..self }
@@ -144,6 +149,7 @@ impl From<Denied> for ErrorObject {
             }
             Denied::Viewer => "use the operator's token",
             Denied::Stopped { .. } => "wait three seconds, and ask again when the arm may move",
+            Denied::Gone => "take the lease with POST /api/lease",
             Denied::NotHolder => "take the lease with POST /api/lease",
         };
         let object = Self::new("denied", denied.to_string(), next);

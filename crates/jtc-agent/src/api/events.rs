@@ -85,6 +85,8 @@ pub(super) async fn events(
             ErrorObject::new("request", message, "ask again from `last` on to wait longer").unreadable()
         );
     }
+    let place = agent.waiting.try_acquire();
+    let wait_s = if place.is_ok() { wait_s } else { 0.0 };
     let end = Instant::now() + Duration::from_secs_f64(wait_s);
     let mut changes = agent.jobs.journal.changes();
     loop {
@@ -141,7 +143,7 @@ async fn send(agent: &Agent, caller: &Caller, after: Option<u64>, mut socket: We
     let (mut last, mut due) = (None, Instant::now());
     loop {
         let excerpt = agent.jobs.journal.after(after, None, EVENTS_MAX);
-        if !excerpt.events.is_empty() || excerpt.missed {
+        if !excerpt.events.is_empty() || (excerpt.missed && excerpt.last != after) {
             after = excerpt.last;
             if !pass(&mut socket, &StreamMessage::Events(agent.events(excerpt))).await {
                 return;

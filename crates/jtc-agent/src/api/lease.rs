@@ -13,13 +13,13 @@ use utoipa::ToSchema;
 
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
-use crate::jobs::{Commander, Unable};
+use crate::jobs::{Commander, Turn, Unable};
 use crate::line::{Denied, Introduction, Policy, Role};
 
 /// The header with the key of a lease.
 pub(super) const KEY: &str = "lease-key";
 /// How long a lease may last without a request, s.
-const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
+const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
 
 /// Who wants to command.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -29,7 +29,7 @@ pub struct LeaseRequest {
     pub name: String,
     /// How long the lease lasts without a request of this client, s.
     #[serde(default = "ten")]
-    #[schema(minimum = 1, maximum = 3600)]
+    #[schema(minimum = 1, maximum = 60)]
     pub lasts_s: f64,
     /// What becomes of a motion when it has lapsed.
     #[serde(default)]
@@ -79,6 +79,19 @@ impl Agent {
         Ok(commander)
     }
 
+    /// The same, for what may move the arm: nothing that was asked for before this moves it any more where somebody has stopped it, and
+    /// nothing at all for three seconds then. The turn is taken first: what still waits for its own is not let through by this.
+    pub(super) fn mover(
+        &self,
+        caller: &Caller,
+        headers: &HeaderMap,
+    ) -> Result<(Arc<Commander>, Turn), ErrorObject> {
+        let commander = self.commander(caller, headers)?;
+        let turn = commander.turn()?;
+        self.line.with(|line, now| line.ask_to_move(commander.client, now))?;
+        Ok((commander, turn))
+    }
+
     /// The client that asks with a key, and how often it does at least.
     pub(super) fn client(
         &self,
@@ -121,7 +134,7 @@ pub(super) async fn take(
     }
     let LeaseRequest { name, lasts_s, policy, ask } = request;
     if !LASTS_S.contains(&lasts_s) {
-        let message = format!("lasts_s is {lasts_s}: 1 to 3600 s are possible");
+        let message = format!("lasts_s is {lasts_s}: 1 to 60 s are possible");
         return Err(ErrorObject::new("lease", message, "choose how long it may last without a request")
             .kind(ErrorKind::Usage));
     }
@@ -192,9 +205,12 @@ pub(super) async fn release(
     headers: HeaderMap,
 ) -> Result<StatusCode, ErrorObject> {
     let (commander, _) = agent.client(&caller, &headers)?;
-    if let Some(job) = commander.job() {
-        return Err(Unable::Busy(Some(job)).into());
-    }
+    let turn = match commander.turn() {
+        Ok(turn) => Some(turn),
+        // Its thread is gone: it has nothing going on.
+        Err(Unable::Gone) => None,
+        Err(busy) => return Err(busy.into()),
+    };
     // One that waits has none to give.
     let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
     agent.line.wake();
@@ -202,5 +218,6 @@ pub(super) async fn release(
     if let Some(key) = headers.get(KEY).and_then(|key| key.to_str().ok()) {
         agent.jobs.dismiss(key);
     }
+    drop(turn);
     Ok(StatusCode::NO_CONTENT)
 }

@@ -31,7 +31,6 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::jobs::Jobs;
-use crate::line::OWNER;
 use crate::owner::Line;
 
 pub use error::ErrorObject;
@@ -43,8 +42,11 @@ const BODY_MAX: usize = 64 << 10;
 /// Longest of a trajectory: 12,000 points as text, with room to spare. So many of them are read at once.
 const TRAJECTORY_MAX: usize = 16 << 20;
 const TRAJECTORIES_AT_ONCE: usize = 4;
+const CHECKS_AT_ONCE: usize = 2;
+/// Requests that wait for an event, at once: more are answered at once. They leave room for the connections of others.
+const WAITING_MAX: usize = 64;
 /// Longest that a request may take.
-const REQUEST_TIME: Duration = Duration::from_secs(10);
+const REQUEST_TIME: Duration = Duration::from_secs(15);
 /// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
@@ -62,6 +64,9 @@ pub struct Agent {
     viewers: Arc<Semaphore>,
     operators: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
+    /// Checks of trajectories at once, and requests that wait for an event.
+    checks: Arc<Semaphore>,
+    waiting: Arc<Semaphore>,
 }
 
 impl Agent {
@@ -89,6 +94,8 @@ impl Agent {
             viewers: room(VIEWERS_MAX),
             operators: room(OPERATORS_MAX),
             bodies: room(TRAJECTORIES_AT_ONCE),
+            checks: room(CHECKS_AT_ONCE),
+            waiting: room(WAITING_MAX),
         })
     }
 
@@ -132,13 +139,8 @@ impl Agent {
             let object = ErrorObject::new("no-link", message, "the emergency stop, if it is");
             return Err(object.kind(ErrorKind::NoLink));
         }
-        let number = self.line.with(|line, now| {
-            line.halt(OWNER, &name, command, now);
-            line.last_halt()
-        });
-        if let Some(client) = client {
-            client.has_halted(number);
-        }
+        let client = client.map(|client| client.client);
+        self.line.with(|line, now| line.halt_for(client, &name, command, now));
         Ok(Json(SentObject { sent: command.name().to_owned() }))
     }
 

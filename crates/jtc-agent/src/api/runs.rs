@@ -222,12 +222,14 @@ fn begin(
     policy: Option<Policy>,
     order: Order,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let commander = agent.commander(caller, headers)?;
-    let job = agent.jobs.begin(&commander, what.clone(), move |task, session| run(task, session, &order))?;
-    // Only now: a job that goes on keeps its own.
-    if let Some(policy) = policy {
-        agent.line.with(|line, _| line.set_policy(commander.client, policy));
-    }
+    let (commander, turn) = agent.mover(caller, headers)?;
+    let (client, own) = (commander.client, commander.policy);
+    agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
+    let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {
+        let done = run(task, session, &order);
+        task.line.with(|line, _| line.set_policy(client, own));
+        done
+    })?;
     agent.note(
         "job",
         json!({ "client": commander.client.0, "job": job.number, "what": what, "policy": policy }),

@@ -1,5 +1,7 @@
 //! Trajectories by number: kept, checked, listed.
-use agent_kit::api::{Body, Number, Refusals};
+use agent_kit::api::{Number, Refusals};
+use agent_kit::gate::plain;
+use axum::body::Bytes;
 use axum::extract::{FromRequest as _, Request, State};
 use axum::http::StatusCode;
 use axum::{Extension, Json};
@@ -140,27 +142,27 @@ pub(super) async fn put(
     request: Request,
 ) -> Result<Json<TrajectoryObject>, ErrorObject> {
     operator(&caller)?;
-    let room = agent.bodies.acquire().await;
-    let Body(request): Body<TrajectoryRequest> = Body::from_request(request, &()).await?;
-    keep(&agent, &caller, number, request).await.inspect(|_| drop(room))
+    let room = agent.bodies.clone().acquire_owned().await;
+    let body = Bytes::from_request(request, &())
+        .await
+        .map_err(|e| ErrorObject::rejected(e.status(), e.body_text()))?;
+    // Until it is done, whether or not somebody waits for it: what is long is read beside the threads that serve.
+    blocking(move || {
+        let kept = keep(&agent, number, &body);
+        let (from, why) = (caller.peer.to_string(), kept.as_ref().err().map(|error| error.message.clone()));
+        agent.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
+        drop(room);
+        kept.map(Json)
+    })
+    .await?
 }
 
-async fn keep(
-    agent: &Agent,
-    caller: &Caller,
-    number: u16,
-    request: TrajectoryRequest,
-) -> Result<Json<TrajectoryObject>, ErrorObject> {
+fn keep(agent: &Agent, number: u16, body: &[u8]) -> Result<TrajectoryObject, ErrorObject> {
+    let request = serde_json::from_slice(body)
+        .map_err(|e| ErrorObject::rejected(StatusCode::BAD_REQUEST, e.to_string()))?;
     let TrajectoryRequest { name, text, degrees } = request;
-    let name = agent_kit::gate::plain(&name);
-    let jobs = agent.jobs.clone();
-    let kept = blocking(move || jobs.store.put(number, &name, &text, degrees)).await?;
-    let stored = kept.map_err(|e| ErrorObject::diagnosed(&e))?;
-    agent.note(
-        "trajectory",
-        json!({ "number": number, "name": stored.name, "from": caller.peer.to_string() }),
-    );
-    Ok(Json(TrajectoryObject::from(&*stored)))
+    let stored = agent.jobs.store.put(number, &plain(&name), &text, degrees);
+    stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
 }
 
 /// Keeps it no more.
@@ -211,7 +213,7 @@ pub(super) async fn check(
         .store
         .get(number)
         .ok_or_else(|| ErrorObject::nothing("trajectory", number, "/api/trajectories"))?;
-    let own = agent.jobs.arm().clone();
+    let (own, room) = (agent.jobs.arm().clone(), agent.checks.clone().acquire_owned().await);
     let asked = move |session: &mut Session<ClientPort>| -> Result<(Arm, CheckOptions), Error> {
         let device = session.device_config()?;
         let arm = if session.has_extensions() { session.device_arm()? } else { own };
@@ -220,8 +222,12 @@ pub(super) async fn check(
     let asked = agent.jobs.asker().call_in_turn(asked).await?;
     let (arm, options) = asked?;
     let start = stored.trajectory.points.first().map_or([0.0; 6], |point| point.position);
-    let checked =
-        blocking(move || CheckedTrajectory::check(&stored.trajectory, &arm, &start, &options)).await?;
+    let checked = blocking(move || {
+        let checked = CheckedTrajectory::check(&stored.trajectory, &arm, &start, &options);
+        drop(room);
+        checked
+    })
+    .await?;
     match checked {
         Ok(checked) => Ok(Json(CheckObject::from(checked.verdict()))),
         Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::from(&*verdict))),

@@ -1,15 +1,16 @@
 //! A client that has no connection of its own: it asks by HTTP, and shows by each request that it is there.
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::api::ErrorObject;
 use jtc_host::Session;
 use jtc_host::session::Flow;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-use crate::line::{ClientId, Introduction};
+use crate::line::{ClientId, Introduction, Policy};
 use crate::owner::{ClientPort, Line};
 
 /// How often a client without work takes in what the controller reports.
@@ -28,10 +29,20 @@ pub struct Commander {
     /// One thing at a time.
     free: Arc<Semaphore>,
     /// The job that is going on, and what is wished of it.
-    job: Mutex<Option<(u64, SyncSender<Flow>)>>,
+    job: Mutex<Option<(u64, SyncSender<Wish>)>>,
     seen: Mutex<Instant>,
-    /// The last Stop or Pause that it asked for itself, by number.
-    halt: AtomicU64,
+    /// The policy that its lease was taken with.
+    pub policy: Policy,
+    /// A motion is going on, and what is wished of it is done.
+    moves: AtomicBool,
+}
+
+/// What is wished of a motion, and who is to know what came of it.
+pub struct Wish {
+    /// What.
+    pub flow: Flow,
+    /// Receives what came of it.
+    pub done: oneshot::Sender<Result<(), ErrorObject>>,
 }
 
 /// The turn to do something with a client's end of the line; it is over when this is dropped.
@@ -49,15 +60,15 @@ pub enum Unable {
 impl Commander {
     /// A client of this line from now on.
     pub fn new(line: &Line, introduction: Introduction) -> Arc<Self> {
-        let name = introduction.name.clone();
+        let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
         let client = port.client();
         // One waits while the one before is being taken.
         let (work, incoming) = sync_channel(1);
         std::thread::spawn(move || serve(port, &incoming));
         let seen = Mutex::new(Instant::now());
-        let (free, job, halt) = (Arc::new(Semaphore::new(1)), Mutex::default(), AtomicU64::new(0));
-        Arc::new(Self { client, name, work, free, job, seen, halt })
+        let (free, job, moves) = (Arc::new(Semaphore::new(1)), Mutex::default(), AtomicBool::new(false));
+        Arc::new(Self { client, name, policy, work, free, job, seen, moves })
     }
 
     /// It has asked for something.
@@ -65,14 +76,14 @@ impl Commander {
         *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
     }
 
-    /// It asked for this Stop or Pause.
-    pub fn has_halted(&self, number: u64) {
-        self.halt.store(number, Ordering::Relaxed);
+    /// A motion is going on.
+    pub fn is_moving(&self) -> bool {
+        self.moves.load(Ordering::Acquire)
     }
 
-    /// The last one that it asked for.
-    pub fn last_halt(&self) -> u64 {
-        self.halt.load(Ordering::Relaxed)
+    /// A motion begins, or has ended: what is wished of it is done from then on, or no more.
+    pub fn set_moving(&self, moves: bool) {
+        self.moves.store(moves, Ordering::Release);
     }
 
     /// For how long it has not asked for anything, nor has it anything going on.
@@ -97,19 +108,7 @@ impl Commander {
         self.free.clone().try_acquire_owned().map(Turn).map_err(|_| Unable::Busy(self.job()))
     }
 
-    /// Does something that is soon over, and returns what comes of it.
-    ///
-    /// # Errors
-    ///
-    /// [`Unable`]: nothing was done.
-    pub async fn call<T: Send + 'static>(
-        &self,
-        act: impl FnOnce(&mut Session<ClientPort>) -> T + Send + 'static,
-    ) -> Result<T, Unable> {
-        self.act(self.turn()?, act).await
-    }
-
-    /// The same, when its turn has come.
+    /// Does something that is soon over when its turn has come.
     ///
     /// # Errors
     ///
@@ -122,7 +121,12 @@ impl Commander {
         self.act(Turn(turn), act).await
     }
 
-    async fn act<T: Send + 'static>(
+    /// Does something in its turn.
+    ///
+    /// # Errors
+    ///
+    /// [`Unable::Gone`].
+    pub async fn act<T: Send + 'static>(
         &self,
         turn: Turn,
         act: impl FnOnce(&mut Session<ClientPort>) -> T + Send + 'static,
@@ -148,7 +152,7 @@ impl Commander {
         self: &Arc<Self>,
         turn: Turn,
         job: u64,
-        act: impl FnOnce(&mut Session<ClientPort>, &Receiver<Flow>) -> T + Send + 'static,
+        act: impl FnOnce(&mut Session<ClientPort>, &Receiver<Wish>) -> T + Send + 'static,
         then: impl FnOnce(T) + Send + 'static,
     ) -> Result<(), Unable> {
         let (wishes, wished) = sync_channel(4);
@@ -169,13 +173,18 @@ impl Commander {
         })
     }
 
-    /// Wishes something of the motion that is going on. False: there is none.
-    pub fn wish(&self, wish: Flow) -> bool {
+    /// Wishes something of the motion that is going on; what is returned receives what came of it. `None`: no motion is going on.
+    pub fn wish(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), ErrorObject>>> {
+        if !self.moves.load(Ordering::Acquire) {
+            return None;
+        }
+        let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        job.as_ref().is_some_and(|(_, wishes)| wishes.try_send(wish).is_ok())
+        let (_, wishes) = job.as_ref()?;
+        wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
 
-    fn set_job(&self, job: Option<(u64, SyncSender<Flow>)>) {
+    fn set_job(&self, job: Option<(u64, SyncSender<Wish>)>) {
         *self.job.lock().unwrap_or_else(PoisonError::into_inner) = job;
     }
 }

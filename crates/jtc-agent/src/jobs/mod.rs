@@ -11,10 +11,9 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use jtc_host::session::Flow;
 use jtc_host::{Arm, Session};
 
-pub use commander::{Commander, Unable};
+pub use commander::{Commander, Turn, Unable, Wish};
 pub use happening::{EventObject, Happening, Journal};
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
@@ -31,6 +30,8 @@ const KEPT: usize = 256;
 const COMMANDERS_MAX: usize = 32;
 /// A client that has asked for nothing for so long behind the end of its lease is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
+/// Stops and Pauses are written at most so often, the last one always: one who repeats them is not to crowd out what others did.
+const HALTS_APART: Duration = Duration::from_millis(200);
 /// How often is looked whether something has changed where nothing announces it.
 const LOOK: Duration = Duration::from_millis(200);
 
@@ -109,11 +110,18 @@ impl Jobs {
 
     /// A client comes that will ask with `key`, and shows at least so often that it is there. `None`: there is no room for another.
     pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<Commander>> {
+        let commander = Commander::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.commanders.len() >= COMMANDERS_MAX {
-            return None;
+            // One that neither commands nor does anything makes room: a program that is begun again and again keeps nobody out.
+            let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
+            let idle = kept
+                .commanders
+                .iter()
+                .filter(|(_, (other, _))| Some(other.client) != holder && other.idle() > Duration::ZERO);
+            let longest = idle.max_by_key(|(_, (other, _))| other.idle()).map(|(key, _)| key.clone())?;
+            kept.commanders.remove(&longest);
         }
-        let commander = Commander::new(&self.line, introduction);
         kept.commanders.insert(key.to_owned(), (commander.clone(), lasts));
         Some(commander)
     }
@@ -130,7 +138,7 @@ impl Jobs {
         self.lock().commanders.remove(key);
     }
 
-    /// Begins a job for a client: `act` is given the number of the last Stop or Pause that it was asked for after.
+    /// Begins a job for a client, in its turn.
     ///
     /// # Errors
     ///
@@ -138,11 +146,10 @@ impl Jobs {
     pub fn begin(
         self: &Arc<Self>,
         commander: &Arc<Commander>,
+        turn: Turn,
         what: String,
         act: impl FnOnce(&Task<'_>, &mut Session<ClientPort>) -> (Done, Option<ErrorObject>) + Send + 'static,
     ) -> Result<Job, Unable> {
-        let turn = commander.turn()?;
-        let halt = self.line.last_halt();
         let client = commander.name.clone();
         let job = {
             let mut kept = self.lock();
@@ -151,13 +158,14 @@ impl Jobs {
         };
         // Before it can end.
         self.remember(job.clone());
-        let (own, begun) = (self.clone(), job.clone());
+        let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(commander));
         let unfinished = Unfinished { jobs: self.clone(), number: job.number };
-        let work = move |session: &mut Session<ClientPort>, wishes: &Receiver<Flow>| {
+        let work = move |session: &mut Session<ClientPort>, wishes: &Receiver<Wish>| {
+            let Some(commander) = whose.upgrade() else { return (Done::default(), None) };
             let Job { number, what, client, .. } = begun;
             let Self { line, journal, arm, .. } = &*own;
             journal.write(Happening::Begun { job: number, what, client });
-            act(&Task { wishes, job: number, journal, line, halt, arm }, session)
+            act(&Task { wishes, job: number, journal, line, commander: &commander, arm }, session)
         };
         let accepted =
             commander.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));
@@ -238,10 +246,12 @@ impl Stage {
 }
 
 /// What the journal says of the line itself.
-#[derive(Default, PartialEq)]
+#[derive(Default)]
 struct Seen {
     holder: Option<String>,
     halt: u64,
+    /// When the last one was written.
+    halted: Option<Instant>,
     state: Option<(String, String, Vec<String>)>,
     lost: Option<String>,
 }
@@ -278,8 +288,8 @@ fn see(jobs: &Jobs, seen: &mut Seen) {
         seen.holder.clone_from(&holder);
         jobs.journal.write(Happening::Lease { holder });
     }
-    if halt != seen.halt {
-        seen.halt = halt;
+    if halt != seen.halt && seen.halted.is_none_or(|at| at.elapsed() >= HALTS_APART) {
+        (seen.halt, seen.halted) = (halt, Some(Instant::now()));
         let (by, command) = by;
         jobs.journal.write(Happening::Halt { command, by });
     }

@@ -1,15 +1,18 @@
 //! A run: waits until the arm can be moved, checks, uploads, executes and follows, and reports each step.
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::{self, Planner};
-use jtc_host::report::Summary;
+use jtc_host::recording::RecordingInfo;
+use jtc_host::report::{Digest, Summary};
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Session, Trajectory};
-use jtc_wire::{Status, TrajectoryState};
+use jtc_wire::Status;
 
-use super::{Happening, Task};
+use super::{Happening, Task, Wish};
 use crate::api::ErrorObject;
 use crate::owner::ClientPort;
 
@@ -55,14 +58,12 @@ pub struct Done {
 struct Run<'a> {
     task: &'a Task<'a>,
     session: &'a mut Session<ClientPort>,
-    /// The last Stop or Pause that was meant for what this run did before.
-    halt: u64,
 }
 
 /// Runs what was ordered: how far it came, and what forbids it, or ended it in a fault.
 pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<ErrorObject>) {
     let mut done = Done::default();
-    let error = Run { task, session, halt: task.halt }.go(order, &mut done).err();
+    let error = Run { task, session }.go(order, &mut done).err();
     (done, error)
 }
 
@@ -74,9 +75,9 @@ struct Site {
 
 impl Run<'_> {
     fn go(&mut self, order: &Order, done: &mut Done) -> Result<(), ErrorObject> {
-        let (task, halt) = (self.task, self.halt);
+        let task = self.task;
         let waits = |what| task.note(format!("waiting until {what}"));
-        let ready = self.session.ready_to_move(waits, || task.is_halted(halt));
+        let ready = self.session.ready_to_move(waits, || task.is_halted());
         let mut status = ready.map_err(|error| self.before_motion(&error))?;
         let site = self.site(order)?;
         let trajectory = self.trajectory(order, &site, &status)?;
@@ -164,7 +165,7 @@ impl Run<'_> {
         site: &Site,
         done: &mut Done,
     ) -> Result<bool, ErrorObject> {
-        let (task, halt) = (self.task, self.halt);
+        let task = self.task;
         let Task { job, journal, wishes, .. } = *task;
         let phase = || phase.to_owned();
         journal.write(Happening::Checked {
@@ -182,32 +183,47 @@ impl Run<'_> {
                 shown = segments_done * 10 / segments.max(1);
                 journal.write(Happening::Uploading { job, phase: phase(), segments_done, segments });
             }
-            if task.is_halted(halt) { Flow::Cancel } else { Flow::Continue }
+            if task.is_halted() { Flow::Cancel } else { Flow::Continue }
         });
         let report = uploaded.map_err(|error| self.before_motion(&error))?;
         let (time_s, bytes, retries) = (report.time_s, report.bytes, report.retries);
         journal.write(Happening::Uploaded { job, phase: phase(), time_s, bytes, retries });
         // Somebody who stopped an arm that stood still meant that it is to stand.
-        if task.is_halted(halt) {
+        if task.is_halted() {
             return Err(task.stopped());
         }
         let duration_s = checked.trajectory().duration_s();
         journal.write(Happening::Executing { job, phase: phase(), duration_s });
-        let (mut reported, mut seen) = (Instant::now(), halt);
-        let run = self.session.run(checked, |status| {
-            if status.trajectory == TrajectoryState::Pause {
-                // That one did what it was meant for. One that came too late for this motion is meant for the next.
-                seen = task.line.last_halt();
-            }
-            if reported.elapsed() >= MOVING && status.is_executing() {
-                reported = Instant::now();
-                journal.write(Happening::Moving { job, phase: phase(), point: status.point });
-            }
-            wishes.try_recv().unwrap_or_default()
-        });
-        self.halt = seen;
-        done.summary = Some(run.summary(&site.arm));
-        match run.outcome {
+        let digest = Rc::new(RefCell::new(Digest::new()));
+        let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
+        task.commander.set_moving(true);
+        let outcome = self.session.run_unkept(
+            checked,
+            move |sample| taken.borrow_mut().push(sample),
+            |status| {
+                if reported.elapsed() >= MOVING && status.is_executing() {
+                    reported = Instant::now();
+                    journal.write(Happening::Moving { job, phase: phase(), point: status.point });
+                }
+                let Ok(Wish { flow, done }) = wishes.try_recv() else { return Flow::Continue };
+                wish.set(Some(done));
+                flow
+            },
+            |_, did| {
+                if let Some(done) = wish.take() {
+                    // Whoever wished it may have gone.
+                    let _ = done.send(match did {
+                        Ok(()) => Ok(()),
+                        Err(error) => Err(ErrorObject::of(error)),
+                    });
+                }
+            },
+        );
+        task.commander.set_moving(false);
+        // Those that came too late are known to have: their senders are dropped.
+        while wishes.try_recv().is_ok() {}
+        done.summary = Some(digest.borrow().summary(&RecordingInfo::of(&site.arm)));
+        match outcome {
             Ok(Outcome::Finished(_)) => Ok(true),
             Ok(Outcome::Stopped(_)) => Ok(false),
             Err(error) => Err(self.before_motion(&error)),
@@ -218,7 +234,7 @@ impl Run<'_> {
     fn before_motion(&self, error: &Error) -> ErrorObject {
         match error {
             Error::Cancelled => self.task.stopped(),
-            Error::Link(LinkError::Denied { .. }) if self.task.is_halted(self.halt) => self.task.stopped(),
+            Error::Link(LinkError::Denied { .. }) if self.task.is_halted() => self.task.stopped(),
             error => ErrorObject::of(error),
         }
     }

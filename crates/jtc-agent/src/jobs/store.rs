@@ -31,6 +31,14 @@ pub enum StoreError {
     /// No such number.
     #[error("{0} is no number of a trajectory: 1 to {NUMBER_MAX} are")]
     Number(u16),
+    /// Two files of one number: which of them is meant?
+    #[error("{directory}: two files are trajectory {number}", directory = directory.display())]
+    Twice {
+        /// Where.
+        directory: PathBuf,
+        /// The number.
+        number: u16,
+    },
     /// More points than a controller holds.
     #[error("{points} points: a controller holds {POINTS_MAX}")]
     TooMany {
@@ -54,6 +62,9 @@ impl host_kit::Diagnose for StoreError {
     fn diagnosis(&self) -> host_kit::Diagnosis {
         let (code, next) = match self {
             Self::Number(_) => ("number", format!("choose a number from 1 to {NUMBER_MAX}")),
+            Self::Twice { .. } => {
+                ("store", "remove the one that is not meant, or give it another number".into())
+            }
             Self::TooMany { .. } => ("too-long", "send it in parts, or with a longer step".into()),
             Self::File(error) => return error.diagnosis(),
             Self::Io { .. } => {
@@ -68,12 +79,14 @@ impl host_kit::Diagnose for StoreError {
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
+    /// Of who writes to the directory: whoever reads what is kept waits for no disk.
+    writing: Mutex<()>,
 }
 
 impl Store {
     /// In memory alone.
     pub fn in_memory() -> Self {
-        Self { directory: None, kept: Mutex::default() }
+        Self { directory: None, kept: Mutex::default(), writing: Mutex::default() }
     }
 
     /// In a directory: files with names like `7-pick.csv`. What is no such file is left alone.
@@ -85,12 +98,15 @@ impl Store {
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let io = |source| StoreError::Io { path: directory.to_owned(), source };
         fs::create_dir_all(directory).map_err(io)?;
-        let store = Self { directory: Some(directory.to_owned()), kept: Mutex::default() };
+        let store = Self { directory: Some(directory.to_owned()), ..Self::in_memory() };
         for entry in fs::read_dir(directory).map_err(io)? {
             let path = entry.map_err(io)?.path();
             let Some((number, name)) = numbered(&path) else { continue };
             let loaded = Loaded::load(&path, None)?;
-            store.lock().insert(number, Arc::new(Stored::new(number, &name, loaded)));
+            let stored = Arc::new(Stored::new(number, &name, loaded));
+            if store.lock().insert(number, stored).is_some() {
+                return Err(StoreError::Twice { directory: directory.to_owned(), number });
+            }
         }
         Ok(store)
     }
@@ -123,14 +139,13 @@ impl Store {
             return Err(StoreError::TooMany { points });
         }
         let stored = Arc::new(Stored::new(number, name, loaded));
-        let mut kept = self.lock();
+        let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
             let path = directory.join(format!("{number}-{}.csv", file_name(name)));
-            let written = write(&path, &stored.trajectory);
-            written.map_err(|source| StoreError::Io { path: path.clone(), source })?;
-            remove(directory, number, Some(&path))?;
+            let written = write(directory, &path, &stored.trajectory, number);
+            written.map_err(|source| StoreError::Io { path, source })?;
         }
-        kept.insert(number, stored.clone());
+        self.lock().insert(number, stored.clone());
         Ok(stored)
     }
 
@@ -140,11 +155,12 @@ impl Store {
     ///
     /// Its file cannot be removed; it is kept then.
     pub fn delete(&self, number: u16) -> Result<bool, StoreError> {
-        let mut kept = self.lock();
+        let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
-            remove(directory, number, None)?;
+            let removed = remove(directory, number, None);
+            removed.map_err(|source| StoreError::Io { path: directory.clone(), source })?;
         }
-        Ok(kept.remove(&number).is_some())
+        Ok(self.lock().remove(&number).is_some())
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<u16, Arc<Stored>>> {
@@ -168,29 +184,77 @@ fn numbered(path: &Path) -> Option<(u16, String)> {
     Some((number, name.to_owned()))
 }
 
-/// A name as a file can have it.
+/// A name as a file can have it, of 64 bytes at most.
 fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
-    let name: String = name.chars().map(plain).take(64).collect();
-    if name.is_empty() { "trajectory".to_owned() } else { name }
+    let mut short = String::new();
+    for c in name.chars().map(plain) {
+        if short.len() + c.len_utf8() > 64 {
+            break;
+        }
+        short.push(c);
+    }
+    if short.is_empty() { "trajectory".to_owned() } else { short }
 }
 
-/// Whole, or not at all.
-fn write(path: &Path, trajectory: &Trajectory) -> io::Result<()> {
+/// Whole, or not at all. What had the number before goes first: without power in between there is none, and never two.
+fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
     fs::write(&part, trajectory.to_exact_csv())?;
     fs::File::open(&part)?.sync_all()?;
-    fs::rename(&part, path)
+    remove(directory, number, Some(path))?;
+    fs::rename(&part, path)?;
+    fs::File::open(directory)?.sync_all()
 }
 
 /// Removes the files of a number, but for `keep`.
-fn remove(directory: &Path, number: u16, keep: Option<&Path>) -> Result<(), StoreError> {
-    let io = |path: &Path, source| StoreError::Io { path: path.to_owned(), source };
-    for entry in fs::read_dir(directory).map_err(|e| io(directory, e))? {
-        let path = entry.map_err(|e| io(directory, e))?.path();
+fn remove(directory: &Path, number: u16, keep: Option<&Path>) -> io::Result<()> {
+    for entry in fs::read_dir(directory)? {
+        let path = entry?.path();
         if numbered(&path).is_some_and(|(n, _)| n == number) && Some(path.as_path()) != keep {
-            fs::remove_file(&path).map_err(|e| io(&path, e))?;
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n";
+
+    #[test]
+    fn what_is_kept_outlasts_the_agent_under_its_number_and_name() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let store = Store::open(directory.path()).expect("it is empty");
+        store.put(7, "pick", TEXT, false).expect("a trajectory");
+        store.put(7, "place", TEXT, false).expect("another one");
+        store.put(8, &"ä/".repeat(60), TEXT, false).expect("a long name");
+        assert!(store.put(0, "x", TEXT, false).is_err() && store.put(100, "x", TEXT, false).is_err());
+        assert!(store.put(7, "bad", "no trajectory", false).is_err());
+        let names =
+            |store: &Store| store.list().iter().map(|s| (s.number, s.name.clone())).collect::<Vec<_>>();
+        let again = Store::open(directory.path()).expect("its own files");
+        assert_eq!(names(&again)[0], (7, "place".to_owned()));
+        assert_eq!(
+            again.get(7).expect("it is there").trajectory,
+            store.get(7).expect("it is there").trajectory
+        );
+        assert!(again.delete(7).expect("it can be written") && !again.delete(7).expect("it can be written"));
+        assert_eq!(names(&Store::open(directory.path()).expect("its own files")).len(), 1);
+    }
+
+    #[test]
+    fn two_files_of_one_number_are_refused() {
+        let directory = tempfile::tempdir().expect("a directory");
+        for name in ["07-old.csv", "7-new.csv"] {
+            std::fs::write(directory.path().join(name), TEXT).expect("a file");
+        }
+        let error = Store::open(directory.path()).err().expect("which is meant?");
+        assert!(error.to_string().contains("two files are trajectory 7"), "{error}");
+    }
 }

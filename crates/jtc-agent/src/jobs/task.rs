@@ -2,9 +2,8 @@
 use std::sync::mpsc::Receiver;
 
 use jtc_host::Arm;
-use jtc_host::session::Flow;
 
-use super::{Happening, Journal};
+use super::{Commander, Happening, Journal, Wish};
 use crate::api::ErrorObject;
 use crate::owner::Line;
 
@@ -16,13 +15,13 @@ pub struct Task<'a> {
     /// Its number.
     pub job: u64,
     /// What is wished on the way.
-    pub wishes: &'a Receiver<Flow>,
+    pub wishes: &'a Receiver<Wish>,
     /// Where each step is reported.
     pub journal: &'a Journal,
     /// Where a Stop of somebody else shows.
     pub line: &'a Line,
-    /// The last Stop or Pause, by number, that it was asked for after.
-    pub halt: u64,
+    /// Whose it is.
+    pub commander: &'a Commander,
     /// The arm of controllers that cannot be asked for theirs.
     pub arm: &'a Arm,
 }
@@ -33,9 +32,9 @@ impl Task<'_> {
         self.journal.write(Happening::Note { job: self.job, text });
     }
 
-    /// Somebody has stopped or paused the arm since the one with this number.
-    pub fn is_halted(&self, since: u64) -> bool {
-        self.line.last_halt() != since
+    /// Somebody has stopped or paused the arm since this was asked for, or was gone on with.
+    pub fn is_halted(&self) -> bool {
+        self.line.with(|line, _| line.is_halted(self.commander.client))
     }
 
     /// Somebody stopped the arm before this moved it.

@@ -104,6 +104,8 @@ pub(super) struct Client {
     unread: usize,
     /// No motion begins before: somebody else has stopped the arm.
     pub calm_until: Duration,
+    /// The last halt that what it does now was asked for after; `None`: it is asked itself whether it knows of the last one.
+    pub asked_after: Option<u64>,
     /// For how long it commands without showing that it is there; `None`: as long as it is connected.
     pub lasts: Option<Duration>,
     /// The last halt of somebody else, by number, and the last that is known to have been seen.
@@ -125,6 +127,7 @@ impl Client {
             deliveries: VecDeque::new(),
             unread: 0,
             calm_until: Duration::ZERO,
+            asked_after: None,
             lasts: None,
             halted: 0,
             seen: 0,

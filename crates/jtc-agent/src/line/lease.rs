@@ -34,11 +34,16 @@ pub enum Denied {
     #[error("this client was let in to look and to stop, not to command")]
     Viewer,
     /// Somebody stopped the arm just now, and this was sent before or at the same time.
-    #[error("{by} has stopped the arm: what was sent before that is not done")]
+    #[error(
+        "{by} has stopped the arm: what was asked for before is not done, and nothing that moves it for three seconds"
+    )]
     Stopped {
         /// Who it was.
         by: String,
     },
+    /// The client was put out.
+    #[error("this client is on the line no more: it was put out, or has gone")]
+    Gone,
     /// The client has no lease that it could give.
     #[error("this client does not command the arm: it has no lease to give or to renew")]
     NotHolder,
@@ -110,7 +115,7 @@ impl SharedLine {
 
     /// The client commands; it takes the lease where nobody has it.
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
-        if self.introduction(id).is_none_or(|client| client.role != Role::Operator) {
+        if self.introduction(id).ok_or(Denied::Gone)?.role != Role::Operator {
             return Err(Denied::Viewer);
         }
         self.end_lapsed(now);
@@ -144,7 +149,9 @@ impl SharedLine {
 
     /// The one who commanded does not any more.
     pub(super) fn end_lease(&mut self, holder: ClientId, policy: Policy, now: Duration) {
-        self.set_lease(None);
+        let next = self.lease.as_ref().and_then(|lease| lease.wanted_by);
+        let next = next.filter(|next| self.clients.contains_key(next));
+        self.set_lease(next.map(|holder| self.lease_of(holder, now)));
         let Some(command) = (match policy {
             Policy::Continue => None,
             Policy::Pause => Some(ExecCommand::Pause),

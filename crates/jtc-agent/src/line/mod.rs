@@ -66,6 +66,8 @@ pub struct SharedLine {
     halts: Halts,
     /// How many halts there were, who asked for the last, and for what.
     halted: (u64, String, ExecCommand),
+    /// No motion begins before that was not asked for by the one who asked for the last halt.
+    calm_until: Duration,
     /// Frames of the owner itself.
     own: VecDeque<HostFrame>,
     receiver: StatusReceiver,
@@ -91,6 +93,7 @@ impl SharedLine {
             lease: None,
             halts: Halts::default(),
             halted: (0, String::new(), ExecCommand::Stop),
+            calm_until: Duration::ZERO,
             own: VecDeque::new(),
             receiver: StatusReceiver::new(),
             status: None,
@@ -103,8 +106,8 @@ impl SharedLine {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // What was stopped before concerns it no more.
-        (client.halted, client.seen) = (self.halted.0, self.halted.0);
+        // It knows of what was stopped before; what it is to do may have been asked for before that.
+        (client.halted, client.seen, client.calm_until) = (self.halted.0, self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
@@ -148,12 +151,23 @@ impl SharedLine {
     /// Stops or pauses the motion for a client, ahead of all else: what is sent already and not on the line yet is dropped. It is sent again
     /// until the device has taken it. `name`: who it is, for those who ask why their frames were not passed on.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
+        self.halt_by(client, client, name, command, now);
+    }
+
+    /// The same for somebody who has no end of the line, or not at hand; `client` is the one who may go on at once, where it is one.
+    pub fn halt_for(&mut self, client: Option<ClientId>, name: &str, command: ExecCommand, now: Duration) {
+        self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
+    }
+
+    /// `asker` has the record, `own` may go on at once.
+    fn halt_by(&mut self, asker: ClientId, own: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
         self.halted = (self.halted.0 + 1, name.clone(), command);
-        for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != client) {
+        self.calm_until = now + CALM;
+        for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != own) {
             (other.halted, other.calm_until) = (self.halted.0, now + CALM);
         }
-        self.halts.ask(client, command);
+        self.halts.ask(asker, command);
         let denied = Denied::Stopped { by: name };
         if let Some((outgoing, written)) = self.outbox.writing()
             && written == 0
@@ -193,8 +207,15 @@ impl SharedLine {
 
     fn take_frame(&mut self, id: ClientId, frame: HostFrame, now: Duration) {
         if let Class::Halt(command) = frame.class {
-            let name = self.name(id);
-            return self.halt(id, &name, command, now);
+            let (name, before) = (self.name(id), self.halted.0);
+            self.halt(id, &name, command, now);
+            // What it stops itself on its way, it goes on from.
+            if let Some(client) = self.clients.get_mut(&id)
+                && client.asked_after == Some(before)
+            {
+                client.asked_after = Some(before + 1);
+            }
+            return;
         }
         if frame.class.needs_lease()
             && let Err(denied) = self.may_send(id, frame.class, now)
@@ -209,14 +230,47 @@ impl SharedLine {
     /// A frame of this class may be sent by this client.
     fn may_send(&mut self, id: ClientId, class: Class, now: Duration) -> Result<(), Denied> {
         self.may_command(id, now)?;
-        let Some(client) = self.clients.get_mut(&id).filter(|_| class == Class::Motion) else {
-            return Ok(());
-        };
-        if now >= client.calm_until && client.seen >= client.halted {
+        if class != Class::Motion || self.may_begin(id, now) {
             return Ok(());
         }
-        client.calm_until = client.calm_until.max(now + CALM_AGAIN);
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.calm_until = client.calm_until.max(now + CALM_AGAIN);
+        }
         Err(Denied::Stopped { by: self.halted.1.clone() })
+    }
+
+    /// Nobody has stopped what this client would begin now.
+    fn may_begin(&self, id: ClientId, now: Duration) -> bool {
+        self.clients.get(&id).is_some_and(|client| {
+            let known = client.asked_after.is_none_or(|number| number == self.halted.0);
+            known && now >= client.calm_until && client.seen >= client.halted
+        })
+    }
+
+    /// A client that has no end of the line at hand asks for what may move the arm. From then on only that moves it: a Stop or a Pause
+    /// behind this takes it back, however long it has waited since.
+    ///
+    /// # Errors
+    ///
+    /// [`Denied`]: another one commands, or somebody else has just stopped the arm.
+    pub fn ask_to_move(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
+        self.may_command(id, now)?;
+        let last = self.halted.0;
+        if self.clients.get(&id).is_some_and(|client| now < client.calm_until) {
+            return Err(Denied::Stopped { by: self.halted.1.clone() });
+        }
+        if let Some(client) = self.clients.get_mut(&id) {
+            (client.asked_after, client.seen) = (Some(last), last);
+        }
+        Ok(())
+    }
+
+    /// What this client has asked for was stopped or paused since.
+    pub fn is_halted(&self, id: ClientId) -> bool {
+        self.clients
+            .get(&id)
+            .and_then(|client| client.asked_after)
+            .is_some_and(|number| number != self.halted.0)
     }
 
     /// Number of the last halt: whoever carries a client's bytes asks it whether it has seen that, behind what it has sent before.
@@ -227,23 +281,6 @@ impl SharedLine {
     /// Who asked for the last halt, and for what.
     pub fn last_halt_by(&self) -> (&str, ExecCommand) {
         (&self.halted.1, self.halted.2)
-    }
-
-    /// The client asked for this halt itself, and goes on now: nothing that it had sent before is to be waited for. Not where there was
-    /// another one since.
-    pub fn go_on_after(&mut self, client: ClientId, halt: u64, now: Duration) {
-        if let Some(client) = self.clients.get_mut(&client).filter(|_| halt == self.halted.0) {
-            (client.calm_until, client.seen) = (now, halt);
-        }
-    }
-
-    /// A frame that begins a motion would be taken from this client now.
-    ///
-    /// # Errors
-    ///
-    /// [`Denied`].
-    pub fn may_move(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
-        self.may_send(client, Class::Motion, now)
     }
 
     /// Everything that the client had sent when it did not know of this halt has come.

@@ -48,7 +48,21 @@ impl<P: Port> Session<P> {
     /// [`MotionError::RunFault`] when the controller ended the motion with an error, [`MotionError::PausedByController`] when it paused it
     /// because of one, [`Error::Cancelled`] when `each` left it, [`MotionError::LinkLost`] when nothing is received any more: the arm
     /// may be moving.
-    pub fn follow(&mut self, mut each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
+    pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
+        self.follow_with(each, |_, _| {})
+    }
+
+    /// The same; `done` is called with each thing that `each` wanted and what came of it: a speed or a resume that was refused does not end
+    /// the motion.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::follow`].
+    pub fn follow_with(
+        &mut self,
+        mut each: impl FnMut(&Status) -> Flow,
+        mut done: impl FnMut(Flow, &Result<(), Error>),
+    ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
         // On an error the controller forgets the trajectory, and its point with it.
@@ -85,27 +99,33 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            match flow {
-                Flow::Continue => {}
-                Flow::Pause if status.is_executing() => unless_ended(self.pause())?,
-                Flow::Resume if status.trajectory == TrajectoryState::Pause => match self.go() {
-                    // Somebody else has just paused it: it stays so, and can be asked for again.
-                    Err(Error::Link(LinkError::Denied { .. })) => {}
-                    other => other?,
-                },
-                Flow::Speed(percent) => match self.set_speed(f64::from(percent) / 100.0) {
-                    // The motion goes on as it was, and is followed.
-                    Err(Error::Link(error)) if !matches!(error, LinkError::Port(_)) => {}
-                    Err(Error::Link(error)) => return Err(self.lost_in_motion(error)),
-                    other => other?,
-                },
+            let did = match flow {
+                Flow::Continue => continue,
+                Flow::Cancel => return Err(Error::Cancelled),
+                Flow::Pause if status.is_executing() => unless_ended(self.pause()),
+                Flow::Resume => self.resume(),
+                Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
                 Flow::Stop if !stopping => {
-                    unless_ended(self.stop())?;
                     stopping = true;
+                    unless_ended(self.stop())
                 }
-                Flow::Pause | Flow::Resume | Flow::Stop => {}
-                Flow::Cancel => return Err(Error::Cancelled),
+                Flow::Pause | Flow::Stop => Ok(()),
+            };
+            done(flow, &did);
+            match (flow, did) {
+                (_, Ok(())) => {}
+                // The motion goes on as it was, or stays paused, and is followed.
+                (Flow::Resume, Err(Error::Link(LinkError::Denied { .. }))) => {}
+                (
+                    Flow::Resume,
+                    Err(Error::Motion(MotionError::NotPaused { .. } | MotionError::RestRefused { .. })),
+                ) => {}
+                (Flow::Speed(_), Err(Error::Link(LinkError::Port(error)))) => {
+                    return Err(self.lost_in_motion(error.into()));
+                }
+                (Flow::Speed(_), Err(Error::Link(_))) => {}
+                (_, Err(error)) => return Err(error),
             }
         }
     }

@@ -36,37 +36,47 @@ impl<P: Port> Session<P> {
     ///
     /// `each` is called with each status and returns what to do: go on, pause, resume, stop. An observer that was set before is replaced.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
-        self.run_observed(checked, |_| {}, each)
+        self.run_observed(checked, |_| {}, each, |_, _| {})
     }
 
-    /// The same; `observe` is called with each sample as it comes, to record it while the arm moves.
+    /// The same; `observe` is called with each sample as it comes, to record it while the arm moves, and `done` as by
+    /// [`Session::follow_with`].
     pub fn run_observed(
         &mut self,
         checked: &CheckedTrajectory,
-        observe: impl FnMut(&Sample) + 'static,
+        mut observe: impl FnMut(&Sample) + 'static,
         each: impl FnMut(&Status) -> Flow,
+        done: impl FnMut(Flow, &Result<(), Error>),
     ) -> Run {
-        let samples = self.collect(checked, observe);
-        let outcome = self.execute(checked).and_then(|()| self.follow(each));
-        self.stop_observing();
+        let samples = Rc::<RefCell<Vec<Sample>>>::default();
+        let taken = Rc::clone(&samples);
+        let observe = move |sample: &Sample| {
+            observe(sample);
+            taken.borrow_mut().push(*sample);
+        };
+        let outcome = self.run_unkept(checked, observe, each, done);
         Run { outcome, samples: samples.take() }
     }
 
-    /// Collects a sample of each status from now on.
-    fn collect(
+    /// The same for a run of any length: its samples are kept by `observe`, or by nobody.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::execute`] and [`Session::follow`].
+    pub fn run_unkept(
         &mut self,
         checked: &CheckedTrajectory,
         mut observe: impl FnMut(&Sample) + 'static,
-    ) -> Rc<RefCell<Vec<Sample>>> {
+        each: impl FnMut(&Status) -> Flow,
+        done: impl FnMut(Flow, &Result<(), Error>),
+    ) -> Result<Outcome, Error> {
         let (trajectory, delay) = (checked.shared(), checked.delay_ticks());
-        let samples = Rc::<RefCell<Vec<Sample>>>::default();
-        let taken = Rc::clone(&samples);
         let mut clock = StatusClock::begin(self.now(), 0);
         self.observe(move |now, status| {
-            let sample = Sample::following(clock.at(now, status), status, &trajectory, delay);
-            observe(&sample);
-            taken.borrow_mut().push(sample);
+            observe(&Sample::following(clock.at(now, status), status, &trajectory, delay));
         });
-        samples
+        let outcome = self.execute(checked).and_then(|()| self.follow_with(each, done));
+        self.stop_observing();
+        outcome
     }
 }

@@ -108,6 +108,7 @@ fn execute(
     operator: &mut Operator,
 ) -> Run {
     operator.motion_begins();
+    let out = operator.out;
     let duration_s = checked.trajectory().duration_s();
     operator.progress.event("executing", json!({ "phase": what, "duration_s": duration_s }));
     let bar = operator.out.motion_bar((duration_s * 1e3) as u64, what, operator.keys());
@@ -116,12 +117,21 @@ fn execute(
             sink.write(&Sample { time_s: sample.time_s + offset_s, ..*sample });
         }
     };
-    let run = session.run_observed(checked, record, |s| {
-        bar.set_position(u64::from(s.point));
-        bar.set_message(run_report::motion_line(s));
-        operator.progress.see(s);
-        operator.wish(s)
-    });
+    let run = session.run_observed(
+        checked,
+        record,
+        |s| {
+            bar.set_position(u64::from(s.point));
+            bar.set_message(run_report::motion_line(s));
+            operator.progress.see(s);
+            operator.wish(s)
+        },
+        |_, did| {
+            if let Err(error) = did {
+                out.note(format!("jtc: {error}"));
+            }
+        },
+    );
     operator.motion_ended();
     bar.finish_and_clear();
     run

@@ -202,7 +202,7 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         let anna = Program::new(&served, "anna", 1.0, policy);
         // Behind the halt of the one before.
         let halted =
-            || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": [0.0; 6] }))).1["code"] == "denied";
+            || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
             std::thread::sleep(Duration::from_millis(100));
         }

@@ -56,8 +56,27 @@ enum Seen {
     Answered(bool),
     /// A Jog, at this time of the line.
     Jog(Duration),
-    /// Something that may change the arm.
-    Other(Duration),
+    /// Something that may change the arm, at this time of the line.
+    Change(Duration),
+}
+
+/// The arm may be another one behind it (J-51 to J-55).
+fn may_change_the_arm(frame_type: FrameType) -> bool {
+    use FrameType::*;
+    matches!(
+        frame_type,
+        FrictionTable
+            | FrictionTableUseDefault
+            | FrictionPolynomial
+            | FrictionPolynomialUseDefault
+            | PidParam
+            | PidParamUseDefault
+            | ArmModel
+            | ArmModelUseDefault
+            | SetSettings
+            | SetName
+            | Disable
+    )
 }
 
 /// Sees what happens on the line, for the recorder. It never waits.
@@ -72,7 +91,7 @@ impl Witness {
         let seen = match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => Seen::Segment(bytes.clone()),
             LineEvent::Sent { frame_type: FrameType::Jog, .. } => Seen::Jog(now),
-            LineEvent::Sent { .. } => Seen::Other(now),
+            LineEvent::Sent { frame_type, .. } if may_change_the_arm(*frame_type) => Seen::Change(now),
             LineEvent::Answered { response, .. }
                 if response.frame_type == FrameType::Trajectory as u8
                     && response.status == FrameStatus::NoError =>
@@ -270,7 +289,7 @@ impl Following {
                 Seen::Segment(frame) => self.upload.sent(&frame),
                 Seen::Answered(accepted) => self.upload.answered(accepted),
                 Seen::Jog(at) => self.follower.jog(at),
-                Seen::Other(at) => self.doubt = Some(Doubt { since: at, asked: None }),
+                Seen::Change(at) => self.doubt = Some(Doubt { since: at, asked: None }),
             }
         }
     }

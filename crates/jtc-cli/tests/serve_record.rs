@@ -201,3 +201,29 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     assert_eq!(second.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&second.stderr).contains("another agent"), "{second:?}");
 }
+
+/// The arm in a recording is the one that the controller has, also after it was given another.
+#[test]
+fn the_arm_in_a_recording_is_that_of_the_controller() {
+    let agent = Agent::start();
+    let mut arm = jtc_host::Arm::avena();
+    let file = agent.dir.path().join("mine.toml");
+    let of_recording = |n: usize| {
+        let info = read(&agent.recordings(".mcap", n)[n - 1]).info.expect("its arm");
+        (info.arm, info.gains.expect("gains")[2].kp, info.hash)
+    };
+    let of_arm = |arm: &jtc_host::Arm| {
+        (arm.name.clone(), arm.pid.expect("gains")[2].kp, arm.hash().expect("it can be sent"))
+    };
+    agent.jtc(&["jog", "1", "0.1", "--duration", "0.3"]).ends(0);
+    assert_eq!(of_recording(1), of_arm(&arm));
+    arm.name = "mine".into();
+    arm.pid.as_mut().expect("gains")[2].kp = 6000.0;
+    std::fs::write(&file, arm.to_toml()).expect("a file");
+    let file = file.to_str().expect("a name");
+    agent.jtc(&["disable", "--yes"]).ends(0);
+    agent.jtc(&["arm", "push", file]).ends(0);
+    agent.jtc(&["recover", "--arm", file]).ends(0);
+    agent.jtc(&["jog", "1", "0.1", "--duration", "0.3"]).ends(0);
+    assert_eq!(of_recording(2), of_arm(&arm));
+}

@@ -5,6 +5,7 @@ pub mod api;
 pub mod jobs;
 pub mod line;
 pub mod log;
+pub mod modbus;
 pub mod owner;
 pub mod record;
 

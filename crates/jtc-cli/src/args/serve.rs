@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::FalseyValueParser;
+use jtc_agent::modbus::Network;
 
 use super::LinkArgs;
 
@@ -42,6 +43,12 @@ pub struct ServeArgs {
     /// Room that recordings take at most: the oldest of this directory's agents are removed first
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = size)]
     pub record_limit: u64,
+    /// Address at which a PLC drives the arm by Modbus TCP, which knows no tokens; by default only from this computer
+    #[arg(long, env = "JTC_MODBUS", value_name = "ADDRESS:PORT")]
+    pub modbus: Option<SocketAddr>,
+    /// Address or network (192.168.0.0/24) that alone may connect by Modbus; more than once, or with commas, for several
+    #[arg(long, env = "JTC_MODBUS_ALLOW", value_name = "CIDR", value_delimiter = ',', requires = "modbus")]
+    pub modbus_allow: Vec<Network>,
     #[command(flatten)]
     pub link: LinkArgs,
 }

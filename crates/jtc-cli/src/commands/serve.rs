@@ -10,6 +10,7 @@ use jtc_agent::access::{Access, Tokens, default_token_file};
 use jtc_agent::api::Agent;
 use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
+use jtc_agent::modbus::{self, Allowed, Plc};
 use jtc_agent::record::{Notice, Prepared};
 use jtc_agent::{Line, Owner, serve as service, tls};
 use jtc_client::agents::{Registered, register};
@@ -46,6 +47,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("another agent may listen there: name another address with --listen")
     })?;
     let listen = listener.local_addr()?;
+    let modbus = listen_modbus(args)?;
+    let modbus_at = modbus.as_ref().map(TcpListener::local_addr).transpose()?;
     let mut recordings =
         args.record.as_deref().map(|dir| open_recordings(dir, args.record_limit)).transpose()?;
     let (port, arm) = port(args, out)?;
@@ -77,17 +80,31 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     if !listen.ip().is_loopback() && tls.is_none() {
         out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
     }
+    if let Some(at) = modbus_at {
+        out.note(format!("note: Modbus knows no tokens: whoever may connect to {at} may command the arm"));
+    }
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
     let access = Access::new(tokens, listen, &args.names);
-    let agent = Agent::new(owner.line(), Jobs::new(owner.line(), store, arm), access, log, &name, args.sim)?;
-    let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim });
-    out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
+    let jobs = Jobs::new(owner.line(), store, arm);
+    let agent = Agent::new(owner.line(), jobs.clone(), access, log.clone(), &name, args.sim)?;
+    let plcs = match modbus {
+        Some(listener) => {
+            let plc = Plc::new(owner.line(), jobs, log, args.sim, modbus::first_sequence()?);
+            Some(modbus::Server::start(listener, Allowed::new(args.modbus_allow.clone()), plc)?)
+        }
+        None => None,
+    };
+    let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim, "modbus": modbus_at });
+    out.result(&value, || {
+        let modbus = modbus_at.map_or(String::new(), |at| format!(", Modbus {at}"));
+        format!("ready: {url}{modbus}{}", if args.sim { " (SIMULATED)" } else { "" })
+    });
     let (line, ended) = (owner.line(), stop.clone());
     let lost = owner.line();
     service::serve(agent.router(), listener, tls, move || ended.asked() || lost.lost().is_some())?;
-    drop(registration);
+    drop((registration, plcs));
     let gone = line.lost();
     if gone.is_none() {
         come_to_rest(&line, out);
@@ -100,6 +117,22 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         }
         None => Ok(()),
     }
+}
+
+/// Where PLCs are to connect, if they are.
+fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
+    let Some(at) = args.modbus else { return Ok(None) };
+    if !at.ip().is_loopback() && args.modbus_allow.is_empty() {
+        return Err(Failure::usage(format!(
+            "--modbus {at}: nobody else than this computer could connect there"
+        ))
+        .hint("name who may with --modbus-allow, an address or a network: Modbus knows no tokens"));
+    }
+    let listener = TcpListener::bind(at).map_err(|error| {
+        Failure::usage(format!("--modbus {at}: {error}"))
+            .hint("name another port: 502, that of Modbus, is for administrators on most systems")
+    })?;
+    Ok(Some(listener))
 }
 
 /// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held.

@@ -1,0 +1,262 @@
+//! Commands of a PLC, done with the one client of the line that all of its connections share.
+use std::sync::Arc;
+
+use jtc_host::session::{Flow, ParameterSource};
+use jtc_host::{Error, Session};
+use jtc_wire::ALL_NODES;
+use serde_json::json;
+
+use super::codes::{Command, Outcome, error_number};
+use super::handshake::Order;
+use super::map::View;
+use super::plc::Plc;
+use crate::api::ErrorObject;
+use crate::jobs::{Commander, Course, Done, Job, Order as RunOrder, Turn, Unable, run};
+use crate::line::Denied;
+use crate::owner::ClientPort;
+
+/// Why a command was not done.
+pub(super) struct Refusal {
+    pub outcome: Outcome,
+    /// Number of the error, where it is one.
+    pub error: u16,
+    /// In words.
+    pub why: String,
+}
+
+impl Refusal {
+    fn new(outcome: Outcome) -> Self {
+        Self { outcome, error: 0, why: outcome.text().to_owned() }
+    }
+}
+
+impl From<ErrorObject> for Refusal {
+    fn from(error: ErrorObject) -> Self {
+        let outcome = match error.code {
+            "busy" => Outcome::Busy,
+            "not-ready" | "not-paused" => Outcome::NotReady,
+            "no-link" | "not-confirmed" | "link-lost" | "gone" => Outcome::NoController,
+            _ => Outcome::Failed,
+        };
+        Self { outcome, error: error_number(error.code), why: error.message.into() }
+    }
+}
+
+impl From<Unable> for Refusal {
+    fn from(unable: Unable) -> Self {
+        ErrorObject::from(unable).into()
+    }
+}
+
+impl From<Denied> for Refusal {
+    fn from(denied: Denied) -> Self {
+        let outcome = match denied {
+            Denied::Stopped { .. } => Outcome::Stopped,
+            Denied::Held { .. } | Denied::NotHolder | Denied::Viewer | Denied::Gone => Outcome::Held,
+        };
+        Self { outcome, error: 0, why: denied.to_string() }
+    }
+}
+
+impl Plc {
+    /// Does what was commanded; or nothing of it. `halt`: the last Stop or Pause that it was commanded after, by number.
+    pub(super) async fn act(self: &Arc<Self>, order: &Order, halt: u64) -> Result<(), Refusal> {
+        if let Some(lost) = self.line.lost() {
+            return Err(Refusal { why: lost, ..Refusal::new(Outcome::NoController) });
+        }
+        let commander = self.commander();
+        if order.command == Command::Release {
+            return self.release(&commander);
+        }
+        if order.watchdog_ms == 0 {
+            return Err(Refusal::new(Outcome::Value));
+        }
+        match order.command {
+            Command::Start => self.start(&commander, order, halt),
+            Command::Resume => self.resume(&commander, halt).await,
+            Command::Recover | Command::RecoverWithDefaults => self.recover(&commander, order.command, halt),
+            Command::SetSpeed => self.change_speed(&commander, order.speed).await,
+            Command::TeachOn => {
+                self.free_to_move()?;
+                let turn = commander.turn()?;
+                self.take_lease(&commander)?;
+                self.ask_to_move(&commander, halt)?;
+                call(&commander, turn, |session| session.teach(true)).await
+            }
+            Command::TeachOff => self.call(&commander, |session| session.teach(false)).await,
+            Command::GripperOn => self.call(&commander, |session| session.gripper(true)).await,
+            Command::GripperOff => self.call(&commander, |session| session.gripper(false)).await,
+            Command::Clear => {
+                let clear = |session: &mut Session<ClientPort>| {
+                    session.clear(true, ALL_NODES).and_then(|()| session.clear_occurred())
+                };
+                self.call(&commander, clear).await
+            }
+            // Those are done where they come in.
+            Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
+        }
+    }
+
+    /// No coil demands that the arm stands.
+    fn free_to_move(&self) -> Result<(), Refusal> {
+        if self.is_held_by_a_coil() { Err(Refusal::new(Outcome::Coil)) } else { Ok(()) }
+    }
+
+    /// Takes or renews the lease, for as long as the watchdog allows.
+    fn take_lease(&self, commander: &Commander) -> Result<(), Refusal> {
+        let (policy, lasts) = self.watchdog();
+        let taken = self.line.with(|line, now| {
+            line.set_policy(commander.client, policy);
+            line.take_lease(commander.client, Some(lasts), now)
+        });
+        Ok(taken?)
+    }
+
+    /// Nobody has stopped the arm since it was commanded, and nobody else just before.
+    fn ask_to_move(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
+        self.line.with(|line, now| {
+            if line.last_halt() != halt {
+                return Err(Refusal::new(Outcome::Stopped));
+            }
+            Ok(line.ask_to_move(commander.client, now)?)
+        })
+    }
+
+    /// What the controller reports now.
+    fn reported(&self) -> View {
+        let status =
+            self.line.with(|line, now| line.status().map(|(at, status)| (now.saturating_sub(*at), *status)));
+        View { status, ..View::default() }
+    }
+
+    fn start(self: &Arc<Self>, commander: &Arc<Commander>, order: &Order, halt: u64) -> Result<(), Refusal> {
+        let number = order.trajectory;
+        let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
+        self.free_to_move()?;
+        // One that goes on is reported before what it does with the arm.
+        let turn = commander.turn()?;
+        self.take_lease(commander)?;
+        let reported = self.reported();
+        if !reported.is_fresh() {
+            return Err(Refusal::new(Outcome::NoController));
+        }
+        if !reported.is_ready() {
+            return Err(Refusal { error: error_number("not-ready"), ..Refusal::new(Outcome::NotReady) });
+        }
+        self.ask_to_move(commander, halt)?;
+        let order = RunOrder {
+            course: Course::Along(stored.trajectory.clone()),
+            approach: order.approach,
+            speed_percent: f64::from(order.speed),
+            repeat: order.repeat.into(),
+            accept_device_limits: false,
+        };
+        let what = format!("run of trajectory {number}, {}", stored.name);
+        let job = self.jobs.begin(commander, turn, what, move |task, session| run(task, session, &order))?;
+        self.begun(commander, &job);
+        Ok(())
+    }
+
+    fn recover(
+        self: &Arc<Self>,
+        commander: &Arc<Commander>,
+        command: Command,
+        halt: u64,
+    ) -> Result<(), Refusal> {
+        let source = match command {
+            Command::RecoverWithDefaults => ParameterSource::ControllerDefaults,
+            _ => ParameterSource::None,
+        };
+        self.free_to_move()?;
+        let turn = commander.turn()?;
+        self.take_lease(commander)?;
+        self.ask_to_move(commander, halt)?;
+        let job = self.jobs.begin(commander, turn, "recover".into(), move |task, session| {
+            let ended = || task.is_halted();
+            let error = match session.recover_until(source, ended, |step| task.note(step.to_string())) {
+                Ok(_) => None,
+                Err(Error::Cancelled) => Some(task.stopped()),
+                Err(error) => Some(ErrorObject::of(&error)),
+            };
+            (Done { finished: error.is_none(), ..Done::default() }, error)
+        })?;
+        self.begun(commander, &job);
+        Ok(())
+    }
+
+    fn begun(&self, commander: &Commander, job: &Job) {
+        self.set_job(job.number);
+        let (policy, _) = self.watchdog();
+        self.note(
+            "job",
+            json!({ "client": commander.client.0, "job": job.number, "what": job.what, "policy": policy }),
+        );
+    }
+
+    async fn resume(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
+        self.free_to_move()?;
+        self.take_lease(commander)?;
+        if !self.reported().is_paused() {
+            return Err(Refusal { error: error_number("not-paused"), ..Refusal::new(Outcome::NotReady) });
+        }
+        if commander.is_moving() {
+            self.ask_to_move(commander, halt)?;
+            if let Some(done) = commander.wish(Flow::Resume) {
+                return finished(done.await);
+            }
+        }
+        let turn = commander.turn()?;
+        self.ask_to_move(commander, halt)?;
+        call(commander, turn, Session::resume).await
+    }
+
+    async fn change_speed(&self, commander: &Commander, percent: u16) -> Result<(), Refusal> {
+        let part = u8::try_from(percent).ok().filter(|percent| (5..=100).contains(percent));
+        let part = part.ok_or_else(|| Refusal::new(Outcome::Value))?;
+        self.take_lease(commander)?;
+        match commander.wish(Flow::Speed(part)) {
+            Some(done) => finished(done.await)?,
+            None => {
+                let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(part) / 100.0);
+                call(commander, commander.turn()?, set).await?;
+            }
+        }
+        self.set_speed(Some(percent));
+        Ok(())
+    }
+
+    fn release(&self, commander: &Commander) -> Result<(), Refusal> {
+        if let Some(job) = commander.job() {
+            return Err(Unable::Busy(Some(job)).into());
+        }
+        // One who has none has none to give.
+        let _ = self.line.with(|line, now| line.release_lease(commander.client, now));
+        self.line.wake();
+        self.resign();
+        Ok(())
+    }
+
+    /// Something that is soon over, with the lease.
+    async fn call<E: Into<Error> + Send + 'static>(
+        &self,
+        commander: &Commander,
+        act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
+    ) -> Result<(), Refusal> {
+        let turn = commander.turn()?;
+        self.take_lease(commander)?;
+        call(commander, turn, act).await
+    }
+}
+
+/// What came of what was wished of a motion, which may have ended before.
+fn finished<E>(done: Result<Result<(), ErrorObject>, E>) -> Result<(), Refusal> {
+    done.map_err(|_| Refusal::new(Outcome::NotReady))?.map_err(Refusal::from)
+}
+
+async fn call<E: Into<Error> + Send + 'static>(
+    commander: &Commander,
+    turn: Turn,
+    act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
+) -> Result<(), Refusal> {
+    commander.act(turn, act).await?.map_err(|error| ErrorObject::of(&error.into()).into())
+}

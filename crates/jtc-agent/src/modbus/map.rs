@@ -1,0 +1,377 @@
+//! The register map: one table for what is served and for the page that describes it.
+use std::time::Duration;
+
+use jtc_host::sample::is_measured;
+use jtc_host::words;
+use jtc_wire::{ControllerState, JOINTS, Status, TrajectoryState};
+
+use super::codes::{Outcome, error_number};
+use super::pdu::Exception;
+use crate::jobs::{Job, NUMBER_MAX, Stage};
+
+/// Version of this map. It counts up when what has an address changes, not when something is added behind the rest.
+pub const VERSION: u16 = 1;
+/// A number that is not known.
+pub const UNKNOWN: u16 = u16::MAX;
+const UNKNOWN_LONG: u32 = u32::MAX;
+/// A controller that has not reported for longer is not there.
+pub const FRESH: Duration = Duration::from_secs(1);
+/// The heartbeat counts up so often.
+const HEARTBEAT: Duration = Duration::from_millis(100);
+
+/// Who commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u16)]
+pub enum Holder {
+    /// Nobody does.
+    #[default]
+    Nobody = 0,
+    /// The PLC that asks.
+    Own = 1,
+    /// Somebody else.
+    Other = 2,
+}
+
+/// What a connection is shown.
+#[derive(Clone, Debug, Default)]
+pub struct View {
+    /// Time of the agent.
+    pub now: Duration,
+    /// No arm moves.
+    pub simulated: bool,
+    /// The port is gone.
+    pub lost: bool,
+    /// What the controller reported last, and how long ago.
+    pub status: Option<(Duration, Status)>,
+    /// Speed override, %.
+    pub speed: Option<u16>,
+    /// Who commands.
+    pub holder: Holder,
+    /// Somebody has asked the PLC for the lease.
+    pub wanted: bool,
+    /// The last job that a PLC began.
+    pub job: Option<Job>,
+    /// The command that was acknowledged last, what became of it, and the code of its error.
+    pub acknowledged: u16,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Number of its error.
+    pub error: u16,
+}
+
+impl View {
+    fn status<T>(&self, unknown: T, read: impl FnOnce(&Status) -> T) -> T {
+        self.status.as_ref().map_or(unknown, |(_, status)| read(status))
+    }
+
+    fn joint(&self, n: usize, read: impl FnOnce(&jtc_wire::JointStatus) -> u32) -> u32 {
+        self.status(u32::from(UNKNOWN), |status| status.joints.get(n).map_or(u32::from(UNKNOWN), read))
+    }
+
+    /// A measured value of a joint; not a number where it is not known.
+    fn measured(&self, n: usize, read: impl FnOnce(&jtc_wire::JointStatus) -> f32) -> u32 {
+        let known = |status: &Status| {
+            let joint = status.joints.get(n).filter(|_| is_measured(status, n));
+            joint.map_or(f32::NAN, read)
+        };
+        self.status(f32::NAN, known).to_bits()
+    }
+
+    /// Of the last job; 0 where there was none.
+    fn job(&self, read: impl FnOnce(&Job) -> u32) -> u32 {
+        self.job.as_ref().map_or(0, read)
+    }
+
+    /// The controller reports now.
+    pub fn is_fresh(&self) -> bool {
+        !self.lost && self.status.as_ref().is_some_and(|(age, _)| *age <= FRESH)
+    }
+
+    /// It reports now, and this.
+    fn reports(&self, what: impl FnOnce(&Status) -> bool) -> bool {
+        self.is_fresh() && self.status(false, what)
+    }
+
+    /// The arm is held without errors, and nothing moves it: a motion can be begun.
+    pub fn is_ready(&self) -> bool {
+        self.reports(|s| {
+            s.state == ControllerState::HoldPos && s.errors == 0 && words::is_held(s) && !s.is_executing()
+        })
+    }
+
+    /// A motion is paused.
+    pub fn is_paused(&self) -> bool {
+        self.reports(|s| s.trajectory == TrajectoryState::Pause)
+    }
+}
+
+/// How a value lies in registers. Of two registers the first one has the upper 16 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// One register.
+    U16,
+    /// Two registers.
+    U32,
+    /// Two registers, IEEE 754.
+    F32,
+}
+
+impl Form {
+    /// Registers of a value.
+    pub fn words(self) -> u16 {
+        if self == Self::U16 { 1 } else { 2 }
+    }
+
+    /// As people write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U16 => "u16",
+            Self::U32 => "u32",
+            Self::F32 => "f32",
+        }
+    }
+}
+
+/// Input registers of one meaning.
+pub struct Input {
+    /// Address of the first, from 0.
+    pub at: u16,
+    /// How many values: one, or one a joint.
+    pub count: u16,
+    /// How each of them lies.
+    pub form: Form,
+    /// Name.
+    pub name: &'static str,
+    /// Meaning.
+    pub meaning: &'static str,
+    /// Its n-th value.
+    pub value: fn(&View, usize) -> u32,
+}
+
+/// A bit that is read.
+pub struct DiscreteInput {
+    /// Name.
+    pub name: &'static str,
+    /// Meaning.
+    pub meaning: &'static str,
+    /// Its value.
+    pub value: fn(&View) -> bool,
+}
+
+/// A holding register.
+pub struct Holding {
+    /// Name.
+    pub name: &'static str,
+    /// Smallest and largest value.
+    pub range: (u16, u16),
+    /// Value before it is written.
+    pub default: u16,
+    /// Meaning.
+    pub meaning: &'static str,
+}
+
+const fn one(
+    at: u16,
+    form: Form,
+    name: &'static str,
+    meaning: &'static str,
+    value: fn(&View, usize) -> u32,
+) -> Input {
+    Input { at, count: 1, form, name, meaning, value }
+}
+
+const fn joints(
+    at: u16,
+    form: Form,
+    name: &'static str,
+    meaning: &'static str,
+    value: fn(&View, usize) -> u32,
+) -> Input {
+    Input { at, count: JOINTS as u16, form, name, meaning, value }
+}
+
+/// The input registers, by address.
+#[rustfmt::skip]
+pub const INPUTS: &[Input] = &[
+    one(0, Form::U16, "map_version", "version of this map", |_, _| VERSION.into()),
+    one(1, Form::U16, "heartbeat", "counts up ten times a second as long as the agent runs, from 65535 to 0",
+        |v, _| (v.now.as_millis() / HEARTBEAT.as_millis()) as u32 & 0xFFFF),
+    one(2, Form::U16, "simulated", "1: no arm moves, the controller is simulated", |v, _| v.simulated.into()),
+    one(3, Form::U16, "port_lost", "1: the port of the controller is gone: nothing more reaches it", |v, _| v.lost.into()),
+    one(4, Form::U16, "status_age_ms", "ms since the controller reported; 65535: longer, or never. Old values are not those of now",
+        |v, _| v.status.map_or(UNKNOWN.into(), |(age, _)| age.as_millis().min(UNKNOWN.into()) as u32)),
+    one(5, Form::U16, "state", "state of the controller: 0 Start, 1 Init, 2 HoldPos, 3 Operate, 4 Teaching, 5 Error; 65535 before the first report",
+        |v, _| v.status(UNKNOWN.into(), |s| s.state.byte().into())),
+    one(6, Form::U16, "trajectory_state", "what becomes of the trajectory: 0 none, 1 at its start, 2 paused, 3 executed, 4 finished; 65535 alike",
+        |v, _| v.status(UNKNOWN.into(), |s| s.trajectory.byte().into())),
+    one(7, Form::U16, "errors", "errors of the controller now, bits of the table below", |v, _| v.status(0, |s| s.errors.into())),
+    one(8, Form::U16, "errors_occurred", "errors since they were cleared, the same bits", |v, _| v.status(0, |s| s.occurred.into())),
+    one(9, Form::U32, "point", "point of the trajectory, one each ms of its time", |v, _| v.status(0, |s| s.point)),
+    one(11, Form::U16, "speed_override", "speed on the path now, %; 65535: not known", |v, _| v.speed.unwrap_or(UNKNOWN).into()),
+    one(12, Form::U16, "lease", "who commands: 0 nobody, 1 this PLC, 2 somebody else", |v, _| v.holder as u32),
+    one(13, Form::U16, "lease_wanted", "1: somebody has asked this PLC for the lease", |v, _| v.wanted.into()),
+    one(14, Form::U16, "acknowledged", "the `sequence` of the last command that was answered", |v, _| v.acknowledged.into()),
+    one(15, Form::U16, "result", "what became of it: a code of the table of results", |v, _| v.outcome as u32),
+    one(16, Form::U16, "command_error", "why it failed: a code of the table of errors; 0: it did not", |v, _| v.error.into()),
+    one(17, Form::U32, "job", "number of the last job that a PLC began (a start, a recovery); 0: there was none", |v, _| v.job(|j| j.number as u32)),
+    one(19, Form::U16, "job_stage", "0 none, 1 running, 2 finished, 3 stopped, 4 failed", |v, _| v.job(|j| match j.stage {
+        Stage::Running => 1, Stage::Finished => 2, Stage::Stopped => 3, Stage::Failed => 4,
+    })),
+    one(20, Form::U16, "job_error", "why it failed or was stopped: a code of the table of errors; 0: no error",
+        |v, _| v.job(|j| j.error.as_ref().map_or(0, |e| error_number(e.code).into()))),
+    one(21, Form::U16, "job_error_joint", "joint of that error, 1 to 6 from the base; 0: none",
+        |v, _| v.job(|j| j.error.as_ref().and_then(|e| e.joint).unwrap_or(0).into())),
+    one(22, Form::U32, "job_error_point", "point of that error, as its text has it; 4294967295: none",
+        |v, _| v.job.as_ref().and_then(|j| j.error.as_ref()).and_then(|e| e.point).unwrap_or(UNKNOWN_LONG)),
+    one(24, Form::U16, "job_runs", "runs that the job has finished, approaches not counted", |v, _| v.job(|j| j.done.runs.min(u32::from(u16::MAX)))),
+    one(25, Form::U16, "pump", "pump of the gripper: 0 off, 1 on; 65535: not known",
+        |v, _| v.status(UNKNOWN.into(), |s| s.gripper.map_or(UNKNOWN.into(), |g| g.pump.into()))),
+    joints(26, Form::F32, "position", "rad, base to wrist; NaN: not known", |v, n| v.measured(n, |j| j.position)),
+    joints(38, Form::F32, "velocity", "rad/s, alike", |v, n| v.measured(n, |j| j.velocity)),
+    joints(50, Form::F32, "torque", "N·m, alike", |v, n| v.measured(n, |j| j.torque)),
+    joints(62, Form::U16, "temperature", "°C; 65535: not known",
+        |v, n| v.status(UNKNOWN.into(), |s| if is_measured(s, n) { s.joints.get(n).map_or(UNKNOWN.into(), |j| j.temperature.into()) } else { UNKNOWN.into() })),
+    joints(68, Form::U16, "joint_errors", "errors that the controller finds at the joint now, bits of the table below; 65535: not known", |v, n| v.joint(n, |j| j.internal.into())),
+    joints(74, Form::U16, "joint_errors_occurred", "the same since they were cleared", |v, n| v.joint(n, |j| j.internal_occurred.into())),
+    joints(80, Form::U16, "drive_state", "state of the drive: 3 enabled, 255 fault, others on the way; 65535: not known", |v, n| v.joint(n, |j| j.state.code().into())),
+];
+
+/// The discrete inputs, from address 0.
+#[rustfmt::skip]
+pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
+    DiscreteInput { name: "controller_there", meaning: "the controller has reported within the last second", value: View::is_fresh },
+    DiscreteInput { name: "simulated", meaning: "no arm moves", value: |v| v.simulated },
+    DiscreteInput { name: "port_lost", meaning: "the port of the controller is gone", value: |v| v.lost },
+    DiscreteInput { name: "error", meaning: "the controller reports an error now", value: |v| v.reports(|s| s.errors != 0 || s.state == ControllerState::Error) },
+    DiscreteInput { name: "ready", meaning: "the arm is held without errors, and nothing moves it", value: View::is_ready },
+    DiscreteInput { name: "executing", meaning: "a trajectory is executed", value: |v| v.reports(Status::is_executing) },
+    DiscreteInput { name: "paused", meaning: "a motion is paused", value: View::is_paused },
+    DiscreteInput { name: "teaching", meaning: "the arm is led by hand", value: |v| v.reports(|s| s.state == ControllerState::Teaching) },
+    DiscreteInput { name: "lease_own", meaning: "this PLC commands", value: |v| v.holder == Holder::Own },
+    DiscreteInput { name: "lease_other", meaning: "somebody else commands", value: |v| v.holder == Holder::Other },
+    DiscreteInput { name: "job_running", meaning: "the last job of a PLC goes on", value: |v| v.job.as_ref().is_some_and(|j| j.stage == Stage::Running) },
+    DiscreteInput { name: "job_finished", meaning: "it came to its end", value: |v| v.job.as_ref().is_some_and(|j| j.stage == Stage::Finished) },
+    DiscreteInput { name: "pump", meaning: "the pump of the gripper is on", value: |v| v.reports(|s| s.gripper.is_some_and(|g| g.pump == 1)) },
+];
+
+/// Addresses of the holding registers.
+pub mod holding {
+    /// ms without a request after which the policy applies.
+    pub const WATCHDOG: usize = 0;
+    /// What becomes of a motion then.
+    pub const POLICY: usize = 1;
+    /// Which trajectory.
+    pub const TRAJECTORY: usize = 2;
+    /// %.
+    pub const SPEED: usize = 3;
+    /// How often.
+    pub const REPEAT: usize = 4;
+    /// To its first point.
+    pub const APPROACH: usize = 5;
+    /// What is to be done.
+    pub const COMMAND: usize = 6;
+    /// The number that has it done.
+    pub const SEQUENCE: usize = 7;
+    /// How many there are.
+    pub const COUNT: usize = 8;
+}
+
+/// Shortest watchdog, ms.
+pub const WATCHDOG_MIN: u16 = 100;
+
+/// The holding registers, from address 0.
+#[rustfmt::skip]
+pub const HOLDINGS: [Holding; holding::COUNT] = [
+    Holding { name: "watchdog_ms", range: (0, 60_000), default: 1000,
+        meaning: "without a request for so long the policy applies, ms, 100 or more; 0: off, which nobody who commands can have" },
+    Holding { name: "policy", range: (0, 2), default: 1, meaning: "what becomes of a motion then: 0 it goes on, 1 it pauses, 2 it stops" },
+    Holding { name: "trajectory", range: (0, NUMBER_MAX), default: 0, meaning: "number of the trajectory to start; 0: none" },
+    Holding { name: "speed", range: (1, 1000), default: 100,
+        meaning: "%: for a start, of the trajectory's own speed; for `set speed`, of the speed on the path, 5 to 100" },
+    Holding { name: "repeat", range: (1, u16::MAX), default: 1, meaning: "how often it is run" },
+    Holding { name: "approach", range: (0, 1), default: 0, meaning: "1: where the arm stands elsewhere it is moved to the first point" },
+    Holding { name: "command", range: (0, super::codes::COMMAND_MAX), default: 0, meaning: "a command of the table of commands" },
+    Holding { name: "sequence", range: (0, u16::MAX), default: 0, meaning: "`acknowledged` and one: now the command is done" },
+];
+
+/// Address of the coil that stops.
+pub const STOP: usize = 0;
+/// Address of the coil that pauses.
+pub const PAUSE: usize = 1;
+/// The coils, from address 0: name and meaning.
+pub const COILS: [(&str, &str); 2] = [
+    ("stop", "from 0 to 1: the motion is stopped on its path, at once"),
+    ("pause", "from 0 to 1: the motion is paused on its path, at once"),
+];
+
+/// The whole image of the input registers.
+pub fn inputs(view: &View) -> Vec<u16> {
+    let mut all = Vec::new();
+    for row in INPUTS {
+        for n in 0..usize::from(row.count) {
+            let value = (row.value)(view, n);
+            if row.form != Form::U16 {
+                all.push((value >> 16) as u16);
+            }
+            all.push(value as u16);
+        }
+    }
+    all
+}
+
+/// `count` of a table from address `at`.
+///
+/// # Errors
+///
+/// [`Exception::Address`].
+pub fn span<T: Clone>(all: &[T], at: u16, count: usize) -> Result<Vec<T>, Exception> {
+    let at = usize::from(at);
+    all.get(at..at + count).map(<[T]>::to_vec).ok_or(Exception::Address)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_lie_one_behind_the_other() {
+        let mut next = 0;
+        for row in INPUTS {
+            assert_eq!(row.at, next, "{}", row.name);
+            next += row.count * row.form.words();
+        }
+        assert_eq!(inputs(&View::default()).len(), usize::from(next));
+        let mut names: Vec<_> = INPUTS.iter().map(|row| row.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), INPUTS.len(), "each has a name of its own");
+        for row in &HOLDINGS {
+            assert!((row.range.0..=row.range.1).contains(&row.default), "{}", row.name);
+        }
+    }
+
+    /// What the page promises of the order of the words, in bytes that were written by hand: 1.5 is 3FC00000, 70000 is 00011170.
+    #[test]
+    fn two_registers_have_the_upper_half_first() {
+        let mut status = Status { point: 70_000, ..Status::default() };
+        status.joints[1].position = 1.5;
+        let image = inputs(&View { status: Some((Duration::from_millis(7), status)), ..View::default() });
+        assert_eq!(image[9..11], [0x0001, 0x1170]);
+        assert_eq!(image[26 + 2..26 + 4], [0x3FC0, 0x0000]);
+        assert_eq!(image[4], 7);
+    }
+
+    #[test]
+    fn what_is_not_known_is_no_number() {
+        let image = inputs(&View::default());
+        assert_eq!(
+            (image[4], image[5], image[6], image[11], image[62]),
+            (UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
+        );
+        for joint in 0..3 * JOINTS {
+            let at = 26 + 2 * joint;
+            let bits = u32::from(image[at]) << 16 | u32::from(image[at + 1]);
+            assert!(f32::from_bits(bits).is_nan(), "{at}");
+        }
+    }
+}

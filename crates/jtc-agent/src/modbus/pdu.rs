@@ -1,0 +1,310 @@
+//! Requests and responses of Modbus TCP, without I/O: bytes go in, bytes come out.
+//!
+//! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b. A request is checked in
+//! the order of its state diagrams: function, quantity, address, then it is done. Whatever the bytes are, there is an answer or the end of the
+//! connection, and nothing that is written is written in part.
+
+/// Bytes of the header in front of a request: transaction, protocol, length, unit.
+pub const HEADER_LEN: usize = 7;
+/// Longest request or response behind the header.
+const PDU_MAX: usize = 253;
+/// Most that one request may read or write, by the standard.
+const READ_BITS_MAX: u16 = 2000;
+const READ_REGISTERS_MAX: u16 = 125;
+const WRITE_BITS_MAX: u16 = 1968;
+const WRITE_REGISTERS_MAX: u16 = 123;
+
+/// The four tables of a Modbus device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Table {
+    /// Bits that are written.
+    Coils,
+    /// Bits that are read only.
+    DiscreteInputs,
+    /// Registers that are written.
+    HoldingRegisters,
+    /// Registers that are read only.
+    InputRegisters,
+}
+
+/// Why a request is not done, as the standard numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exception {
+    /// The device has no such function.
+    Function = 1,
+    /// The device has nothing at one of the addresses.
+    Address = 2,
+    /// A quantity, a length or a value is not possible.
+    Value = 3,
+    /// The device failed to do it: here, the controller cannot be reached.
+    Failure = 4,
+    /// The device is busy with somebody else: here, another connection commands.
+    Busy = 6,
+}
+
+/// What answers requests.
+pub trait Device {
+    /// The bits of a table, `count` of them from address `at`.
+    ///
+    /// # Errors
+    ///
+    /// [`Exception`].
+    fn bits(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<bool>, Exception>;
+
+    /// The registers of a table, `count` of them from address `at`.
+    ///
+    /// # Errors
+    ///
+    /// [`Exception`].
+    fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception>;
+
+    /// Writes coils from address `at` on: all of them or none.
+    ///
+    /// # Errors
+    ///
+    /// [`Exception`]: nothing was written.
+    fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception>;
+
+    /// Writes holding registers from address `at` on: all of them or none.
+    ///
+    /// # Errors
+    ///
+    /// [`Exception`]: nothing was written.
+    fn write_registers(&mut self, at: u16, values: &[u16]) -> Result<(), Exception>;
+}
+
+/// Header of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// What the client counts its requests with, and the unit: both go back as they came.
+    transaction: [u8; 2],
+    unit: u8,
+    /// Bytes of the request behind the header.
+    pub len: usize,
+}
+
+impl Header {
+    /// `None`: this is no Modbus, or a length that no request has. There is no telling where the next one begins.
+    pub fn parse(bytes: [u8; HEADER_LEN]) -> Option<Self> {
+        let [t0, t1, p0, p1, l0, l1, unit] = bytes;
+        let len = usize::from(u16::from_be_bytes([l0, l1])).checked_sub(1)?;
+        let whole = [p0, p1] == [0, 0] && (1..=PDU_MAX).contains(&len);
+        whole.then_some(Self { transaction: [t0, t1], unit, len })
+    }
+
+    /// The response with its header.
+    pub fn respond(&self, pdu: &[u8]) -> Vec<u8> {
+        let len = (pdu.len() + 1) as u16;
+        let head = [self.transaction, [0, 0], len.to_be_bytes()];
+        head.into_iter().flatten().chain([self.unit]).chain(pdu.iter().copied()).collect()
+    }
+}
+
+/// The response of a device to a request. True: it was done.
+pub fn answer(pdu: &[u8], device: &mut impl Device) -> (Vec<u8>, bool) {
+    let function = pdu.first().copied().unwrap_or(0);
+    match act(pdu, device) {
+        Ok(response) => (response, true),
+        Err(exception) => (vec![function | 0x80, exception as u8], false),
+    }
+}
+
+fn act(pdu: &[u8], device: &mut impl Device) -> Result<Vec<u8>, Exception> {
+    let (function, rest) = pdu.split_first().ok_or(Exception::Function)?;
+    match function {
+        1 => read_bits(*function, Table::Coils, rest, device),
+        2 => read_bits(*function, Table::DiscreteInputs, rest, device),
+        3 => read_registers(*function, Table::HoldingRegisters, rest, device),
+        4 => read_registers(*function, Table::InputRegisters, rest, device),
+        5 => {
+            let (at, value) = two(rest)?;
+            let on = match value {
+                0xFF00 => true,
+                0 => false,
+                _ => return Err(Exception::Value),
+            };
+            device.write_coils(at, &[on])?;
+            Ok(pdu.to_vec())
+        }
+        6 => {
+            let (at, value) = two(rest)?;
+            device.write_registers(at, &[value])?;
+            Ok(pdu.to_vec())
+        }
+        15 => {
+            let (at, count, data) = many(rest, WRITE_BITS_MAX, |count| count.div_ceil(8))?;
+            let bit = |n: usize| data.get(n / 8).is_some_and(|byte| byte >> (n % 8) & 1 == 1);
+            device.write_coils(at, &(0..count).map(bit).collect::<Vec<_>>())?;
+            Ok(pdu.iter().copied().take(5).collect())
+        }
+        16 => {
+            let (at, _, data) = many(rest, WRITE_REGISTERS_MAX, |count| 2 * count)?;
+            let values: Vec<u16> = data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+            device.write_registers(at, &values)?;
+            Ok(pdu.iter().copied().take(5).collect())
+        }
+        _ => Err(Exception::Function),
+    }
+}
+
+fn read_bits(
+    function: u8,
+    table: Table,
+    rest: &[u8],
+    device: &mut impl Device,
+) -> Result<Vec<u8>, Exception> {
+    let (at, count) = span(rest, READ_BITS_MAX)?;
+    let bits = device.bits(table, at, count)?;
+    let mut packed = vec![0; bits.len().div_ceil(8)];
+    for (n, _) in bits.iter().enumerate().filter(|(_, bit)| **bit) {
+        packed[n / 8] |= 1 << (n % 8);
+    }
+    Ok([function, packed.len() as u8].into_iter().chain(packed).collect())
+}
+
+fn read_registers(
+    function: u8,
+    table: Table,
+    rest: &[u8],
+    device: &mut impl Device,
+) -> Result<Vec<u8>, Exception> {
+    let (at, count) = span(rest, READ_REGISTERS_MAX)?;
+    let values = device.registers(table, at, count)?;
+    let bytes = values.iter().flat_map(|value| value.to_be_bytes());
+    Ok([function, (2 * values.len()) as u8].into_iter().chain(bytes).collect())
+}
+
+/// Two words, and no more.
+fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
+    let [a, b, c, d] = rest.try_into().map_err(|_| Exception::Value)?;
+    Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
+}
+
+/// An address, and a quantity of 1 to `most`.
+fn span(rest: &[u8], most: u16) -> Result<(u16, u16), Exception> {
+    two(rest).and_then(|(at, count)| quantity(count, most).map(|_| (at, count)))
+}
+
+fn quantity(count: u16, most: u16) -> Result<usize, Exception> {
+    if (1..=most).contains(&count) { Ok(usize::from(count)) } else { Err(Exception::Value) }
+}
+
+/// An address, a quantity, and exactly the data of so many.
+fn many(rest: &[u8], most: u16, len: fn(usize) -> usize) -> Result<(u16, usize, &[u8]), Exception> {
+    let (head, data) = rest.split_at_checked(5).ok_or(Exception::Value)?;
+    let (at, count) = two(&head[..4])?;
+    let count = quantity(count, most)?;
+    let whole = data.len() == len(count) && usize::from(head[4]) == data.len();
+    if whole { Ok((at, count, data)) } else { Err(Exception::Value) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Eight of everything, and what was written.
+    #[derive(Default)]
+    struct Eight {
+        coils: [bool; 8],
+        holdings: [u16; 8],
+        writes: usize,
+    }
+
+    fn part<T: Clone>(all: &[T], at: u16, count: usize) -> Result<Vec<T>, Exception> {
+        let at = usize::from(at);
+        all.get(at..at + count).map(<[T]>::to_vec).ok_or(Exception::Address)
+    }
+
+    impl Device for Eight {
+        fn bits(&mut self, _: Table, at: u16, count: u16) -> Result<Vec<bool>, Exception> {
+            part(&self.coils, at, count.into())
+        }
+
+        fn registers(&mut self, _: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception> {
+            part(&self.holdings, at, count.into())
+        }
+
+        fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception> {
+            part(&self.coils, at, values.len())?;
+            self.coils[usize::from(at)..][..values.len()].copy_from_slice(values);
+            self.writes += 1;
+            Ok(())
+        }
+
+        fn write_registers(&mut self, at: u16, values: &[u16]) -> Result<(), Exception> {
+            part(&self.holdings, at, values.len())?;
+            self.holdings[usize::from(at)..][..values.len()].copy_from_slice(values);
+            self.writes += 1;
+            Ok(())
+        }
+    }
+
+    fn ask(device: &mut Eight, pdu: &[u8]) -> Vec<u8> {
+        answer(pdu, device).0
+    }
+
+    /// The standard's own examples have these forms (V1.1b3, 6.1 to 6.12).
+    #[test]
+    fn requests_are_answered_as_the_standard_has_it() {
+        let mut device = Eight::default();
+        assert_eq!(ask(&mut device, &[5, 0, 2, 0xFF, 0]), [5, 0, 2, 0xFF, 0]);
+        assert_eq!(ask(&mut device, &[15, 0, 4, 0, 3, 1, 0b101]), [15, 0, 4, 0, 3]);
+        assert_eq!(ask(&mut device, &[1, 0, 0, 0, 8]), [1, 1, 0b0101_0100]);
+        assert_eq!(ask(&mut device, &[6, 0, 1, 0xAB, 0xCD]), [6, 0, 1, 0xAB, 0xCD]);
+        assert_eq!(ask(&mut device, &[16, 0, 2, 0, 2, 4, 0, 1, 2, 3]), [16, 0, 2, 0, 2]);
+        assert_eq!(ask(&mut device, &[3, 0, 1, 0, 3]), [3, 6, 0xAB, 0xCD, 0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn what_is_wrong_gets_the_exception_of_the_standard_and_writes_nothing() {
+        let mut device = Eight::default();
+        for (pdu, exception) in [
+            (&[7][..], 1),
+            (&[0x16, 0, 0, 0, 0, 0, 0], 1),
+            (&[3, 0, 0, 0, 0], 3),
+            (&[3, 0, 0, 0, 126], 3),
+            (&[1, 0, 0, 0x07, 0xD1], 3),
+            (&[3, 0, 0, 0, 9], 2),
+            (&[3, 0xFF, 0xFF, 0, 1], 2),
+            (&[3, 0, 0, 0], 3),
+            (&[3, 0, 0, 0, 1, 0], 3),
+            (&[5, 0, 0, 1, 0], 3),
+            (&[5, 0, 8, 0xFF, 0], 2),
+            (&[6, 0, 8, 0, 0], 2),
+            (&[15, 0, 0, 0, 9, 1, 0], 3),
+            (&[15, 0, 0, 0xFF, 0xFF, 1, 0], 3),
+            (&[16, 0, 0, 0x80, 1, 2, 0, 0], 3),
+            (&[16, 0, 0, 0, 1, 4, 0, 0], 3),
+            (&[16, 0, 7, 0, 2, 4, 0, 0, 0, 0], 2),
+        ] {
+            assert_eq!(ask(&mut device, pdu), [pdu[0] | 0x80, exception], "{pdu:02x?}");
+        }
+        assert_eq!(device.writes, 0);
+    }
+
+    #[test]
+    fn what_is_no_modbus_has_no_header() {
+        for text in [*b"POST / ", *b"GET /ap", [0x16, 3, 1, 2, 0, 1, 0]] {
+            assert_eq!(Header::parse(text), None);
+        }
+        assert_eq!(Header::parse([0, 1, 0, 0, 0, 1, 9]), None, "nothing behind the header");
+        assert_eq!(Header::parse([0, 1, 0, 0, 0, 255, 9]), None, "longer than a request is");
+        let header = Header::parse([1, 2, 0, 0, 0, 6, 9]).expect("a header");
+        assert_eq!((header.len, header.respond(&[3, 0])), (5, vec![1, 2, 0, 0, 0, 3, 9, 3, 0]));
+    }
+
+    proptest! {
+        /// Any bytes have an answer of their function, no longer than a response may be, and never write more than there is.
+        #[test]
+        fn any_bytes_are_answered(function in 0..24_u8, rest in prop::collection::vec(any::<u8>(), 0..PDU_MAX)) {
+            let pdu: Vec<u8> = [function].into_iter().chain(rest).collect();
+            let mut device = Eight::default();
+            let (response, done) = answer(&pdu, &mut device);
+            prop_assert!((2..=PDU_MAX).contains(&response.len()));
+            prop_assert_eq!(response[0], if done { function } else { function | 0x80 });
+            prop_assert!(done || device.writes == 0);
+        }
+    }
+}

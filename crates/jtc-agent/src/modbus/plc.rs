@@ -1,0 +1,390 @@
+//! What a PLC's requests do: what it is shown, who of several commands, and what becomes of a command.
+use std::collections::BTreeMap;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use jtc_wire::ExecCommand;
+use serde_json::json;
+
+use super::codes::{Command, Outcome};
+use super::handshake::{Handshake, Order};
+use super::map::{self, COILS, DISCRETE_INPUTS, Holder, View, holding};
+use super::pdu::{self, Device, Exception, Table};
+use crate::jobs::{Commander, Happening, Jobs};
+use crate::line::{Introduction, Policy, Role};
+use crate::log::CommandLog;
+use crate::owner::Line;
+
+/// What a PLC is called on the line.
+const NAME: &str = "the PLC (Modbus)";
+/// A connection that commands and has no watchdog, or a short one, is gone after so long without a request.
+const GONE: Duration = Duration::from_secs(1);
+const GONE_UNWATCHED: Duration = Duration::from_secs(60);
+
+/// A connection of a PLC.
+#[derive(Clone, Copy, Debug)]
+pub struct Connection {
+    /// Its number; numbers are not used again.
+    pub number: u64,
+    /// Where it comes from.
+    pub peer: SocketAddr,
+}
+
+/// Who writes the holding registers.
+struct Operator {
+    address: IpAddr,
+    /// `None`: it has gone, or has let the lease go.
+    connection: Option<u64>,
+    seen: Instant,
+}
+
+struct State {
+    handshake: Handshake,
+    operator: Option<Operator>,
+    /// Coils of each connection that has written one.
+    coils: BTreeMap<u64, [bool; COILS.len()]>,
+    commander: Arc<Commander>,
+    /// The last job, the event up to which it was looked at, and its runs.
+    job: Option<u64>,
+    looked: u64,
+    runs: u32,
+    speed: Option<u16>,
+    asked: Option<Instant>,
+}
+
+/// The one device that all connections speak with.
+pub struct Plc {
+    pub(super) line: Line,
+    pub(super) jobs: Arc<Jobs>,
+    log: Arc<Mutex<CommandLog>>,
+    simulated: bool,
+    state: Mutex<State>,
+}
+
+impl Plc {
+    /// That of a line; the number behind `sequence` is that of the first command.
+    pub fn new(
+        line: Line,
+        jobs: Arc<Jobs>,
+        log: Arc<Mutex<CommandLog>>,
+        simulated: bool,
+        sequence: u16,
+    ) -> Arc<Self> {
+        let state = State {
+            handshake: Handshake::new(sequence),
+            operator: None,
+            coils: BTreeMap::new(),
+            // From now on: somebody's Stop concerns it also where it has not asked for anything yet.
+            commander: commander(&line),
+            job: None,
+            looked: 0,
+            runs: 0,
+            speed: None,
+            asked: None,
+        };
+        Arc::new(Self { line, jobs, log, simulated, state: Mutex::new(state) })
+    }
+
+    /// The response to a request.
+    pub fn respond(self: &Arc<Self>, connection: &Connection, request: &[u8]) -> Vec<u8> {
+        self.lock().asked = Some(Instant::now());
+        let (response, done) = pdu::answer(request, &mut Asking { plc: self, connection });
+        if done {
+            self.renew(connection);
+        }
+        response
+    }
+
+    /// A connection has gone. The lease goes on until the watchdog, for a PLC that connects again.
+    pub fn left(&self, connection: &Connection) {
+        let mut state = self.lock();
+        state.coils.remove(&connection.number);
+        if let Some(operator) = &mut state.operator {
+            operator.connection = operator.connection.filter(|number| *number != connection.number);
+        }
+    }
+
+    /// This connection commands.
+    pub fn is_operator(&self, connection: u64) -> bool {
+        let state = self.lock();
+        state.operator.as_ref().is_some_and(|operator| {
+            operator.connection == Some(connection) && !operator.is_gone(&state.handshake)
+        })
+    }
+
+    /// Somebody has asked for something in the last time.
+    pub fn is_asked(&self, within: Duration) -> bool {
+        self.lock().asked.is_some_and(|asked| asked.elapsed() < within)
+    }
+
+    /// The speed override is this, %.
+    pub fn set_speed(&self, percent: Option<u16>) {
+        self.lock().speed = percent;
+    }
+
+    pub(super) fn set_job(&self, job: u64) {
+        let mut state = self.lock();
+        (state.job, state.runs, state.looked) = (Some(job), 0, 0);
+    }
+
+    /// The client of the line that the commands are sent by.
+    pub(super) fn commander(&self) -> Arc<Commander> {
+        let mut state = self.lock();
+        if self.line.with(|line, _| line.introduction(state.commander.client).is_none()) {
+            // It was put out.
+            state.commander = commander(&self.line);
+        }
+        state.commander.clone()
+    }
+
+    /// A coil of some connection is 1: somebody wants the arm to stand.
+    pub(super) fn is_held_by_a_coil(&self) -> bool {
+        self.lock().coils.values().any(|coils| coils.contains(&true))
+    }
+
+    /// What becomes of a motion without the PLC, and how long that takes.
+    pub(super) fn watchdog(&self) -> (Policy, Duration) {
+        watchdog(&self.lock().handshake)
+    }
+
+    /// The PLC lets the lease go.
+    pub(super) fn resign(&self) {
+        if let Some(operator) = &mut self.lock().operator {
+            operator.connection = None;
+        }
+    }
+
+    pub(super) fn note(&self, what: &str, facts: serde_json::Value) {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+    }
+
+    /// Somebody may not connect.
+    pub fn refused(&self, peer: SocketAddr, why: &str) {
+        self.note("refused", json!({ "from": peer.to_string(), "path": "modbus", "why": why }));
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn has_lease(&self, state: &State) -> bool {
+        self.line.with(|line, _| line.lease().is_some_and(|lease| lease.holder == state.commander.client))
+    }
+
+    /// A request of the connection that commands shows that it is there.
+    fn renew(&self, connection: &Connection) {
+        let mut state = self.lock();
+        let Some(operator) =
+            state.operator.as_mut().filter(|operator| operator.connection == Some(connection.number))
+        else {
+            return;
+        };
+        operator.seen = Instant::now();
+        let (policy, lasts) = watchdog(&state.handshake);
+        let client = state.commander.client;
+        self.line.with(|line, now| {
+            let lives = |until: Option<Duration>| until.is_none_or(|until| now < until);
+            if line.lease().is_some_and(|lease| lease.holder == client && lives(lease.until)) {
+                line.set_policy(client, policy);
+                // It has it.
+                let _ = line.take_lease(client, Some(lasts), now);
+            }
+        });
+    }
+
+    /// What a connection is shown.
+    fn view(&self, connection: &Connection) -> View {
+        let lost = self.line.lost().is_some();
+        let mut state = self.lock();
+        let own = state.operator.as_ref().is_none_or(|operator| match operator.connection {
+            Some(number) => number == connection.number,
+            None => operator.address == connection.peer.ip(),
+        });
+        let client = state.commander.client;
+        let (now, status, holder, wanted) = self.line.with(|line, now| {
+            let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
+            let holder = line.lease().map_or(Holder::Nobody, |lease| {
+                if lease.holder == client && own { Holder::Own } else { Holder::Other }
+            });
+            let wanted =
+                line.lease().is_some_and(|lease| lease.holder == client && lease.wanted_by.is_some());
+            (now, status, holder, wanted)
+        });
+        let job = state.job.and_then(|number| self.jobs.job(number)).map(|mut job| {
+            job.done.runs = job.done.runs.max(self.runs(&mut state, job.number));
+            job
+        });
+        let (acknowledged, outcome, error) = state.handshake.last();
+        let (simulated, speed) = (self.simulated, state.speed);
+        View { now, simulated, lost, status, speed, holder, wanted, job, acknowledged, outcome, error }
+    }
+
+    /// Runs that a job has finished, while it goes on.
+    fn runs(&self, state: &mut State, job: u64) -> u32 {
+        if self.jobs.journal.last() != state.looked {
+            let excerpt = self.jobs.journal.after(state.looked, Some(job), usize::from(u16::MAX));
+            state.looked = excerpt.last;
+            for event in excerpt.events {
+                if let Happening::Finished { runs, .. } = event.event {
+                    state.runs = runs;
+                }
+            }
+        }
+        state.runs
+    }
+
+    /// Stops or pauses for a connection, ahead of all else.
+    fn halt(&self, connection: &Connection, command: ExecCommand) -> Result<(), Exception> {
+        let (name, lost) = (format!("the PLC at {}", connection.peer.ip()), self.line.lost());
+        let facts = json!({
+            "command": command.name(), "from": connection.peer.to_string(), "by": name, "lost": lost,
+        });
+        self.note("halt", facts);
+        if lost.is_some() {
+            return Err(Exception::Failure);
+        }
+        // After its own one it goes on when it likes.
+        let state = self.lock();
+        let is_own = |operator: &Operator| operator.connection == Some(connection.number);
+        let own = state.operator.as_ref().is_some_and(is_own).then_some(state.commander.client);
+        drop(state);
+        self.line.with(|line, now| line.halt_for(own, &name, command, now));
+        Ok(())
+    }
+
+    /// Does what was commanded, and acknowledges it.
+    fn obey(self: &Arc<Self>, connection: Connection, order: Order, busy: bool) {
+        let halt = match order.command {
+            Command::Stop => Some(ExecCommand::Stop),
+            Command::Pause => Some(ExecCommand::Pause),
+            _ => None,
+        };
+        if let Some(halt) = halt {
+            let sent = self.halt(&connection, halt);
+            let outcome = if sent.is_ok() { Outcome::Done } else { Outcome::NoController };
+            return self.lock().handshake.acknowledge(order.sequence, outcome, 0);
+        }
+        if busy || order.command == Command::None {
+            let outcome = if busy { Outcome::Busy } else { Outcome::Done };
+            return self.lock().handshake.acknowledge(order.sequence, outcome, 0);
+        }
+        // A Stop that comes before it is begun is behind it.
+        let (plc, halt) = (self.clone(), self.line.last_halt());
+        tokio::spawn(async move {
+            let refusal = plc.act(&order, halt).await.err();
+            let facts = json!({
+                "client": plc.commander().client.0, "command": order.command.text(), "sequence": order.sequence,
+                "from": connection.peer.to_string(),
+                "why_not": refusal.as_ref().map(|refusal| refusal.why.clone()),
+            });
+            plc.note("command", facts);
+            let (outcome, error) =
+                refusal.map_or((Outcome::Done, 0), |refusal| (refusal.outcome, refusal.error));
+            plc.lock().handshake.acknowledge(order.sequence, outcome, error);
+        });
+    }
+}
+
+impl Operator {
+    /// Nothing comes from it any more.
+    fn is_gone(&self, handshake: &Handshake) -> bool {
+        let after = match handshake.watchdog_ms() {
+            0 => GONE_UNWATCHED,
+            ms => Duration::from_millis(ms.into()).max(GONE),
+        };
+        self.connection.is_none() || self.seen.elapsed() > after
+    }
+}
+
+impl State {
+    /// This connection writes the holding registers from now on, if no other one does. `leased`: a PLC has the lease.
+    fn operate(&mut self, connection: &Connection, leased: bool) -> Result<(), Exception> {
+        let address = connection.peer.ip();
+        let same = self.operator.as_ref().is_some_and(|operator| operator.address == address);
+        if let Some(operator) = self.operator.as_ref().filter(|o| o.connection != Some(connection.number))
+            && (!operator.is_gone(&self.handshake) || (leased && !same))
+        {
+            return Err(Exception::Busy);
+        }
+        if !same {
+            self.handshake.forget();
+        }
+        self.operator = Some(Operator { address, connection: Some(connection.number), seen: Instant::now() });
+        Ok(())
+    }
+}
+
+fn commander(line: &Line) -> Arc<Commander> {
+    let introduction = Introduction { name: NAME.into(), role: Role::Operator, policy: Policy::Pause };
+    Commander::new(line, introduction)
+}
+
+fn watchdog(handshake: &Handshake) -> (Policy, Duration) {
+    let policy = match handshake.values()[holding::POLICY] {
+        0 => Policy::Continue,
+        2 => Policy::Stop,
+        _ => Policy::Pause,
+    };
+    (policy, Duration::from_millis(handshake.watchdog_ms().into()))
+}
+
+/// A connection that asks.
+struct Asking<'a> {
+    plc: &'a Arc<Plc>,
+    connection: &'a Connection,
+}
+
+impl Device for Asking<'_> {
+    fn bits(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<bool>, Exception> {
+        let all = match table {
+            Table::Coils => {
+                self.plc.lock().coils.get(&self.connection.number).copied().unwrap_or_default().to_vec()
+            }
+            _ => {
+                let view = self.plc.view(self.connection);
+                DISCRETE_INPUTS.iter().map(|row| (row.value)(&view)).collect()
+            }
+        };
+        map::span(&all, at, count.into())
+    }
+
+    fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception> {
+        match table {
+            Table::HoldingRegisters => map::span(self.plc.lock().handshake.values(), at, count.into()),
+            _ => map::span(&map::inputs(&self.plc.view(self.connection)), at, count.into()),
+        }
+    }
+
+    fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception> {
+        let number = self.connection.number;
+        let mut coils = self.plc.lock().coils.get(&number).copied().unwrap_or_default();
+        map::span(&coils, at, values.len())?;
+        let before = coils;
+        coils[usize::from(at)..][..values.len()].copy_from_slice(values);
+        let rises = |coil: usize| coils[coil] && !before[coil];
+        // A Stop is more than a Pause.
+        if rises(map::STOP) {
+            self.plc.halt(self.connection, ExecCommand::Stop)?;
+        } else if rises(map::PAUSE) {
+            self.plc.halt(self.connection, ExecCommand::Pause)?;
+        }
+        self.plc.lock().coils.insert(number, coils);
+        Ok(())
+    }
+
+    fn write_registers(&mut self, at: u16, values: &[u16]) -> Result<(), Exception> {
+        let (order, busy) = {
+            let mut state = self.plc.lock();
+            let leased = self.plc.has_lease(&state);
+            state.handshake.check(at, values, leased)?;
+            state.operate(self.connection, leased)?;
+            let busy = state.handshake.is_pending();
+            (state.handshake.write(at, values), busy)
+        };
+        if let Some(order) = order {
+            self.plc.obey(*self.connection, order, busy);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,244 @@
+//! Connections of PLCs: who may come, how many, how fast.
+use std::collections::BTreeMap;
+use std::io;
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use jtc_host::session::Session;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+use tokio::task::AbortHandle;
+use tokio::time::timeout;
+
+use super::allow::Allowed;
+use super::pdu::{HEADER_LEN, Header};
+use super::plc::{Connection, Plc};
+
+/// Connections at once.
+pub const CONNECTIONS_MAX: usize = 8;
+/// One that does not command gives way to a new one when it has not asked for anything for so long.
+const GIVES_WAY: Duration = Duration::from_secs(2);
+/// One that has not asked for anything for so long is closed. Longer than the longest watchdog.
+const IDLE: Duration = Duration::from_secs(90);
+/// How long a response may be left untaken.
+const SEND_TIME: Duration = Duration::from_secs(5);
+/// Requests of a connection in a second, and at once.
+const REQUESTS_PER_S: f64 = 250.0;
+const REQUESTS_AT_ONCE: f64 = 50.0;
+/// How often is looked whether it is to end.
+const LOOK: Duration = Duration::from_millis(50);
+/// How often the controller is asked for its speed override, while somebody asks for anything.
+const SPEED: Duration = Duration::from_secs(2);
+
+/// A Modbus server, on a thread of its own, until it is dropped.
+pub struct Server {
+    ended: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Serves `plc` at `listener`, for those who are allowed.
+    ///
+    /// # Errors
+    ///
+    /// The system has no threads, or the listener fails.
+    pub fn start(listener: TcpListener, allowed: Allowed, plc: Arc<Plc>) -> io::Result<Self> {
+        listener.set_nonblocking(true)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let listener = {
+            let _entered = runtime.enter();
+            tokio::net::TcpListener::from_std(listener)?
+        };
+        let ended = Arc::new(AtomicBool::new(false));
+        let end = ended.clone();
+        let serve = move || {
+            runtime.block_on(async move {
+                tokio::select! {
+                    () = accept(&listener, &allowed, &plc) => {}
+                    () = ask_speed(&plc) => {}
+                    () = until(&end) => {}
+                }
+            });
+        };
+        let thread = std::thread::Builder::new().name("modbus".into()).spawn(serve)?;
+        Ok(Self { ended, thread: Some(thread) })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic of that thread has been printed.
+            drop(thread.join());
+        }
+    }
+}
+
+async fn until(ended: &AtomicBool) {
+    while !ended.load(Ordering::Relaxed) {
+        tokio::time::sleep(LOOK).await;
+    }
+}
+
+/// Keeps the speed override that is shown the one that the controller has.
+async fn ask_speed(plc: &Plc) {
+    loop {
+        if plc.is_asked(SPEED) && plc.line.lost().is_none() {
+            let asked = plc.jobs.asker().call_in_turn(Session::speed).await;
+            let percent = asked.ok().and_then(Result::ok).map(|speed| (speed * 100.0).round() as u16);
+            plc.set_speed(percent);
+        }
+        tokio::time::sleep(SPEED).await;
+    }
+}
+
+/// A connection that is open.
+struct Open {
+    /// When it asked for something last, ms.
+    seen: Arc<AtomicU64>,
+    abort: AbortHandle,
+}
+
+type Connections = Arc<Mutex<BTreeMap<u64, Open>>>;
+
+/// Takes connections for ever.
+async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc<Plc>) {
+    let (connections, start, mut last) = (Connections::default(), Instant::now(), 0);
+    loop {
+        let Ok((stream, peer)) = listener.accept().await else {
+            // No more files, for the time being.
+            tokio::time::sleep(LOOK).await;
+            continue;
+        };
+        // Closed at once.
+        if !allowed.contains(peer.ip()) {
+            plc.refused(peer, "this address may not connect: --modbus-allow names those that may");
+            continue;
+        }
+        if !make_room(&connections, plc, start) {
+            plc.refused(peer, "too many connections of PLCs");
+            continue;
+        }
+        last += 1;
+        let connection = Connection { number: last, peer };
+        let seen = Arc::new(AtomicU64::new(millis(start)));
+        let gone = Gone { connection, plc: plc.clone(), connections: connections.clone() };
+        let mut open = lock(&connections);
+        let conversing = converse(stream, gone, seen.clone(), start);
+        // It cannot end before it is among them: they are locked, and this thread runs it.
+        open.insert(last, Open { seen, abort: tokio::spawn(conversing).abort_handle() });
+    }
+}
+
+/// There is a place for another connection, where need be that of one that asks for nothing.
+fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
+    let mut open = lock(connections);
+    if open.len() < CONNECTIONS_MAX {
+        return true;
+    }
+    let silent = |seen: &AtomicU64| millis(start).saturating_sub(seen.load(Ordering::Relaxed));
+    let idle = open
+        .iter()
+        .map(|(number, open)| (silent(&open.seen), *number))
+        .filter(|(silent, number)| u128::from(*silent) >= GIVES_WAY.as_millis() && !plc.is_operator(*number))
+        .max();
+    let idle = idle.and_then(|(_, number)| open.remove(&number));
+    idle.inspect(|open| open.abort.abort()).is_some()
+}
+
+fn lock(connections: &Connections) -> std::sync::MutexGuard<'_, BTreeMap<u64, Open>> {
+    connections.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn millis(since: Instant) -> u64 {
+    u64::try_from(since.elapsed().as_millis()).unwrap_or(u64::MAX)
+}
+
+/// A connection is gone when this is.
+struct Gone {
+    connection: Connection,
+    plc: Arc<Plc>,
+    connections: Connections,
+}
+
+impl Drop for Gone {
+    fn drop(&mut self) {
+        self.plc.left(&self.connection);
+        lock(&self.connections).remove(&self.connection.number);
+    }
+}
+
+/// Requests and responses, until one end has gone, or sends what is no Modbus.
+async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start: Instant) {
+    // A response is not to wait for more.
+    let _ = stream.set_nodelay(true);
+    let mut pace = Pace::new();
+    let mut request = Vec::new();
+    loop {
+        let Ok(Some(header)) = timeout(IDLE, read(&mut stream, &mut request)).await else { return };
+        // Whoever asks faster waits for its own answers, and for nobody else's.
+        tokio::time::sleep(pace.wait(Instant::now())).await;
+        seen.store(millis(start), Ordering::Relaxed);
+        let response = header.respond(&gone.plc.respond(&gone.connection, &request));
+        if !matches!(timeout(SEND_TIME, stream.write_all(&response)).await, Ok(Ok(()))) {
+            return;
+        }
+    }
+}
+
+/// Reads a request; `None`: there is none, nor any more.
+async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
+    let mut head = [0; HEADER_LEN];
+    stream.read_exact(&mut head).await.ok()?;
+    let header = Header::parse(head)?;
+    request.resize(header.len, 0);
+    stream.read_exact(request).await.ok()?;
+    Some(header)
+}
+
+/// How fast a connection may ask.
+struct Pace {
+    allowance: f64,
+    at: Instant,
+}
+
+impl Pace {
+    fn new() -> Self {
+        Self { allowance: REQUESTS_AT_ONCE, at: Instant::now() }
+    }
+
+    /// How long the next request has to wait.
+    fn wait(&mut self, now: Instant) -> Duration {
+        let passed = now.saturating_duration_since(self.at).as_secs_f64();
+        self.allowance = (self.allowance + passed * REQUESTS_PER_S).min(REQUESTS_AT_ONCE) - 1.0;
+        self.at = now;
+        Duration::from_secs_f64((-self.allowance / REQUESTS_PER_S).max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_asks_faster_than_it_may_waits() {
+        let (mut pace, begin) = (Pace::new(), Instant::now());
+        pace.at = begin;
+        // Each as soon as the one before was answered: so many as are free, then at the rate.
+        let mut now = begin;
+        for _ in 0..1000 {
+            now += pace.wait(now);
+        }
+        let took = now.duration_since(begin).as_secs_f64();
+        let expected = (1000.0 - REQUESTS_AT_ONCE) / REQUESTS_PER_S;
+        assert!((took - expected).abs() < 0.1, "{took} s instead of {expected} s");
+        let mut slow = Pace::new();
+        for n in 0..1000 {
+            assert_eq!(slow.wait(begin + Duration::from_millis(10 * n)), Duration::ZERO, "{n}");
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! PLCs at a simulated arm: what begins a motion and what does not, who commands, and who gets in.
+use std::io::{Read as _, Write as _};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use jtc_agent::jobs::{Jobs, Stage, Store};
+use jtc_agent::line::Class;
+use jtc_agent::log::CommandLog;
+use jtc_agent::modbus::codes::{Command, Outcome};
+use jtc_agent::modbus::map::holding;
+use jtc_agent::modbus::{Allowed, Plc, Server, plc};
+use jtc_agent::{LineEvent, Owner};
+use jtc_host::port::sim::LivePort;
+use jtc_host::{Arm, plan};
+use jtc_sim::{SimConfig, World};
+use jtc_wire::{ControllerState, Status};
+use proptest::prelude::*;
+
+const WAIT: Duration = Duration::from_secs(60);
+/// The number before that of the first command.
+const FIRST: u16 = 700;
+const HERE: [u8; 4] = [127, 0, 0, 1];
+const THERE: [u8; 4] = [127, 0, 0, 2];
+
+/// A simulated arm with an agent and a Modbus server.
+struct Cell {
+    owner: Option<Owner>,
+    jobs: Arc<Jobs>,
+    plc: Arc<Plc>,
+    _server: Server,
+    address: SocketAddr,
+    /// Frames that change something.
+    sent: Arc<Mutex<Vec<Class>>>,
+}
+
+impl Cell {
+    fn start(allowed: &[&str]) -> Self {
+        let arm = Arm::avena();
+        let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
+        let sent: Arc<Mutex<Vec<Class>>> = Arc::default();
+        let seen = sent.clone();
+        let observer = Box::new(move |_, event: &LineEvent| {
+            if let LineEvent::Sent { class, .. } = event {
+                seen.lock().expect("nobody panics").push(*class);
+            }
+        });
+        let owner = Owner::new(LivePort::new(World::new(config)), observer);
+        let log = Arc::new(Mutex::new(CommandLog::open(None, |_| {}).expect("none")));
+        let jobs = Jobs::new(owner.line(), Store::in_memory(), arm);
+        jobs.store.put(3, "there and back", &there_and_back(), false).expect("a trajectory");
+        let plc = Plc::new(owner.line(), jobs.clone(), log, true, FIRST);
+        let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
+        let address = listener.local_addr().expect("it listens");
+        let allowed = allowed.iter().map(|text| text.parse().expect("a network")).collect();
+        let _server = Server::start(listener, Allowed::new(allowed), plc.clone()).expect("it serves");
+        Self { owner: Some(owner), jobs, plc, _server, address, sent }
+    }
+
+    fn connect(&self) -> Client {
+        Client(TcpStream::connect(self.address).expect("it listens"))
+    }
+
+    fn moves(&self) -> bool {
+        self.owner.as_ref().is_some_and(|owner| {
+            owner.line().with(|line, _| line.status().is_some_and(|(_, status)| status.is_executing()))
+        })
+    }
+
+    fn teaches(&self) -> bool {
+        let teaching = |status: &Status| status.state == ControllerState::Teaching;
+        self.owner.as_ref().is_some_and(|owner| {
+            owner.line().with(|line, _| line.status().is_some_and(|(_, status)| teaching(status)))
+        })
+    }
+
+    /// An arm that is held.
+    fn recover(&self, client: &mut Client) {
+        until("a report", || client.input(4) < 500);
+        assert_eq!(client.command(Command::RecoverWithDefaults), Outcome::Done);
+        until("a held arm", || client.ask(&[2, 0, 4, 0, 1]) == [2, 1, 1]);
+    }
+}
+
+fn there_and_back() -> String {
+    let (arm, to) = (Arm::avena(), [0.3, -0.2, 0.2, 0.3, -0.2, 0.3]);
+    let way = |from: &[f64; 6], to: &[f64; 6]| {
+        plan::joint_move(from, to, &arm.config(), 10.0).expect("it is within the limits")
+    };
+    let (mut there, back) = (way(&[0.0; 6], &to), way(&to, &[0.0; 6]));
+    there.points.extend(back.points.into_iter().skip(1));
+    there.to_exact_csv()
+}
+
+fn until(what: &str, mut reached: impl FnMut() -> bool) {
+    let end = Instant::now() + WAIT;
+    while !reached() {
+        assert!(Instant::now() < end, "{what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// A connection of a PLC.
+struct Client(TcpStream);
+
+impl Client {
+    fn send(&mut self, pdus: &[&[u8]]) {
+        let frame = |pdu: &&[u8]| [&[0, 1, 0, 0, 0, pdu.len() as u8 + 1, 9][..], pdu].concat();
+        self.0.write_all(&pdus.iter().flat_map(frame).collect::<Vec<u8>>()).expect("it reads");
+    }
+
+    /// The next response; `None`: it is closed.
+    fn response(&mut self) -> Option<Vec<u8>> {
+        self.0.set_read_timeout(Some(WAIT)).expect("a time");
+        let mut head = [0; 7];
+        self.0.read_exact(&mut head).ok()?;
+        assert_eq!((head[..5].to_vec(), head[6]), (vec![0, 1, 0, 0, 0], 9));
+        let mut pdu = vec![0; usize::from(head[5]) - 1];
+        self.0.read_exact(&mut pdu).ok()?;
+        Some(pdu)
+    }
+
+    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        self.send(&[pdu]);
+        self.response().expect("a response")
+    }
+
+    fn input(&mut self, at: u8) -> u16 {
+        let pdu = self.ask(&[4, 0, at, 0, 1]);
+        u16::from_be_bytes([pdu[2], pdu[3]])
+    }
+
+    fn next(&mut self) -> u16 {
+        self.input(14).wrapping_add(1)
+    }
+
+    /// A command, and what became of it.
+    fn command(&mut self, command: Command) -> Outcome {
+        let next = self.next();
+        let response = self.ask(&order(command, next));
+        assert_eq!(response, [16, 0, 0, 0, 8], "{command:?}");
+        until("an answer", || self.input(14) == next);
+        Outcome::ALL[usize::from(self.input(15))]
+    }
+}
+
+/// All holding registers in one request: trajectory 3 with approach.
+fn order(command: Command, sequence: u16) -> Vec<u8> {
+    let values = [1000, 1, 3, 100, 1, 1, command as u16, sequence];
+    [16, 0, 0, 0, 8, 16]
+        .into_iter()
+        .chain(values.iter().flat_map(|value: &u16| value.to_be_bytes()))
+        .collect()
+}
+
+const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
+const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
+
+/// However near behind the start: in the same packet, as a coil that is 1 for a moment, or as the next command.
+#[test]
+fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
+    let cell = Cell::start(&[]);
+    let mut client = cell.connect();
+    cell.recover(&mut client);
+    drop(client);
+    // By hand: what was commanded is not begun before all of it has come, which is as late as it can be.
+    let connection = plc::Connection { number: 1000, peer: (IpAddr::from(HERE), 5).into() };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
+    let acknowledged = || {
+        let pdu = cell.plc.respond(&connection, &[4, 0, 14, 0, 2]);
+        (u16::from_be_bytes([pdu[2], pdu[3]]), usize::from(pdu[5]))
+    };
+    for command in [Command::Start, Command::Recover, Command::TeachOn] {
+        for stop in [Command::Stop, Command::None] {
+            let begun = cell.jobs.list().len();
+            let _entered = runtime.enter();
+            let next = acknowledged().0.wrapping_add(1);
+            let requests = match stop {
+                Command::Stop => vec![order(command, next), order(stop, next.wrapping_add(1))],
+                _ => vec![order(command, next), PRESS.to_vec(), LET_GO.to_vec()],
+            };
+            for request in requests {
+                assert!(cell.plc.respond(&connection, &request)[0] < 0x80);
+            }
+            runtime.block_on(tokio::time::sleep(Duration::from_millis(500)));
+            let outcome = Outcome::ALL[acknowledged().1];
+            let expected = if stop == Command::Stop { Outcome::Done } else { Outcome::Stopped };
+            assert!(outcome == expected || command == Command::Recover, "{command:?} {outcome:?}");
+            until("no job", || cell.jobs.list().iter().all(|job| job.stage != Stage::Running));
+            for job in &cell.jobs.list()[begun..] {
+                assert_eq!((command, &job.stage), (Command::Recover, &Stage::Stopped), "{job:?}");
+            }
+            assert!(!cell.moves() && !cell.teaches(), "{command:?}");
+        }
+    }
+    cell.plc.left(&connection);
+    let mut client = cell.connect();
+    // In one packet.
+    for _ in 0..3 {
+        let start = order(Command::Start, client.next());
+        client.send(&[&start, &PRESS, &LET_GO]);
+        for _ in 0..3 {
+            assert!(client.response().expect("a response")[0] < 0x80);
+        }
+        until("no job", || cell.jobs.list().iter().all(|job| job.stage != Stage::Running));
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(!cell.moves());
+    }
+    let executed = cell.jobs.list().into_iter().filter(|job| job.done.summary.is_some());
+    assert_eq!(executed.count(), 0);
+    // Its own Stop: it goes on when it likes.
+    assert_eq!(client.command(Command::Start), Outcome::Done);
+    until("a motion", || {
+        client.input(1);
+        cell.moves()
+    });
+    client.ask(&PRESS);
+}
+
+/// From another address: not while the lease of the one before goes on, and never with what that one wrote.
+#[test]
+fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_defaults() {
+    let cell = Cell::start(&["127.0.0.0/8"]);
+    let mut client = cell.connect();
+    until("a report", || client.input(4) < 500);
+    // By hand: where a connection of the other address comes from is not ours to choose.
+    let there = plc::Connection { number: 1000, peer: (IpAddr::from(THERE), 5).into() };
+    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+    let _entered = runtime.enter();
+    let write = || cell.plc.respond(&there, &[6, 0, holding::TRAJECTORY as u8, 0, 5]);
+    client.ask(&[6, 0, holding::SPEED as u8, 0, 50]);
+    assert_eq!(write(), [0x86, 6], "one commands at a time");
+    let begun = Instant::now();
+    assert_eq!(client.command(Command::GripperOn), Outcome::Done);
+    drop(client);
+    until("the lease", || write() == [6, 0, 2, 0, 5]);
+    assert!(begun.elapsed() > Duration::from_secs(1), "{:?}", begun.elapsed());
+    let read = |at: usize| cell.plc.respond(&there, &[3, 0, at as u8, 0, 1])[3];
+    assert_eq!((read(holding::SPEED), read(holding::TRAJECTORY)), (100, 5));
+    // As long as its watchdog, or until it has gone: it has no lease.
+    let here = plc::Connection { number: 1001, peer: (IpAddr::from(HERE), 5).into() };
+    assert_eq!(cell.plc.respond(&there, &[6, 0, holding::WATCHDOG as u8, 0xEA, 0x60])[0], 6);
+    assert_eq!(cell.plc.respond(&here, &[6, 0, 2, 0, 1]), [0x86, 6]);
+    cell.plc.left(&there);
+    assert_eq!(cell.plc.respond(&here, &[6, 0, 2, 0, 1]), [6, 0, 2, 0, 1]);
+}
+
+#[test]
+fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing() {
+    let cell = Cell::start(&[]);
+    let mut first = cell.connect();
+    first.ask(&[6, 0, holding::WATCHDOG as u8, 0xEA, 0x60]);
+    let mut others: Vec<Client> = (0..7).map(|_| cell.connect()).collect();
+    for other in &mut others {
+        other.input(0);
+    }
+    let refused = |mut ninth: Client| {
+        // It may be closed before or behind what is sent.
+        let _ = ninth.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
+        ninth.response().is_none()
+    };
+    assert!(refused(cell.connect()));
+    std::thread::sleep(Duration::from_millis(2100));
+    for other in &mut others[1..] {
+        other.input(0);
+    }
+    // The one that commands is as silent as the one that gives way.
+    assert_eq!(cell.connect().input(0), 1);
+    assert!(others[0].response().is_none());
+    assert_eq!(first.input(0), 1);
+}
+
+#[test]
+fn who_is_not_named_does_not_get_in() {
+    let cell = Cell::start(&["10.1.2.3", "127.0.0.2"]);
+    let mut client = cell.connect();
+    let _ = client.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
+    assert!(client.response().is_none());
+}
+
+#[test]
+fn without_a_controller_a_stop_fails_and_nothing_else_is_done() {
+    let mut cell = Cell::start(&[]);
+    let mut client = cell.connect();
+    until("a report", || client.input(4) < 500);
+    cell.owner.take().expect("it is there").end();
+    assert_eq!((client.input(3), client.ask(&[2, 0, 0, 0, 3])), (1, vec![2, 1, 0b110]));
+    assert_eq!(client.ask(&PRESS), [0x85, 4]);
+    assert_eq!(client.ask(&[1, 0, 0, 0, 2]), [1, 1, 0], "what failed is not kept");
+    for command in [Command::Start, Command::Stop, Command::Clear, Command::Recover, Command::Release] {
+        assert_eq!(client.command(command), Outcome::NoController, "{command:?}");
+    }
+}
+
+/// A request that is made up.
+fn requests() -> impl Strategy<Value = Vec<u8>> {
+    let values = prop::collection::vec(prop_oneof![0..15_u16, 690..720_u16, any::<u16>()], 1..9);
+    let written = (0..10_u16, values.clone()).prop_map(|(at, values)| {
+        let (at, count) = (at.to_be_bytes(), values.len() as u8);
+        let values = values.into_iter().flat_map(u16::to_be_bytes);
+        [16, at[0], at[1], 0, count, 2 * count].into_iter().chain(values).collect()
+    });
+    let single = (0..10_u8, prop_oneof![0..15_u16, 690..720_u16]).prop_map(|(at, value)| {
+        let value = value.to_be_bytes();
+        vec![6, 0, at, value[0], value[1]]
+    });
+    let bytes = (0..24_u8, prop::collection::vec(any::<u8>(), 0..30))
+        .prop_map(|(function, rest)| [vec![function], rest].concat());
+    // No coil: its Stop is to be seen below.
+    prop_oneof![4 => written, 4 => single, 2 => bytes]
+        .prop_filter("no coil", |pdu| pdu[0] != 5 && pdu[0] != 15)
+}
+
+/// The number behind the last would be written by this.
+fn is_next(pdu: &[u8]) -> bool {
+    let sequence = holding::SEQUENCE;
+    let value = match pdu {
+        [6, 0, at, high, low] if usize::from(*at) == sequence => [*high, *low],
+        [16, 0, at, 0, _, _, values @ ..] => {
+            let Some(n) = sequence.checked_sub(usize::from(*at)) else { return false };
+            match values.get(2 * n..2 * n + 2) {
+                Some(value) => [value[0], value[1]],
+                None => return false,
+            }
+        }
+        _ => return false,
+    };
+    u16::from_be_bytes(value) == FIRST + 1
+}
+
+/// Whatever a PLC writes without the next number: nothing goes to the controller, no job begins, nobody commands.
+#[test]
+fn nothing_goes_to_the_controller_without_the_next_number() {
+    let cell = Cell::start(&[]);
+    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+    let _entered = runtime.enter();
+    let mut client = cell.connect();
+    until("a report", || client.input(4) < 500);
+    let asked = cell.sent.lock().expect("nobody panics").len();
+    let connection = plc::Connection { number: 1000, peer: (Ipv4Addr::from(HERE), 5).into() };
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) };
+    let mut runner = proptest::test_runner::TestRunner::new(config);
+    let strategy = requests().prop_filter("not the next number", |pdu| !is_next(pdu));
+    let done = runner.run(&strategy, |pdu| {
+        let response = cell.plc.respond(&connection, &pdu);
+        prop_assert!(response.len() >= 2);
+        prop_assert!(cell.jobs.list().is_empty());
+        Ok(())
+    });
+    done.expect("nothing is begun");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(cell.sent.lock().expect("nobody panics").len(), asked);
+    assert_eq!(client.input(14), FIRST, "nothing was acknowledged");
+    assert_eq!(client.input(12), 0, "nobody commands");
+}

@@ -1,0 +1,446 @@
+"""A PLC played with pymodbus, against `jtc serve --sim --modbus`: it knows the tables of docs/modbus.md and the HTTP API, no code.
+
+usage: check_modbus.py JTC
+
+JTC is the command `jtc`. The PLC finds its registers by the names in the page. It recovers the arm, starts trajectory 3, pauses, goes on, changes
+the speed, compares what it reads with /api/status, stops, loses its connection, repeats commands, and writes what is wrong. Needs pymodbus.
+"""
+
+import contextlib
+import json
+import math
+import os
+import pathlib
+import re
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.error
+import urllib.request
+
+from pymodbus.client import ModbusTcpClient
+from pymodbus.exceptions import ModbusException
+
+PAGE = pathlib.Path(__file__).parents[2] / "docs" / "modbus.md"
+PATIENCE_S = 60.0
+# One code of each table that is used here, by the page's own numbers.
+DONE, SEQUENCE, VALUE, NO_TRAJECTORY, BUSY, HELD, STOPPED, COIL, NOT_READY = 1, 2, 3, 4, 5, 6, 7, 8, 9
+START, PAUSE, RESUME, STOP, TEACH, TEACH_OFF, PUMP_ON, PUMP_OFF, CLEAR, RECOVER, DEFAULTS, SPEED, RELEASE = range(1, 14)
+RUNNING, FINISHED, STOPPED_JOB, FAILED = 1, 2, 3, 4
+WORDS = {"u16": 1, "u32": 2, "f32": 2}
+
+
+def tables():
+    """Name to (address, count, form) of each table of the page."""
+    found, title = {}, None
+    for line in PAGE.read_text().splitlines():
+        if line.startswith("### "):
+            title = re.sub(r" \(.*", "", line[4:])
+            found[title] = {}
+        elif title and (row := re.match(r"\| (\d+)(?: to \d+)? \| `(\w+)` \| ([^|]*) \|", line)):
+            address, name, third = int(row[1]), row[2], row[3]
+            form = re.fullmatch(r"(?:(\d) × )?(u16|u32|f32)", third)
+            count, form = (int(form[1] or 1), form[2]) if form else (1, "u16")
+            found[title][name] = (address, count, form)
+    return found
+
+
+MAP = tables()
+INPUTS, HOLDINGS = MAP["Input registers"], MAP["Holding registers"]
+DISCRETE, COILS = MAP["Discrete inputs"], MAP["Coils"]
+INPUTS_END = max(address + count * WORDS[form] for address, count, form in INPUTS.values())
+
+
+class Plc:
+    """A PLC with a connection of its own, that asks ten times a second in the background as a cycle does."""
+
+    def __init__(self, port, cyclic=True):
+        self.client = ModbusTcpClient("127.0.0.1", port=port, timeout=5, retries=0)
+        assert self.client.connect()
+        self.lock = threading.Lock()
+        self.open = True
+        if cyclic:
+            threading.Thread(target=self.cycle, daemon=True).start()
+
+    def cycle(self):
+        while self.open:
+            with contextlib.suppress(ModbusException, OSError):
+                self.do("read_input_registers", 0, count=2)
+            time.sleep(0.1)
+
+    def do(self, function, *arguments, **named):
+        """The response of the server; one that is an exception is returned too."""
+        with self.lock:
+            return getattr(self.client, function)(*arguments, **named)
+
+    def leave(self):
+        """Gone without a word."""
+        self.open = False
+        with self.lock:
+            self.client.close()
+
+    def inputs(self):
+        """All input registers by name, from one request."""
+        response = self.do("read_input_registers", 0, count=INPUTS_END)
+        assert not response.isError(), response
+        words, values = response.registers, {}
+        for name, (address, count, form) in INPUTS.items():
+            if form == "u16":
+                found = words[address : address + count]
+            else:
+                raw = struct.pack(f">{2 * count}H", *words[address : address + 2 * count])
+                found = struct.unpack(f">{count}{'f' if form == 'f32' else 'I'}", raw)
+            values[name] = found[0] if count == 1 else list(found)
+        return values
+
+    def bits(self):
+        response = self.do("read_discrete_inputs", 0, count=len(DISCRETE))
+        assert not response.isError(), response
+        return {name: response.bits[address] for name, (address, _, _) in DISCRETE.items()}
+
+    def write(self, name, *values):
+        return self.do("write_registers", HOLDINGS[name][0], list(values))
+
+    def coil(self, name, on):
+        return self.do("write_coil", COILS[name][0], on)
+
+    def command(self, command, trajectory=0, speed=100, repeat=1, approach=0, watchdog=1000, policy=1):
+        """Writes all eight registers at once and waits for the answer; returns its result and the registers as they were then."""
+        sequence = (self.inputs()["acknowledged"] + 1) % 65536
+        response = self.write("watchdog_ms", watchdog, policy, trajectory, speed, repeat, approach, command, sequence)
+        assert not response.isError(), response
+        now = self.until(lambda now: now["acknowledged"] == sequence)
+        return now["result"], now
+
+    def until(self, reached, patience=PATIENCE_S):
+        end = time.monotonic() + patience
+        while time.monotonic() < end:
+            now = self.inputs()
+            if reached(now):
+                return now
+            time.sleep(0.02)
+        raise AssertionError(f"not reached: {now}")
+
+    def job_over(self):
+        return self.until(lambda now: now["job_stage"] != RUNNING)
+
+
+class Agent:
+    """`jtc serve --sim` with a Modbus server; it ends with the block."""
+
+    def __init__(self, jtc, directory):
+        self.directory = directory
+        self.log = directory / "commands.jsonl"
+        environment = {**os.environ, "XDG_STATE_HOME": str(directory / "state"), "XDG_RUNTIME_DIR": str(directory)}
+        words = ["--json", "serve", "--sim", "--baud", "921600", "--listen", "127.0.0.1:0", "--modbus", "127.0.0.1:0"]
+        words += ["--trajectories", str(directory / "motions"), "--command-log", str(self.log)]
+        self.program = subprocess.Popen([jtc, *words], stdout=subprocess.PIPE, env=environment, text=True)
+        ready = json.loads(self.program.stdout.readline())
+        self.url, self.port = ready["url"], int(ready["modbus"].rsplit(":", 1)[1])
+        self.token = re.search(r'operator = "(.*)"', pathlib.Path(ready["token_file"]).read_text())[1]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.program.terminate()
+        code = self.program.wait(timeout=PATIENCE_S)
+        assert code == 0, f"the agent ended with {code}"
+
+    def http(self, request, body=None, key=None):
+        method, path = request.split(" ")
+        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/json"}
+        headers |= {"Lease-Key": key} if key else {}
+        data = json.dumps(body).encode() if body is not None else None
+        asked = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
+        try:
+            with urllib.request.urlopen(asked, timeout=20) as response:
+                text = response.read()
+        except urllib.error.HTTPError as error:
+            return error.code, json.loads(error.read() or "null")
+        return response.status, json.loads(text) if text else None
+
+    def joints(self):
+        controller = self.http("GET /api/status")[1]["controller"]
+        return controller, [joint["position_rad"] for joint in controller["joints"]]
+
+
+def motion(seconds, amplitude=0.3):
+    """There and back of two joints, smooth, as CSV."""
+    lines, steps = ["t,q1,q2,q3,q4,q5,q6"], round(seconds / 0.02)
+    for n in range(steps + 1):
+        q = amplitude * math.sin(math.pi * n / steps) ** 4
+        lines.append(f"{0.02 * n:.2f},{q:.9f},0,0,{-q:.9f},0,0")
+    return "\n".join(lines) + "\n"
+
+
+def recover(agent, plc):
+    result, now = plc.command(DEFAULTS)
+    assert result == DONE and now["lease"] == 1, now
+    now = plc.job_over()
+    assert now["job_stage"] == FINISHED and now["job_error"] == 0, now
+    # "Finished" comes with HoldPos; the drives are all enabled a moment later.
+    plc.until(lambda now: plc.bits()["ready"])
+    assert agent.http("GET /api/status")[1]["lease"]["holder"].startswith("the PLC")
+    result, now = plc.command(CLEAR)
+    assert result == DONE and now["errors_occurred"] == 0, now
+
+
+def runs(agent, plc):
+    """Starts, pauses, goes on, changes the speed; what is read is what HTTP says."""
+    assert plc.command(START, trajectory=9)[0] == NO_TRAJECTORY
+    result, now = plc.command(START, trajectory=3, approach=1)
+    assert result == DONE and now["job"] > 0, now
+    job = now["job"]
+    plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 2000)
+    assert plc.bits()["executing"] and not plc.bits()["ready"]
+    # One thing at a time.
+    for other in (START, CLEAR, PUMP_ON, TEACH, RECOVER, RELEASE):
+        result, now = plc.command(other, trajectory=3)
+        assert result == BUSY and now["job"] == job, (other, now)
+    assert plc.command(PAUSE)[0] == DONE
+    paused = plc.until(lambda now: now["trajectory_state"] == 2)
+    assert plc.bits()["paused"]
+    controller, positions = agent.joints()
+    assert controller["trajectory"] == "Pause" and controller["point"] == paused["point"], (controller, paused)
+    assert any(abs(q) > 0.01 for q in positions), "it has moved"
+    now = plc.inputs()
+    assert all(abs(a - b) < 2e-3 for a, b in zip(now["position"], positions)), (now["position"], positions)
+    assert plc.command(SPEED, speed=50)[0] == DONE
+    assert plc.command(SPEED, speed=101)[0] == VALUE
+    assert plc.command(RESUME)[0] == DONE
+    now = plc.until(lambda now: now["trajectory_state"] == 3)
+    assert now["speed_override"] == 50, now
+    assert plc.command(SPEED, speed=100)[0] == DONE
+    now = plc.job_over()
+    assert (now["job"], now["job_stage"], now["job_runs"], now["job_error"]) == (job, FINISHED, 1, 0), now
+    assert plc.command(RESUME)[0] == NOT_READY
+    # Finished, and standing: both see the same.
+    time.sleep(0.5)
+    controller, positions = agent.joints()
+    now = plc.inputs()
+    assert all(abs(a - b) < 1e-3 for a, b in zip(now["position"], positions)), (now["position"], positions)
+    temperatures = [joint["temperature_c"] for joint in controller["joints"]]
+    assert now["temperature"] == temperatures, (now["temperature"], temperatures)
+    told = agent.http(f"GET /api/jobs/{job}")[1]
+    assert told["stage"] == "finished" and told["client"].startswith("the PLC"), told
+
+
+def repeats(agent, plc):
+    """Nothing moves without a new number, nor with one that is not the next."""
+    now = plc.inputs()
+    job, acknowledged = now["job"], now["acknowledged"]
+    for sequence in (acknowledged, acknowledged, (acknowledged + 2) % 65536, (acknowledged - 1) % 65536):
+        response = plc.write("watchdog_ms", 1000, 1, 3, 100, 1, 1, START, sequence)
+        assert not response.isError()
+        time.sleep(0.2)
+        now = plc.inputs()
+        assert now["job"] == job and now["acknowledged"] == acknowledged and now["trajectory_state"] != 3, now
+        assert now["result"] == (SEQUENCE if sequence != acknowledged else now["result"]), now
+    # Half of it, in an odd order, is nothing yet; the number makes it a command, once.
+    for name, value in (("command", START), ("trajectory", 3), ("approach", 1), ("speed", 100)):
+        assert not plc.do("write_register", HOLDINGS[name][0], value).isError()
+    assert plc.inputs()["job"] == job
+    for _ in range(3):
+        assert not plc.do("write_register", HOLDINGS["sequence"][0], (acknowledged + 1) % 65536).isError()
+    now = plc.until(lambda now: now["acknowledged"] == (acknowledged + 1) % 65536)
+    assert now["result"] == DONE and now["job"] == job + 1, now
+    assert plc.until(lambda now: now["trajectory_state"] == 3)
+    assert not plc.coil("stop", True).isError()
+    now = plc.job_over()
+    assert now["job"] == job + 1 and now["job_stage"] == STOPPED_JOB, now
+    assert plc.command(START, trajectory=3, approach=1)[0] == COIL
+    # The same again is no edge.
+    assert not plc.coil("stop", True).isError() and not plc.coil("stop", False).isError()
+    plc.until(lambda now: plc.bits()["ready"])
+
+
+def nonsense(agent, plc):
+    """The standard's exceptions; nothing is written by a request that has one."""
+    before = plc.do("read_holding_registers", 0, count=len(HOLDINGS)).registers
+    job = plc.inputs()["job"]
+    end = len(HOLDINGS)
+    watchdog = HOLDINGS["watchdog_ms"][0]
+    wrong = [
+        (2, "read_input_registers", (INPUTS_END,), {"count": 1}),
+        (2, "read_input_registers", (INPUTS_END - 1,), {"count": 2}),
+        (2, "read_holding_registers", (end,), {"count": 1}),
+        (2, "read_discrete_inputs", (len(DISCRETE),), {"count": 1}),
+        (2, "read_coils", (len(COILS),), {"count": 1}),
+        (2, "write_register", (end, 1), {}),
+        (2, "write_coil", (len(COILS), True), {}),
+        (2, "write_registers", (end - 1, [1, 2]), {}),
+        (2, "write_coils", (1, [True, True]), {}),
+        (3, "write_register", (HOLDINGS["command"][0], 14), {}),
+        (3, "write_register", (HOLDINGS["trajectory"][0], 100), {}),
+        (3, "write_register", (HOLDINGS["policy"][0], 3), {}),
+        (3, "write_register", (watchdog, 50), {}),
+        (3, "write_register", (watchdog, 0), {}),
+        (3, "write_registers", (0, [1000, 1, 3, 0, 1, 1, START, 1]), {}),
+        (1, "mask_write_register", (), {"address": 0, "and_mask": 0, "or_mask": 0}),
+        (1, "read_exception_status", (), {}),
+    ]
+    for code, function, arguments, named in wrong:
+        response = plc.do(function, *arguments, **named)
+        assert response.isError() and response.exception_code == code, (function, arguments, response)
+    assert plc.do("read_holding_registers", 0, count=end).registers == before
+    # What pymodbus would never send: half a frame, other protocols, lengths that are none.
+    pieces = [b"\0\1\0\0\0\6\1\5\0\0\1\0", b"\0\1\0\0\0\7\1\x0f\0\0\xff\xff\0", b"\0\1\0\0\0\x09\1\x10\0\0\x80\1\2\0\0"]
+    for piece in pieces:
+        with socket.create_connection(("127.0.0.1", agent.port), timeout=5) as raw:
+            raw.sendall(piece)
+            answer = raw.recv(300)
+            assert answer[7] == piece[7] | 0x80 and answer[8] == 3, answer
+    for piece in (b"GET /api/status HTTP/1.1\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03", b"\0\1\0\0\xff\xff\1\5", b"\0\1\0\0\0\1\1"):
+        with socket.create_connection(("127.0.0.1", agent.port), timeout=5) as raw:
+            raw.sendall(piece)
+            with contextlib.suppress(ConnectionResetError):
+                assert raw.recv(300) == b"", "it is closed"
+    now = plc.inputs()
+    assert now["job"] == job and now["trajectory_state"] != 3, now
+
+
+def two(agent, plc):
+    """Another connection reads, stops, and does not command."""
+    other = Plc(agent.port, cyclic=False)
+    assert plc.command(START, trajectory=3, approach=1)[0] == DONE
+    plc.until(lambda now: now["trajectory_state"] == 3)
+    assert other.inputs()["lease"] == 2 and plc.inputs()["lease"] == 1
+    response = other.write("trajectory", 5)
+    assert response.isError() and response.exception_code == 6, response
+    assert plc.do("read_holding_registers", HOLDINGS["trajectory"][0], count=1).registers == [3]
+    assert not other.coil("stop", True).isError()
+    now = plc.job_over()
+    assert now["job_stage"] == STOPPED_JOB, now
+    # As long as it is pressed, and three seconds after that was.
+    assert plc.command(START, trajectory=3, approach=1)[0] == COIL
+    assert not other.coil("stop", False).isError()
+    assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
+    job = now["job"]
+    time.sleep(3.6)
+    assert plc.inputs()["job"] == job and plc.inputs()["trajectory_state"] != 3
+    # A Stop by HTTP is somebody else's, too.
+    agent.http("POST /api/stop")
+    assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
+    time.sleep(3.6)
+    other.leave()
+
+
+def held(agent, plc):
+    """Somebody has the lease by HTTP: nothing of the PLC is done, and its reading goes on."""
+    assert plc.command(RELEASE)[0] == DONE and plc.inputs()["lease"] == 0
+    grant = agent.http("POST /api/lease", {"name": "anna", "lasts_s": 30})[1]
+    assert grant["held"], grant
+    for command in (START, RESUME, TEACH, PUMP_ON, CLEAR, RECOVER, SPEED):
+        result, now = plc.command(command, trajectory=3, approach=1)
+        assert result in (HELD, NOT_READY) and (command in (RESUME,) or result == HELD), (command, now)
+        assert now["lease"] == 2 and now["trajectory_state"] != 3, now
+    agent.http("DELETE /api/lease", key=grant["key"])
+    # Released, and so without a watchdog: it commands nothing then.
+    assert plc.command(RELEASE)[0] == DONE
+    assert plc.command(PUMP_ON, watchdog=0)[0] == VALUE and plc.inputs()["lease"] == 0
+    assert plc.command(PUMP_ON)[0] == DONE
+    plc.until(lambda now: now["pump"] == 1 and plc.bits()["pump"])
+    assert plc.command(PUMP_OFF)[0] == DONE
+    assert plc.command(TEACH)[0] == DONE and plc.until(lambda now: now["state"] == 4) and plc.bits()["teaching"]
+    assert plc.command(START, trajectory=3)[0] == NOT_READY
+    assert plc.command(TEACH_OFF)[0] == DONE
+    plc.until(lambda now: plc.bits()["ready"])
+    # A trajectory that the check refuses: joint and point are numbers.
+    far = "t,q1,q2,q3,q4,q5,q6\n0,0,9,0,0,0,0\n1,0,9,0,0,0,0\n"
+    assert agent.http("PUT /api/trajectories/4", {"name": "far", "text": far})[0] == 200
+    assert plc.command(START, trajectory=4)[0] == DONE
+    now = plc.job_over()
+    error = agent.http(f"GET /api/jobs/{now['job']}")[1]["error"]
+    assert now["job_stage"] == FAILED and now["job_error_joint"] == error["joint"] == 2, (now, error)
+    assert now["job_error_point"] == error["point"] and f"| {now['job_error']} | `{error['code']}` |" in PAGE.read_text(), (now, error)
+
+
+def watchdog(agent, plc):
+    """The connection is lost in a motion: it pauses; the PLC comes again and goes on."""
+    result, now = plc.command(START, trajectory=3, approach=1, watchdog=500)
+    assert result == DONE, now
+    plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 300)
+    job, left = now["job"], time.monotonic()
+    plc.leave()
+    while agent.joints()[0]["trajectory"] != "Pause":
+        assert time.monotonic() - left < 5, "it does not pause"
+        time.sleep(0.02)
+    took = time.monotonic() - left
+    assert took > 0.3, f"paused after {took} s already"
+    assert agent.http("GET /api/status")[1].get("lease") is None
+    again = Plc(agent.port)
+    now = again.inputs()
+    assert now["lease"] == 0 and now["job_stage"] == RUNNING, now
+    # The registers are as they were left; what is written again begins nothing.
+    sequence = again.do("read_holding_registers", HOLDINGS["sequence"][0], count=1).registers[0]
+    assert not again.write("watchdog_ms", 500, 1, 3, 100, 1, 1, START, sequence).isError()
+    assert again.command(RESUME, watchdog=500)[0] == STOPPED, "the watchdog's pause is somebody else's"
+    time.sleep(3.6)
+    assert again.inputs()["trajectory_state"] == 2
+    assert again.command(RESUME, watchdog=500)[0] == DONE
+    again.until(lambda now: now["trajectory_state"] == 3)
+    # Silent, and connected: that is the same.
+    again.open = False
+    time.sleep(2)
+    assert agent.joints()[0]["trajectory"] == "Pause"
+    # The command stop ends it.
+    assert again.command(STOP)[0] == DONE
+    now = again.job_over()
+    assert (now["job"], now["job_stage"]) == (job, STOPPED_JOB), now
+    again.leave()
+    return took
+
+
+def restarted(jtc, directory, sequence, motions):
+    """An agent that was started again, and a PLC that goes on writing what it wrote before."""
+    with Agent(jtc, directory) as agent:
+        plc = Plc(agent.port)
+        if plc.inputs()["acknowledged"] != (sequence - 1) % 65536:
+            assert not plc.write("watchdog_ms", 1000, 1, 3, 100, 1, 1, START, sequence).isError()
+            now = plc.until(lambda now: now["result"] != 0)
+            assert now["result"] == SEQUENCE and now["job"] == 0, now
+        # Trajectories outlast it; the arm of this one is not up yet.
+        assert [kept["number"] for kept in agent.http("GET /api/trajectories")[1]] == motions
+        plc.until(lambda now: plc.bits()["controller_there"])
+        assert plc.command(START, trajectory=3)[0] == NOT_READY
+        plc.leave()
+
+
+def main():
+    jtc = sys.argv[1]
+    assert len(COILS) == 2 and len(HOLDINGS) == 8 and len(INPUTS) > 20, MAP
+    with tempfile.TemporaryDirectory() as directory:
+        directory = pathlib.Path(directory)
+        with Agent(jtc, directory) as agent:
+            assert agent.http("PUT /api/trajectories/3", {"name": "there and back", "text": motion(6)})[0] == 200
+            plc = Plc(agent.port)
+            first = plc.until(lambda now: plc.bits()["controller_there"])
+            assert first["simulated"] == 1 and first["port_lost"] == 0 and first["result"] == 0 and first["lease"] == 0, first
+            assert plc.command(START, trajectory=3)[0] == NOT_READY, "the controller has no arm yet"
+            recover(agent, plc)
+            runs(agent, plc)
+            repeats(agent, plc)
+            nonsense(agent, plc)
+            two(agent, plc)
+            held(agent, plc)
+            beats = plc.inputs()["heartbeat"]
+            took = watchdog(agent, plc)
+            last = Plc(agent.port, cyclic=False)
+            now = last.inputs()
+            assert now["heartbeat"] != beats
+            last.leave()
+        lines = [json.loads(line) for line in agent.log.read_text().splitlines()]
+        commands = [line for line in lines if line["what"] == "command"]
+        refused = sum(line["why_not"] is not None for line in commands)
+        halts = [line for line in lines if line["what"] == "halt" and line["by"].startswith("the PLC at 127.0.0.1")]
+        assert len(commands) > 30 and refused > 10 and len(halts) >= 4, (len(commands), refused, len(halts))
+        restarted(jtc, directory, now["acknowledged"], [3, 4])
+    print(f"{len(commands)} commands by Modbus, {refused} of them refused; paused {took:.2f} s after the connection was lost")
+
+
+main()

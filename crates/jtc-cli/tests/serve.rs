@@ -173,3 +173,37 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
         );
     }
 }
+
+/// Modbus knows no tokens: it is off where nobody has asked for it, and for others than this computer where nobody is named.
+#[test]
+fn modbus_is_there_for_those_who_are_named() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let serve = |words: &[&str]| {
+        let mut serve = here(command(), &dir);
+        serve.args(["serve", "--sim", "--listen", "127.0.0.1:0"]).args(words);
+        run(serve, &[], "")
+    };
+    let refused = serve(&["--modbus", "0.0.0.0:0"]).ends(2);
+    assert!(refused.err.contains("--modbus-allow"), "{}", refused.err);
+    let refused = serve(&["--modbus", "127.0.0.1:0", "--modbus-allow", "10.0.0.0/33"]).ends(2);
+    assert!(refused.err.contains("10.0.0.0/33"), "{}", refused.err);
+    serve(&["--modbus-allow", "10.0.0.0/24"]).ends(2);
+    let ready = |words: &[&str]| {
+        let mut child = here(command(), &dir)
+            .args(["--json", "serve", "--sim", "--listen", "127.0.0.1:0"])
+            .args(words)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("jtc serve starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        let modbus = serde_json::from_str::<Value>(&line).expect("an object")["modbus"].clone();
+        let connects = modbus.as_str().map(|at| std::net::TcpStream::connect(at).is_ok());
+        child.kill().ok();
+        child.wait().ok();
+        connects
+    };
+    assert_eq!(ready(&[]), None);
+    assert_eq!(ready(&["--modbus", "127.0.0.1:0"]), Some(true));
+}

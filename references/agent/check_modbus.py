@@ -365,6 +365,8 @@ def watchdog(agent, plc):
     result, now = plc.command(START, trajectory=3, approach=1, watchdog=500)
     assert result == DONE, now
     plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 300)
+    # Somebody who looks all the time keeps nobody else's lease.
+    viewer = Plc(agent.port)
     job, left = now["job"], time.monotonic()
     plc.leave()
     while agent.joints()[0]["trajectory"] != "Pause":
@@ -393,6 +395,16 @@ def watchdog(agent, plc):
     now = again.job_over()
     assert (now["job"], now["job_stage"]) == (job, STOPPED_JOB), now
     again.leave()
+    # The other policies: it stops, or goes on to its end.
+    for policy, stage in ((2, STOPPED_JOB), (0, FINISHED)):
+        plc = Plc(agent.port)
+        assert plc.command(START, trajectory=3, approach=1, watchdog=500, policy=policy)[0] == DONE
+        plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 300)
+        plc.leave()
+        now = viewer.job_over()
+        assert now["job_stage"] == stage and now["lease"] == 0, (policy, now)
+        time.sleep(3.6)
+    viewer.leave()
     return took
 
 

@@ -170,6 +170,9 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
         let pdu = cell.plc.respond(&connection, &[4, 0, 14, 0, 2]);
         (u16::from_be_bytes([pdu[2], pdu[3]]), usize::from(pdu[5]))
     };
+    // When the server has noticed that the other one is closed.
+    let write = [6, 0, holding::SPEED as u8, 0, 100];
+    until("its turn", || cell.plc.respond(&connection, &write) == write);
     for command in [Command::Start, Command::Recover, Command::TeachOn] {
         for stop in [Command::Stop, Command::None] {
             let begun = cell.jobs.list().len();

@@ -23,6 +23,14 @@ pub trait Operator {
     fn stop_asked(&self) -> bool;
     /// Takes a line; waits for no reader.
     fn note(&self, text: String);
+    /// Something happened beside the procedure that runs; `text`: what is to be noted of it.
+    fn happened(&self, _event: &Event, text: Option<String>) {
+        if let Some(text) = text {
+            self.note(text);
+        }
+    }
+    /// Called in each turn, also of procedures: for what cannot wait for their end.
+    fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
 /// The PC side on an open bus.
@@ -67,6 +75,7 @@ impl Driver {
     /// Hands over what has come and sends what is due, waiting for either no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
+        self.operator.turned(&mut self.master, &mut self.link);
         if let Some(news) = self.link.news() {
             self.note(news);
         }
@@ -196,9 +205,12 @@ impl Driver {
             let rebooted = *change != Supervision::Lost;
             self.lost.borrow_mut().push(Loss { board: *board, rebooted });
         }
-        if let Some(text) = event_text(event, during) {
-            self.note(text);
-        }
+        self.operator.happened(event, event_text(event, during));
+    }
+
+    /// Something that is not to be noted happened.
+    pub(super) fn pass_over(&self, event: &Event) {
+        self.operator.happened(event, None);
     }
 
     /// The numbers of the boards that are meant; `all` asks who is there, and refuses a number that two boards have.

@@ -7,6 +7,7 @@ use host_kit::{ErrorKind, Finding, Severity};
 
 use super::driver::Driver;
 use super::error::SessionError;
+use super::link::Link;
 use crate::master::doctor::{Controller, Observation, findings};
 use crate::master::{BoardSeen, Event, Outcome, Request};
 
@@ -44,6 +45,7 @@ impl Driver {
                 if let Event::CompetingMaster { function, to } = event {
                     competing_master = Some((function, to));
                 }
+                self.pass_over(&event);
             }
         }
         let scan = match competing_master {
@@ -72,10 +74,17 @@ impl Driver {
 
     /// What the CAN adapter reports about itself; none where it reports nothing.
     pub fn controller(&mut self) -> Option<Controller> {
-        let state = self.link().state();
+        self.link().controller()
+    }
+}
+
+impl Link {
+    /// What the CAN adapter reports about itself; none where it reports nothing.
+    pub fn controller(&mut self) -> Option<Controller> {
+        let state = self.state();
         (state.errors != ErrorState::Unknown).then_some(Controller {
             bus_off: state.errors == ErrorState::BusOff,
-            times_bus_off: self.link().times_bus_off(),
+            times_bus_off: self.times_bus_off(),
             passive: state.errors == ErrorState::Passive,
             tec: state.tec,
             rec: state.rec,

@@ -32,7 +32,12 @@ impl Link {
     /// The URL is none, or the bus cannot be opened.
     pub fn open(url: &str) -> Result<Self, SessionError> {
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
-        Ok(Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() })
+        Ok(Self::on(bus, url))
+    }
+
+    /// On a bus that is open already; `url` is what people call it.
+    pub fn on(bus: Box<dyn CanBus + Send>, url: &str) -> Self {
+        Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() }
     }
 
     /// The URL it was opened with.

@@ -133,7 +133,7 @@ impl Tokens {
                 fs::create_dir_all(parent)?;
             }
             let text = format!(
-                "# Lets its bearer command the arm.\noperator = \"{}\"\n# Lets its bearer look, stop and pause.\nviewer = \"{}\"\n",
+                "# Lets its bearer command.\noperator = \"{}\"\n# Lets its bearer look and stop.\nviewer = \"{}\"\n",
                 tokens.operator, tokens.viewer
             );
             private(path)?.write_all(text.as_bytes())
@@ -145,8 +145,13 @@ impl Tokens {
 
 /// The token file of this user, where none is named.
 pub fn default_token_file() -> Option<PathBuf> {
+    token_file("tokens.toml")
+}
+
+/// The file of this name where this user's token files are.
+pub fn token_file(name: &str) -> Option<PathBuf> {
     let state = host_kit::user_folder("XDG_STATE_HOME", ".local/state")?;
-    Some(state.join("openjtc").join("tokens.toml"))
+    Some(state.join("openjtc").join(name))
 }
 
 /// A new file that only its owner can read.

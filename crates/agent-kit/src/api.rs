@@ -5,7 +5,7 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::StatusCode;
 use axum::http::request::Parts;
 use axum::response::{IntoResponse, Response};
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use utoipa::{IntoResponses, ToSchema};
 
 /// Why something was not done.
@@ -29,6 +29,37 @@ impl Problem {
     /// Something that was refused, with what helps.
     pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<String>) -> Self {
         Self { code, message: message.into().into(), next: next.into(), status: StatusCode::CONFLICT }
+    }
+
+    /// An error that knows what helps.
+    pub fn diagnosed(error: &impl Diagnose) -> Self {
+        let Diagnosis { kind, code, next } = error.diagnosis();
+        // Marks of code in the texts for terminals.
+        Self::new(code, error.to_string(), next.replace('`', "")).kind(kind)
+    }
+
+    /// Of this kind.
+    pub fn kind(self, kind: ErrorKind) -> Self {
+        Self { status: status(kind), ..self }
+    }
+
+    /// Who asks may not ask for that, whatever goes on.
+    pub fn forbidden(self) -> Self {
+        Self { status: StatusCode::FORBIDDEN, ..self }
+    }
+
+    /// The request itself is wrong.
+    pub fn unreadable(self) -> Self {
+        Self { status: StatusCode::BAD_REQUEST, ..self }
+    }
+
+    /// There is nothing of this number.
+    pub fn nothing(what: &str, number: impl std::fmt::Display, list: &str) -> Self {
+        let next = format!("GET {list} lists what there is");
+        Self {
+            status: StatusCode::NOT_FOUND,
+            ..Self::new("not-found", format!("there is no {what} {number}"), next)
+        }
     }
 
     /// The status of the response that it is.

@@ -51,6 +51,23 @@ pub fn plain(name: &str) -> String {
 }
 
 impl Caller {
+    /// It may command, when it has the lease.
+    ///
+    /// # Errors
+    ///
+    /// It was let in to look and to stop.
+    pub fn operator(&self) -> Result<(), Problem> {
+        match self.role {
+            Role::Operator => Ok(()),
+            Role::Viewer => Err(Problem::new(
+                "denied",
+                "this client was let in to look and to stop, not to command",
+                "use the operator's token",
+            )
+            .forbidden()),
+        }
+    }
+
     /// What people call a client that names itself so.
     pub fn named(&self, name: &str) -> String {
         let name = plain(name);

@@ -5,6 +5,7 @@ pub mod access;
 pub mod api;
 pub mod gate;
 pub mod journal;
+pub mod lease;
 pub mod log;
 pub mod serve;
 pub mod tls;

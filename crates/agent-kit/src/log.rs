@@ -23,8 +23,8 @@ pub struct CommandLog {
     lost: u64,
 }
 
-/// What is written whatever else is: what moved the arm, who stopped it. The rest leaves half of the room free.
-const NEEDED: [&str; 6] = ["sent", "answered", "halt", "lease", "policy", "not-taken"];
+/// What is written whatever else is: what moved something, who stopped it. The rest leaves half of the room free.
+const NEEDED: [&str; 7] = ["sent", "answered", "command", "halt", "lease", "policy", "not-taken"];
 
 impl CommandLog {
     /// Goes on with this file, or begins it; none: nothing is kept. `failed` is called, on the writer's thread, with the first error of

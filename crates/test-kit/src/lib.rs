@@ -1,9 +1,10 @@
 //! What the tests and benchmarks of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain,
-//! documents that show what commands print, the data of an existing arm, and a clock.
+//! documents that show what commands print, the data of an existing arm, a clock, and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
 pub mod existing;
+pub mod http;
 pub mod page;
 
 use std::fs::read_dir;

@@ -1,13 +1,11 @@
 //! An agent of a simulated controller in this process, and requests to it as anybody could send them.
 #![allow(dead_code)]
 
-use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use jtc_agent::access::{Access, Tokens};
 use jtc_agent::api::Agent;
@@ -18,7 +16,7 @@ use jtc_client::{AgentPort, Options};
 use jtc_host::port::sim::LivePort;
 use jtc_host::{Arm, Session};
 use jtc_sim::{SimConfig, World};
-use serde_json::Value;
+use test_kit::http::Http;
 
 /// An agent that ends with the test.
 pub struct Served {
@@ -28,7 +26,16 @@ pub struct Served {
     pub log: PathBuf,
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
+    http: Http,
     _dir: tempfile::TempDir,
+}
+
+impl std::ops::Deref for Served {
+    type Target = Http;
+
+    fn deref(&self) -> &Http {
+        &self.http
+    }
 }
 
 impl Served {
@@ -59,7 +66,8 @@ impl Served {
                 .expect("it serves");
             owner.end();
         });
-        Self { address, tokens, line, log: log_path, ended, thread: Some(thread), _dir: dir }
+        let http = Http { address, operator: tokens.operator.clone() };
+        Self { http, address, tokens, line, log: log_path, ended, thread: Some(thread), _dir: dir }
     }
 
     pub fn url(&self) -> String {
@@ -74,55 +82,6 @@ impl Served {
     pub fn session(&self, name: &str, token: Option<&String>) -> Session<AgentPort> {
         let options = Options { name: name.into(), token: token.cloned(), ..Options::default() };
         Session::new(AgentPort::open(&self.url(), &options).expect("it is let in"))
-    }
-
-    /// Status and body of what a request with these lines gets.
-    pub fn ask(&self, request: &str, lines: &[&str]) -> (u16, String) {
-        let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a time");
-        let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
-        write!(stream, "{request} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: 0\r\n\r\n")
-            .expect("it reads");
-        let mut all = String::new();
-        let _ = stream.read_to_string(&mut all);
-        let status = all.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-        let body = all.split_once("\r\n\r\n").map_or("", |(_, body)| body);
-        (status, body.to_owned())
-    }
-
-    /// The same as an ordinary client asks.
-    pub fn get(&self, request: &str) -> (u16, String) {
-        self.ask(request, &[&format!("Host: {}", self.address)])
-    }
-
-    /// What an operator's program asks, with the key of its lease and a body, where there are any.
-    pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
-        self.api_as(Some(&self.tokens.operator), request, key, body)
-    }
-
-    /// The same with another token, or none.
-    pub fn api_as(
-        &self,
-        token: Option<&String>,
-        request: &str,
-        key: Option<&str>,
-        body: Option<Value>,
-    ) -> (u16, Value) {
-        let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a time");
-        let key = key.map_or(String::new(), |key| format!("Lease-Key: {key}\r\n"));
-        let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
-        let json = body.as_ref().map_or("", |_| "Content-Type: application/json\r\n");
-        let body = body.map_or(String::new(), |body| body.to_string());
-        let (host, length) = (self.address, body.len());
-        let head =
-            format!("Host: {host}\r\n{token}{key}{json}Connection: close\r\nContent-Length: {length}\r\n");
-        write!(stream, "{request} HTTP/1.1\r\n{head}\r\n{body}").expect("it reads");
-        let mut all = String::new();
-        let _ = stream.read_to_string(&mut all);
-        let status = all.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-        let body = all.split_once("\r\n\r\n").map_or("", |(_, body)| body);
-        (status, serde_json::from_str(body).unwrap_or(Value::Null))
     }
 
     /// Lets the agent end.

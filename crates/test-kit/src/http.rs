@@ -1,0 +1,194 @@
+//! Requests as anybody could send them: by HTTP, with nothing of ours.
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+/// Longest wait for an answer.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// An agent as it is seen from outside.
+#[derive(Clone, Debug)]
+pub struct Http {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// The operator's token.
+    pub operator: String,
+}
+
+impl Http {
+    /// Status and body of what a request with these lines gets.
+    pub fn ask(&self, request: &str, lines: &[&str]) -> (u16, String) {
+        let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
+        self.exchange(&format!("{request} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: 0\r\n\r\n"))
+    }
+
+    /// The same as an ordinary client asks.
+    pub fn get(&self, request: &str) -> (u16, String) {
+        self.ask(request, &[&format!("Host: {}", self.address)])
+    }
+
+    /// What an operator's program asks, with the key of its lease and a body, where there are any.
+    pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
+        self.api_as(Some(&self.operator), request, key, body)
+    }
+
+    /// The same with another token, or none.
+    pub fn api_as(
+        &self,
+        token: Option<&String>,
+        request: &str,
+        key: Option<&str>,
+        body: Option<Value>,
+    ) -> (u16, Value) {
+        let key = key.map_or(String::new(), |key| format!("Lease-Key: {key}\r\n"));
+        let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
+        let json = body.as_ref().map_or("", |_| "Content-Type: application/json\r\n");
+        let body = body.map_or(String::new(), |body| body.to_string());
+        let (host, length) = (self.address, body.len());
+        let head =
+            format!("Host: {host}\r\n{token}{key}{json}Connection: close\r\nContent-Length: {length}\r\n");
+        let (status, body) = self.exchange(&format!("{request} HTTP/1.1\r\n{head}\r\n{body}"));
+        (status, serde_json::from_str(&body).unwrap_or(Value::Null))
+    }
+
+    fn exchange(&self, request: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(self.address).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a time");
+        // One that is refused may be closed before all of it is written.
+        let _ = stream.write_all(request.as_bytes());
+        let mut all = String::new();
+        let _ = stream.read_to_string(&mut all);
+        let status = all.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+        let body = all.split_once("\r\n\r\n").map_or("", |(_, body)| body);
+        (status, body.to_owned())
+    }
+
+    /// The first event behind a number that `is` this one, and its number; none is left out on the way.
+    pub fn event(&self, after: u64, what: &str, is: impl Fn(&Value) -> bool) -> (u64, Value) {
+        let (end, mut last, mut seen) = (Instant::now() + 3 * PATIENCE, after, Vec::new());
+        while Instant::now() < end {
+            let (_, found) = self.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
+            for event in found["events"].as_array().expect("events") {
+                let number = event["number"].as_u64().expect("a number");
+                assert_eq!(number, last + 1, "none is left out");
+                last = number;
+                if is(&event["event"]) {
+                    return (number, event["event"].clone());
+                }
+                seen.push(event["event"].clone());
+            }
+        }
+        panic!("no {what} behind {after}: {seen:?}");
+    }
+
+    /// What a WebSocket sends, one text after the other, until `enough` of them.
+    pub fn stream(&self, path: &str, mut enough: impl FnMut(Value) -> bool) {
+        let mut stream = TcpStream::connect(self.address).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a time");
+        let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+                       Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {}\r\n{upgrade}\r\n", self.address).expect("it reads");
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).expect("an answer");
+            head.push(byte[0]);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
+        loop {
+            let mut head = [0; 2];
+            stream.read_exact(&mut head).expect("a message");
+            let mut length = [0; 8];
+            let bytes = match head[1] & 0x7F {
+                126 => &mut length[6..],
+                127 => &mut length[..],
+                short => {
+                    length[7] = short;
+                    &mut length[..0]
+                }
+            };
+            stream.read_exact(bytes).expect("its length");
+            let mut text = vec![0; u64::from_be_bytes(length) as usize];
+            stream.read_exact(&mut text).expect("the message");
+            if head[0] & 0x0F == 1 && enough(serde_json::from_slice(&text).expect("JSON")) {
+                return;
+            }
+        }
+    }
+}
+
+/// Requests of other sites and with tokens of nobody are refused, whatever they ask.
+pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
+    let own = format!("Host: {}", http.address);
+    let bearer = format!("Authorization: Bearer {}", http.operator);
+    for request in requests {
+        let evil = ["Origin: https://evil.example", own.as_str(), bearer.as_str()];
+        assert_eq!(http.ask(request, &evil).0, 403, "{request}: a page of another site");
+        let port = http.address.port();
+        let rebound = format!("Host: evil.example:{port}");
+        assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
+        let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
+        assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
+        assert_eq!(
+            http.ask(request, &[&own, "Authorization: Bearer 0123456789abcdefghij"]).0,
+            401,
+            "{request}"
+        );
+        assert_eq!(http.ask(request, &[&own, "Authorization: Basic b3BlcmF0b3I6"]).0, 401, "{request}");
+    }
+    assert_eq!(http.get("GET /api/status").0, 200);
+    // Reading a state changes nothing, and a page's image or link cannot stop anything.
+    assert_eq!(http.get("GET /api/stop").0, 405);
+}
+
+/// A page of another site gets no socket.
+pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
+    let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    let host = format!("Host: {}", http.address);
+    let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key];
+    let evil = [&upgrade[..], &["Origin: http://evil.example"]].concat();
+    assert_eq!(http.ask(&format!("GET {path}"), &evil).0, 403);
+}
+
+/// Tokens cannot be tried without end, and a Stop is taken meanwhile.
+pub fn tokens_cannot_be_tried_without_end(http: &Http) {
+    let host = format!("Host: {}", http.address);
+    let mut answers =
+        (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
+    assert!(answers.by_ref().take(20).all(|status| status == 401));
+    assert!(answers.all(|status| status == 429));
+    // Those who have a right one, and those on this computer who need none, are not kept out.
+    assert_eq!(http.get("POST /api/stop").0, 200);
+}
+
+/// What is long or wrong is refused with a status of its own, and changes nothing.
+pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) {
+    let host = format!("Host: {}", http.address);
+    for (request, line) in requests {
+        let (status, _) = http.ask(request, &[&host, line]);
+        assert!([200, 400, 404, 415, 426].contains(&status), "{request}: {status}");
+    }
+    let long = "a".repeat(100_000);
+    let (status, _) = http.ask(&format!("GET /api/status?{long}"), &[&host]);
+    assert!(status != 200 || http.get("GET /api/status").0 == 200);
+    assert_eq!(http.get("GET /api/status").0, 200);
+}
+
+/// Connections that ask for nothing are closed, and keep nobody out.
+pub fn idle_connections_are_closed(http: &Http) {
+    let mut idle: Vec<TcpStream> = (0..100)
+        .map(|_| {
+            let mut stream = TcpStream::connect(http.address).expect("it listens");
+            stream.write_all(b"POST /api/stop HTTP/1.1\r\nHost:").expect("it reads");
+            stream
+        })
+        .collect();
+    assert_eq!(http.get("POST /api/stop").0, 200);
+    let mut first = idle.swap_remove(0);
+    first.set_read_timeout(Some(Duration::from_secs(60))).expect("a time");
+    let mut rest = Vec::new();
+    first.read_to_end(&mut rest).expect("it is closed");
+    assert!(!String::from_utf8_lossy(&rest).contains("200"));
+}

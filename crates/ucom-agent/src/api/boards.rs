@@ -1,0 +1,76 @@
+//! The boards, for all who may look.
+use agent_kit::api::{Number, Problem, Refusals};
+use axum::Json;
+use axum::extract::State;
+
+use super::objects::{BoardObject, ValuesObject};
+use super::{Agent, Denials};
+use crate::work::Kind;
+
+/// A board that is not known.
+pub(super) fn unknown(number: u8) -> Problem {
+    Problem::nothing("board", number, "/api/boards")
+}
+
+/// The boards as last seen. They are asked when the agent starts, by a scan, and whenever something is done with them.
+#[utoipa::path(
+    get,
+    path = "/api/boards",
+    operation_id = "list_boards",
+    responses((status = 200, description = "In the order of their numbers", body = Vec<BoardObject>), Refusals)
+)]
+pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>> {
+    Json(BoardObject::all(&agent.shared.picture()))
+}
+
+/// One board as last seen.
+#[utoipa::path(
+    get,
+    path = "/api/boards/{number}",
+    operation_id = "get_board",
+    params(("number" = u8, Path, description = "Number of the board")),
+    responses(
+        (status = 200, description = "The board", body = BoardObject),
+        (status = 404, description = "No board of this number is known", body = Problem),
+        Refusals
+    )
+)]
+pub(super) async fn board(
+    State(agent): State<Agent>,
+    Number(number): Number<u8>,
+) -> Result<Json<BoardObject>, Problem> {
+    let picture = agent.shared.picture();
+    let board = picture.boards.get(number).ok_or_else(|| unknown(number))?;
+    Ok(Json(BoardObject::of(&picture, number, board)))
+}
+
+/// Values of a board by name, in units where the signal table has them. Where its names are not known the board is asked for them.
+#[utoipa::path(
+    get,
+    path = "/api/boards/{number}/values",
+    operation_id = "get_values",
+    params(("number" = u8, Path, description = "Number of the board")),
+    responses(
+        (status = 200, description = "Its values", body = ValuesObject),
+        (status = 404, description = "No board of this number is known", body = Problem),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn values(
+    State(agent): State<Agent>,
+    Number(number): Number<u8>,
+) -> Result<Json<ValuesObject>, Problem> {
+    let picture = agent.shared.picture();
+    if picture.boards.get(number).is_none() {
+        return Err(unknown(number));
+    }
+    if let Some(values) = picture.values.get(&number) {
+        return Ok(Json(ValuesObject::of(&picture, values)));
+    }
+    let asked = agent.shared.call(Kind::Question, move |hands| {
+        let known = hands.known(number).map_err(|error| hands.problem(&error))?;
+        Ok(hands.values_of(&known))
+    });
+    let values = asked.await?;
+    Ok(Json(ValuesObject::of(&agent.shared.picture(), &values)))
+}

@@ -1,0 +1,296 @@
+//! Jobs: what takes longer than a request.
+use std::time::Duration;
+
+use agent_kit::api::{Body, Number, Problem, Refusals};
+use agent_kit::gate::Caller;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
+use host_kit::ErrorKind;
+use serde_json::json;
+use ucom_host::master::{InitOptions, Outcome, Request, RunOptions, RunReport};
+use ucom_host::session::{Assignment, Boards, Prepared, SessionError, only, plans, remember};
+use utoipa::ToSchema;
+
+use super::commands::{GivenValue, by_names};
+use super::objects::JobObject;
+use super::{Agent, Denials};
+use crate::jobs::Done;
+use crate::owner::Hands;
+use crate::work::Kind;
+
+/// How long a doctor listens before it asks.
+const LISTEN: Duration = Duration::from_millis(1500);
+
+impl Agent {
+    /// Begins a job for the client that commands.
+    pub(super) fn begin(
+        &self,
+        (caller, headers): (&Caller, &HeaderMap),
+        (kind, what): (Kind, &'static str),
+        act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), SessionError> + Send + 'static,
+    ) -> Result<(StatusCode, Json<JobObject>), Problem> {
+        let client = self.commander(caller, headers)?;
+        if kind == Kind::Command {
+            self.shared.may_move(client.id)?;
+        }
+        let act = move |hands: &mut Hands| act(hands).map_err(|error| hands.problem(&error));
+        let job = self.shared.begin(kind, what, &client.name, act);
+        let why = job.as_ref().err().map(|error| error.message.clone());
+        let number = job.as_ref().ok().map(|job| job.number);
+        self.gate
+            .note("command", json!({ "client": client.id, "command": what, "job": number, "why_not": why }));
+        Ok((StatusCode::ACCEPTED, Json(job?.into())))
+    }
+}
+
+fn texts(findings: &[impl ToString]) -> Vec<String> {
+    findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
+}
+
+/// Asks who is there; changes nothing.
+#[utoipa::path(
+    post,
+    path = "/api/scan",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn scan(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    agent.begin((&caller, &headers), (Kind::Question, "scan"), |hands| {
+        match hands.driver.run(Request::Scan)? {
+            Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
+            other => Err(other.into()),
+        }
+    })
+}
+
+/// A board that is expected at its place.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExpectedBoard {
+    /// Its place, which is its number.
+    board: u8,
+    /// Number of its bootloader: who it is.
+    flash_number: u16,
+}
+
+/// How the chain is numbered.
+#[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InitRequest {
+    /// Boards that are expected at their places: others are an error. Empty: whoever is there.
+    #[serde(default)]
+    expected: Vec<ExpectedBoard>,
+}
+
+/// Resets all boards and numbers them along the chain.
+#[utoipa::path(
+    post,
+    path = "/api/init",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    request_body = InitRequest,
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn init(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    Body(InitRequest { expected }): Body<InitRequest>,
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    let expected = expected.iter().map(|board| (board.board, board.flash_number)).collect();
+    let options = InitOptions { expected, force: false };
+    agent.begin((&caller, &headers), (Kind::Command, "init"), |hands| {
+        let outcome = hands.driver.run(Request::Init(options));
+        // Whatever came of it, the numbers are not those of before.
+        hands.forget_all();
+        let Outcome::Init(report) = outcome? else { return Err(SessionError::NoBoards) };
+        let findings = texts(&report.findings);
+        let error = report.failure().map(|kind| {
+            Problem::new("init", findings.join("; "), "POST /api/doctor looks for the reason").kind(kind)
+        });
+        Ok((Done::Chain(report.boards, findings), error))
+    })
+}
+
+/// Looks for what is wrong with bus, chain and boards: listens, and asks where that cannot do harm.
+#[utoipa::path(
+    post,
+    path = "/api/doctor",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn doctor(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    agent.begin((&caller, &headers), (Kind::Question, "doctor"), |hands| {
+        let seen = hands.driver.examine(LISTEN)?;
+        Ok((Done::Findings(seen.findings), None))
+    })
+}
+
+/// A value of an input or a parameter.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NamedValue {
+    /// The board; missing: each of those that are to run.
+    board: Option<u8>,
+    /// Its name.
+    name: String,
+    /// The value.
+    value: GivenValue,
+}
+
+/// What is to run.
+#[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunRequest {
+    /// Numbers of the boards; empty: all that answer.
+    #[serde(default)]
+    boards: Vec<u8>,
+    /// Outputs are enabled at the end.
+    #[serde(default)]
+    active: bool,
+    /// Inputs that differ from the boards' initial ones.
+    #[serde(default)]
+    inputs: Vec<NamedValue>,
+    /// Parameters.
+    #[serde(default)]
+    parameters: Vec<NamedValue>,
+}
+
+fn assignments(values: &[NamedValue]) -> Result<Vec<Assignment>, Problem> {
+    let one = |NamedValue { board, name, value }: &NamedValue| {
+        Ok(Assignment { board: *board, name: name.clone(), value: value.parsed(name)? })
+    };
+    values.iter().map(one).collect()
+}
+
+/// Starts applications and control loops. The job ends when they run; what becomes of them then are events.
+#[utoipa::path(
+    post,
+    path = "/api/run",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    request_body = RunRequest,
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn run(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    Body(request): Body<RunRequest>,
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    let (ci, par) = (assignments(&request.inputs)?, assignments(&request.parameters)?);
+    agent.begin((&caller, &headers), (Kind::Command, "run"), move |hands| {
+        let boards = match request.boards.is_empty() {
+            true => Boards::All,
+            false => Boards::Some(request.boards.clone()),
+        };
+        let numbers = hands.driver.numbers(&boards)?;
+        only(&numbers, &ci, "run")?;
+        only(&numbers, &par, "run")?;
+        let (report, prepared) = by_names(hands, |hands, cache| {
+            let mut prepared = Prepared::default();
+            let started = start(hands, cache, &numbers, (&ci, &par), request.active, &mut prepared);
+            // What the procedure began it has taken back itself.
+            let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
+            Ok((report, prepared))
+        })?;
+        for known in prepared.known.into_values() {
+            hands.knows(known);
+        }
+        hands.runs(&numbers);
+        Ok((Done::Running(report.boards, report.load), None))
+    })
+}
+
+/// Names, plans, and the start of all boards.
+fn start(
+    hands: &mut Hands,
+    cache: &ucom_host::session::Cache,
+    numbers: &[u8],
+    (ci, par): (&[Assignment], &[Assignment]),
+    active: bool,
+    prepared: &mut Prepared,
+) -> Result<RunReport, SessionError> {
+    for board in numbers {
+        prepared.add(&mut hands.driver, cache, &hands.signals, *board, false)?;
+    }
+    let plans = plans(&hands.driver, prepared, None, ci, par)?;
+    match hands.driver.run(Request::Run(RunOptions { boards: plans.clone(), active, force: false }))? {
+        Outcome::Running(report) => {
+            remember(cache, prepared, &plans);
+            Ok(report)
+        }
+        other => Err(other.into()),
+    }
+}
+
+/// Jobs that are remembered, oldest first.
+#[utoipa::path(
+    get,
+    path = "/api/jobs",
+    operation_id = "list_jobs",
+    responses((status = 200, description = "Oldest first", body = Vec<JobObject>), Refusals)
+)]
+pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
+    Json(agent.shared.jobs.list().into_iter().map(JobObject::from).collect())
+}
+
+/// A job, while it goes on and afterwards.
+#[utoipa::path(
+    get,
+    path = "/api/jobs/{number}",
+    operation_id = "get_job",
+    params(("number" = u64, Path, description = "Number of the job")),
+    responses(
+        (status = 200, description = "How it is", body = JobObject),
+        (status = 404, description = "It is not remembered", body = Problem),
+        Refusals
+    )
+)]
+pub(super) async fn get(
+    State(agent): State<Agent>,
+    Number(number): Number<u64>,
+) -> Result<Json<JobObject>, Problem> {
+    let job = agent.shared.jobs.get(number);
+    Ok(Json(job.ok_or_else(|| Problem::nothing("job", number, "/api/jobs"))?.into()))
+}
+
+/// Cancels a job: what it has to undo on the boards it still does.
+#[utoipa::path(
+    delete,
+    path = "/api/jobs/{number}",
+    operation_id = "cancel_job",
+    params(
+        ("number" = u64, Path, description = "Number of the job"),
+        ("Lease-Key" = String, Header, description = "Key of the lease")
+    ),
+    responses(
+        (status = 204, description = "It will end"),
+        (status = 404, description = "It is not remembered", body = Problem),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn cancel(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Number(number): Number<u64>,
+    headers: HeaderMap,
+) -> Result<StatusCode, Problem> {
+    let client = agent.commander(&caller, &headers)?;
+    if agent.shared.jobs.get(number).is_none() {
+        return Err(Problem::nothing("job", number, "/api/jobs"));
+    }
+    agent.gate.note("command", json!({ "client": client.id, "command": "cancel", "job": number }));
+    if agent.shared.cancel(number) {
+        return Ok(StatusCode::NO_CONTENT);
+    }
+    let message = format!("job {number} does not go on");
+    Err(Problem::new("over", message, "GET /api/jobs shows how each ended").kind(ErrorKind::Refused))
+}

@@ -1,0 +1,255 @@
+//! The agent's API: what is asked by HTTP, and a stream of what happens.
+mod boards;
+mod commands;
+mod events;
+mod jobs;
+mod lease;
+mod objects;
+mod updates;
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use agent_kit::access::{Access, Role, TokenError, random};
+use agent_kit::api::{Problem, Refusals};
+use agent_kit::gate::{Caller, Gate, let_in};
+use agent_kit::log::CommandLog;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::from_fn_with_state;
+use axum::{Extension, Json, Router};
+use serde_json::json;
+use tokio::sync::Semaphore;
+use tower_http::timeout::TimeoutLayer;
+use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
+use utoipa::{IntoResponses, Modify, OpenApi, ToSchema};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::owner::{Owner, Shared};
+use objects::{LeaseObject, StatusObject};
+
+/// Longest body that is read.
+const BODY_MAX: usize = 64 << 10;
+/// Longest with images: 1 MiB each, as text.
+const IMAGES_MAX: usize = 6 << 20;
+/// Longest that a request may take.
+const REQUEST_TIME: Duration = Duration::from_secs(10);
+/// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
+const VIEWERS_MAX: usize = 128;
+const OPERATORS_MAX: usize = 32;
+
+/// What every handler has.
+#[derive(Clone)]
+pub struct Agent {
+    shared: Arc<Shared>,
+    gate: Gate,
+    /// A number of its own, by which clients know that it is another one.
+    id: Arc<str>,
+    bus: Arc<str>,
+    simulated: bool,
+    viewers: Arc<Semaphore>,
+    operators: Arc<Semaphore>,
+}
+
+impl Agent {
+    /// An agent of a bus. `bus` is what people call it.
+    ///
+    /// # Errors
+    ///
+    /// The system has no random numbers.
+    pub fn new(
+        owner: &Owner,
+        access: Access,
+        log: Arc<Mutex<CommandLog>>,
+        bus: &str,
+        simulated: bool,
+    ) -> Result<Self, TokenError> {
+        Ok(Self {
+            shared: owner.shared.clone(),
+            gate: Gate::new(access, log),
+            id: random()?.get(..8).unwrap_or_default().into(),
+            bus: bus.into(),
+            simulated,
+            viewers: Arc::new(Semaphore::new(VIEWERS_MAX)),
+            operators: Arc::new(Semaphore::new(OPERATORS_MAX)),
+        })
+    }
+
+    /// Everything that is served.
+    pub fn router(self) -> Router {
+        let (router, description) = described().split_for_parts();
+        let description: Arc<str> = text(&description).into();
+        let openapi =
+            move || async move { ([(header::CONTENT_TYPE, "application/json")], description.to_string()) };
+        router
+            .route("/api/stream", axum::routing::get(events::stream))
+            .route("/openapi.json", axum::routing::get(openapi))
+            .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+            .layer(from_fn_with_state(self.gate.clone(), let_in))
+            .with_state(self)
+    }
+
+    fn status(&self, caller: &Caller) -> StatusObject {
+        let now = self.shared.now();
+        let lease = self.shared.leases.lock().unwrap_or_else(PoisonError::into_inner).lease();
+        let lease = lease.filter(|lease| lease.until > now).map(|lease| LeaseObject {
+            holder: lease.holder,
+            age_ms: now.saturating_sub(lease.since).as_millis() as u64,
+            left_ms: lease.until.saturating_sub(now).as_millis() as u64,
+            wanted_by: lease.wanted_by,
+        });
+        StatusObject {
+            simulated: self.simulated,
+            bus: self.bus.to_string(),
+            lost: self.shared.lost(),
+            lease,
+            role: caller.role,
+            agent: self.id.to_string(),
+            last_event: self.shared.journal.last(),
+            ..StatusObject::of(&self.shared.picture())
+        }
+    }
+}
+
+/// The description of the API, OpenAPI 3.1, as JSON.
+pub fn description() -> String {
+    text(&described().into_openapi())
+}
+
+fn text(description: &utoipa::openapi::OpenApi) -> String {
+    // It is made of strings.
+    description.to_pretty_json().unwrap_or_default()
+}
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "openjtc UCoM agent",
+        description = "Owner of one bus of UCoM boards. Reading needs no token on the computer that the agent runs on, and the viewer's or \
+                       the operator's from elsewhere. A Stop is taken from everyone who was let in.",
+        license(name = "MIT OR Apache-2.0")
+    ),
+    components(schemas(Problem)),
+    modifiers(&Bearer),
+    security((), ("token" = []))
+)]
+struct Description;
+
+/// A token, which those on the same computer need for commands alone.
+struct Bearer;
+
+impl Modify for Bearer {
+    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
+        let scheme = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
+        description.components.get_or_insert_default().add_security_scheme("token", scheme);
+    }
+}
+
+fn described() -> OpenApiRouter<Agent> {
+    let images =
+        OpenApiRouter::new().routes(routes!(updates::update)).layer(DefaultBodyLimit::max(IMAGES_MAX));
+    let others = OpenApiRouter::with_openapi(Description::openapi())
+        .routes(routes!(status))
+        .routes(routes!(stop))
+        .routes(routes!(events::events))
+        .routes(routes!(lease::take, lease::renew, lease::release))
+        .routes(routes!(boards::boards))
+        .routes(routes!(boards::board))
+        .routes(routes!(boards::values))
+        .routes(routes!(commands::set_input))
+        .routes(routes!(commands::set_parameter))
+        .routes(routes!(commands::set_outputs))
+        .routes(routes!(commands::start_board))
+        .routes(routes!(commands::stop_board))
+        .routes(routes!(commands::reset_board))
+        .routes(routes!(jobs::scan))
+        .routes(routes!(jobs::init))
+        .routes(routes!(jobs::doctor))
+        .routes(routes!(jobs::run))
+        .routes(routes!(jobs::list))
+        .routes(routes!(jobs::get, jobs::cancel))
+        .layer(DefaultBodyLimit::max(BODY_MAX));
+    others.merge(images)
+}
+
+/// What a command may be refused with beside what every request may.
+#[derive(IntoResponses)]
+#[expect(dead_code, reason = "describes responses")]
+enum Denials {
+    /// Refused: another client commands, something else is going on, a check or a board forbids it
+    #[response(status = 409)]
+    Denied(Problem),
+    /// More than may be sent at once
+    #[response(status = 413)]
+    TooLarge(Problem),
+    /// The body is no JSON
+    #[response(status = 415)]
+    NoJson(Problem),
+    /// What was asked for is none
+    #[response(status = 422)]
+    Invalid(Problem),
+    /// Something went wrong on the way
+    #[response(status = 500)]
+    Fault(Problem),
+    /// The bus is gone, or a board does not answer
+    #[response(status = 503)]
+    Lost(Problem),
+}
+
+/// The bus, and who commands.
+#[utoipa::path(
+    get,
+    path = "/api/status",
+    operation_id = "get_status",
+    responses((status = 200, description = "How the bus is", body = StatusObject), Refusals)
+)]
+async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>) -> Json<StatusObject> {
+    Json(agent.status(&caller))
+}
+
+/// What was sent.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+struct SentObject {
+    /// `stop`.
+    sent: String,
+    /// Number of the last event before it: what came of it follows.
+    last_event: u64,
+}
+
+/// Stops all boards: their control loops ahead of all else, then their applications. No lease is needed.
+///
+/// An update that goes on is not ended: a board whose flash is half written could do nothing afterwards. Everything else is.
+#[utoipa::path(
+    post,
+    path = "/api/stop",
+    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own work")),
+    responses(
+        (status = 200, description = "The Stop is on its way; an event names the boards that have confirmed it", body = SentObject),
+        (status = 503, description = "The bus is gone: nothing was sent", body = Problem),
+        Refusals
+    )
+)]
+async fn stop(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Result<Json<SentObject>, Problem> {
+    // Who it is does not matter, but for going on later.
+    let client = match caller.role {
+        Role::Operator => agent.client(&headers).ok(),
+        Role::Viewer => None,
+    };
+    let by = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
+    let lost = agent.shared.lost();
+    let facts = json!({ "command": "stop", "from": caller.peer.to_string(), "by": by, "lost": lost });
+    agent.gate.note("halt", facts);
+    if let Some(lost) = lost {
+        let message = format!("{lost}: nothing was sent; boards that run become safe without heartbeats");
+        return Err(Problem::new("no-link", message, "cut the power of the outputs, if anything moves")
+            .kind(host_kit::ErrorKind::NoLink));
+    }
+    let last_event = agent.shared.journal.last();
+    agent.shared.halt(&by, client.map(|client| client.id));
+    Ok(Json(SentObject { sent: "stop".into(), last_event }))
+}

@@ -1,0 +1,215 @@
+//! Updates: images that are uploaded, checked, written and read back.
+use agent_kit::api::{Body, Problem, Refusals};
+use agent_kit::gate::Caller;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use host_kit::ErrorKind;
+use time::{Date, Month, OffsetDateTime};
+use ucom::Profile;
+use ucom_host::files::image::{AddressUnit, Format};
+use ucom_host::files::{Image, ImageOptions};
+use ucom_host::master::update::{
+    UpdateImage, UpdateMode, UpdateOptions, UpdateReport, UpdateTarget, has_header,
+};
+use ucom_host::master::{Outcome, Request};
+use utoipa::ToSchema;
+
+use super::objects::JobObject;
+use super::{Agent, Denials};
+use crate::jobs::Done;
+use crate::work::Kind;
+
+/// A board that is to be updated.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetRequest {
+    /// Its number.
+    board: u8,
+    /// Number of its bootloader, which it must have; missing: whoever has that number.
+    flash_number: Option<u16>,
+}
+
+/// Form of an image.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum ImageFormat {
+    /// Raw bytes in wire order.
+    Bin,
+    /// Intel HEX.
+    Hex,
+    /// Motorola S-record.
+    Srec,
+}
+
+/// What addresses of records count.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Unit {
+    /// Bytes.
+    Byte,
+    /// Words of 16 bits.
+    Word,
+}
+
+/// An update.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UpdateRequest {
+    /// The boards.
+    #[schema(min_items = 1, max_items = 31)]
+    boards: Vec<TargetRequest>,
+    /// The image, as base64.
+    image: String,
+    /// What the other cycle carries, as base64, where the profile's plan sends two images.
+    second: Option<String>,
+    /// Form of the images; missing: seen by their content, which text is taken for raw bytes by never.
+    format: Option<ImageFormat>,
+    /// What their addresses count; missing: seen by their records.
+    addresses: Option<Unit>,
+    /// Flash date, as `2009-06-01`; missing: today.
+    date: Option<String>,
+    /// Program ID that the boards must show at the end.
+    expect_program_id: Option<u16>,
+    /// All boards at once, by broadcast.
+    #[serde(default)]
+    group: bool,
+    /// Start the application at the end.
+    #[serde(default)]
+    start: bool,
+    /// Only the checks.
+    #[serde(default)]
+    dry_run: bool,
+    /// Also when boards run, or the image is there already.
+    #[serde(default)]
+    force: bool,
+    /// What cannot be verified is as good as what was.
+    #[serde(default)]
+    accept_unverified: bool,
+}
+
+fn usage(message: impl Into<String>, next: &str) -> Problem {
+    Problem::new("image", message, next).kind(ErrorKind::Usage)
+}
+
+fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
+    let bytes = STANDARD
+        .decode(text)
+        .map_err(|e| usage(format!("the image is no base64: {e}"), "encode the file as base64"))?;
+    let format = request.format.map(|format| match format {
+        ImageFormat::Bin => Format::Bin,
+        ImageFormat::Hex => Format::IntelHex,
+        ImageFormat::Srec => Format::SRecord,
+    });
+    let address_unit = request.addresses.map(|unit| match unit {
+        Unit::Byte => AddressUnit::Byte,
+        Unit::Word => AddressUnit::Word,
+    });
+    let options = ImageOptions { format, address_unit, ..ImageOptions::default() };
+    let image = Image::parse(&bytes, &options).map_err(|e| {
+        usage(
+            e.to_string(),
+            "forms are hex, srec and bin; addresses says what the addresses of records count",
+        )
+    })?;
+    Ok(image.into())
+}
+
+/// The flash date: as asked, else today (UTC); 0 where no header carries it.
+fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
+    let wrong = |text: &str| {
+        usage(
+            format!("{text}: no day of the form YYYY-MM-DD that boards can keep"),
+            "leave date out for today",
+        )
+    };
+    let date = match asked {
+        _ if !has_header(profile) => return Ok(0),
+        Some(text) => parsed(text).ok_or_else(|| wrong(text))?,
+        None => OffsetDateTime::now_utc().date(),
+    };
+    let year = u16::try_from(date.year()).ok();
+    let encoded = year.and_then(|year| profile.prog_date.encode(year, date.month().into(), date.day()));
+    encoded.ok_or_else(|| wrong(&date.to_string()))
+}
+
+fn parsed(text: &str) -> Option<Date> {
+    let mut parts = text.split('-');
+    let (year, month) = (parts.next()?.parse().ok()?, parts.next()?.parse::<u8>().ok()?);
+    let day = parts.next()?.parse().ok()?;
+    let date = Date::from_calendar_date(year, Month::try_from(month).ok()?, day).ok()?;
+    parts.next().is_none().then_some(date)
+}
+
+fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, Problem> {
+    if request.boards.is_empty() {
+        return Err(usage("no board is named", "boards lists them, each with its number"));
+    }
+    let target = |t: &TargetRequest| UpdateTarget { board: t.board, flash_number: t.flash_number };
+    let targets = request.boards.iter().map(target).collect();
+    let second = request.second.as_deref().map(|text| image(text, request)).transpose()?;
+    let date = day(request.date.as_deref(), profile)?;
+    Ok(UpdateOptions {
+        second,
+        expect_program_id: request.expect_program_id,
+        mode: if request.group { UpdateMode::Group } else { UpdateMode::OneByOne },
+        dry_run: request.dry_run,
+        force: request.force,
+        start: request.start,
+        accept_unverified: request.accept_unverified,
+        keep_going: request.boards.len() > 1,
+        ..UpdateOptions::new(targets, image(&request.image, request)?, date)
+    })
+}
+
+/// What an update that did not end well ended with.
+fn failed(report: &UpdateReport) -> Option<Problem> {
+    let kind = report.failure()?;
+    let failures = report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?)));
+    let texts: Vec<String> = failures.map(|(board, failure)| format!("board {board}: {failure}")).collect();
+    let cancelled = report
+        .boards
+        .iter()
+        .any(|b| matches!(b.failure, Some(ucom_host::master::update::UpdateFailure::Cancelled { .. })));
+    let code = if cancelled { "cancelled" } else { "update" };
+    let message = match texts.is_empty() {
+        true => "what was written could not be verified".into(),
+        false => texts.join("; "),
+    };
+    Some(Problem::new(code, message, "the job's update has what became of each board").kind(kind))
+}
+
+/// Programs boards: checked, transferred twice, verified by reading back. Never two at once.
+#[utoipa::path(
+    post,
+    path = "/api/updates",
+    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    request_body = UpdateRequest,
+    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+)]
+pub(super) async fn update(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    Body(request): Body<UpdateRequest>,
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    // Before the image is looked at.
+    agent.commander(&caller, &headers)?;
+    let options = options(&request, &agent.shared.picture().profile)?;
+    agent.begin((&caller, &headers), (Kind::Update, "update"), |hands| {
+        let started: Vec<u8> = options.targets.iter().filter(|_| options.start).map(|t| t.board).collect();
+        let targets: Vec<u8> = options.targets.iter().map(|t| t.board).collect();
+        let outcome = hands.driver.run(Request::Update(options));
+        targets.iter().for_each(|board| hands.forget(*board));
+        started.iter().for_each(|board| hands.has_started(*board));
+        match outcome? {
+            Outcome::Update(report) => {
+                let error = failed(&report);
+                Ok((Done::Update(report), error))
+            }
+            other => Err(other.into()),
+        }
+    })
+}

@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod api;
+mod bus;
+mod happening;
+mod jobs;
+mod owner;
+mod picture;
+mod work;
+
+pub use happening::{Happening, Policy};
+pub use owner::{Config, Owner};

@@ -1,0 +1,308 @@
+//! What a program does by HTTP alone: numbers, boards, values, control loops, inputs, events, and a Stop.
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Served, WAIT, frame};
+use serde_json::{Value, json};
+use ucom::Profile;
+use ucom_sim::ChainConfig;
+
+fn value<'a>(values: &'a Value, list: &str, name: &str) -> &'a Value {
+    let all = values[list].as_array().expect("a list");
+    let is = |value: &&Value| value["name"].as_str().is_some_and(|text| text.starts_with(name));
+    all.iter().find(is).unwrap_or_else(|| panic!("{name} in {values}"))
+}
+
+/// D-24, D-51: boards get the numbers of their places, and are who they are.
+#[test]
+fn d24_a_chain_is_scanned_numbered_and_listed() {
+    let served = Served::start(3);
+    let key = served.lease("anna", 60.0, "stop");
+    let job = served.job("POST /api/scan", &key, None);
+    assert_eq!(job["stage"], "finished", "{job}");
+    assert_eq!(job["chain"]["boards"], json!([]), "none has a number yet: {job}");
+    assert_eq!(job["chain"]["findings"].as_array().map(Vec::len), Some(3), "{job}");
+    let job = served.job("POST /api/init", &key, Some(json!({})));
+    assert_eq!((job["stage"].as_str(), &job["chain"]["findings"]), (Some("finished"), &json!([])), "{job}");
+    let profile = Profile::default();
+    let config = ChainConfig::head(&profile).with_boards(3, &profile);
+    let (_, boards) = served.api("GET /api/boards", None, None);
+    let found: Vec<(u64, u64)> = boards
+        .as_array()
+        .expect("boards")
+        .iter()
+        .filter_map(|board| Some((board["number"].as_u64()?, board["flash_number"].as_u64()?)))
+        .collect();
+    let places = config.boards.iter().zip(1..).map(|(board, place)| (place, u64::from(board.flash_id)));
+    assert_eq!(found, places.collect::<Vec<_>>(), "{boards}");
+    // Another chain than the expected one is an error of the job, with what is there.
+    let expected = json!({ "expected": [{ "board": 1, "flash_number": 9 }] });
+    let job = served.job("POST /api/init", &key, Some(expected));
+    assert_eq!(
+        (job["stage"].as_str(), job["error"]["code"].as_str()),
+        (Some("failed"), Some("init")),
+        "{job}"
+    );
+    let (status, job) = served.api("GET /api/jobs/99", None, None);
+    assert!(status == 404 && job["next"].as_str().is_some_and(|next| next.contains("/api/jobs")), "{job}");
+}
+
+#[test]
+fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
+    let (served, key) = Served::numbered(2);
+    assert_eq!(served.board(1)["offers"], Value::Null, "its application is not started: it has no names");
+    let (status, error) = served.api("GET /api/boards/1/values", None, None);
+    assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
+    let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
+    assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
+    served.run(&key, &[1, 2]);
+    let board = served.board_when(1, "running", |board| board["state"] == "running");
+    assert_eq!(
+        (board["heartbeat"].as_str(), board["active"].as_bool()),
+        (Some("alive"), Some(true)),
+        "{board}"
+    );
+    assert!(board["heartbeat_age_s"].as_f64().is_some_and(|age| age < 1.6), "{board}");
+    let offers: Vec<&str> =
+        board["offers"]["inputs"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
+    assert!(offers.iter().any(|name| name.starts_with("set_position")), "{offers:?}");
+    // An input by its name moves the axis; without the signal table words are numbers.
+    let set = |value: Value| {
+        let request = "PUT /api/boards/1/inputs/set_position";
+        served.api(request, Some(&key), Some(json!({ "value": value })))
+    };
+    let (status, sent) = set(json!(1500));
+    assert_eq!((status, sent["value"].as_f64()), (200, Some(1500.0)), "{sent}");
+    let begun = Instant::now();
+    loop {
+        let (status, values) = served.api("GET /api/boards/1/values", None, None);
+        assert_eq!(status, 200, "{values}");
+        assert_eq!(value(&values, "inputs", "set_position")["value"], 1500.0, "{values}");
+        if value(&values, "outputs", "pos")["value"].as_f64().is_some_and(|at| (at - 1500.0).abs() < 30.0) {
+            assert_eq!(values["stale"], false, "{values}");
+            break;
+        }
+        assert!(begun.elapsed() < WAIT, "{values}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    // Words and text are values, too; what is none is named with what there is, and changes nothing.
+    assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
+    for (name, given, status, part) in [
+        ("set_positon", json!(1), 422, "set_position"),
+        ("set_position", json!(99999), 409, "set_position"),
+        ("set_position", json!("warm"), 422, "no value"),
+    ] {
+        let request = format!("PUT /api/boards/1/inputs/{name}");
+        let (got, error) = served.api(&request, Some(&key), Some(json!({ "value": given })));
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!([status, 409, 422].contains(&got) && message.contains(part), "{got} {error}");
+    }
+    let (_, values) = served.api("GET /api/boards/1/values", None, None);
+    assert_eq!(value(&values, "inputs", "set_position")["value"], 1500.0, "{values}");
+    let body = Some(json!({ "value": 120 }));
+    let name =
+        board["offers"]["parameters"][0].as_str().expect("a name").split(' ').next().unwrap_or_default();
+    let (status, sent) = served.api(&format!("PUT /api/boards/1/parameters/{name}"), Some(&key), body);
+    assert_eq!((status, sent["value"].as_f64()), (200, Some(120.0)), "{sent}");
+    // Outputs off, and one board stopped; the other one goes on.
+    let off = served.api("PUT /api/boards/1/outputs", Some(&key), Some(json!({ "active": false })));
+    assert_eq!(off.0, 204, "{}", off.1);
+    served.board_when(1, "inactive", |board| board["active"] == false);
+    let (status, stopped) = served.api("POST /api/boards/1/stop", Some(&key), None);
+    assert_eq!((status, stopped["state"].as_str()), (200, Some("exloader")), "{stopped}");
+    assert_eq!(served.board(2)["state"], "running");
+    // A reset takes its number.
+    let (status, reset) = served.api("POST /api/boards/1/reset", Some(&key), None);
+    assert_eq!((status, reset["reports"].as_array().map(Vec::len)), (200, Some(1)), "{reset}");
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 503);
+}
+
+/// A Stop is taken from anyone, without token and lease, is on the bus at once, and each board confirms it.
+#[test]
+fn d37_a_stop_needs_no_lease_and_stops_every_board() {
+    let (served, key) = Served::numbered(3);
+    served.run(&key, &[1, 2, 3]);
+    let last = served.last_event();
+    let mut peer = served.chain.peer();
+    let stopper = std::thread::spawn({
+        let http = served.clone();
+        move || http.get("POST /api/stop").0
+    });
+    // MCA_ADMIN_DATA to all, every flag 0; three times, as one frame can be lost.
+    for _ in 0..3 {
+        frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
+    }
+    assert_eq!(stopper.join().expect("it is taken"), 200);
+    let (number, halt) = served.event(last, "halt", |event| event["kind"] == "halt");
+    assert!(halt["by"].as_str().is_some_and(|by| by.starts_with("127.0.0.1")), "{halt}");
+    let (_, stopped) = served.event(number, "stopped", |event| event["kind"] == "stopped");
+    assert_eq!((&stopped["boards"], &stopped["not_stopped"]), (&json!([1, 2, 3]), &json!([])), "{stopped}");
+    for number in 1..=3 {
+        let board = served.board_when(number, "stopped", |board| board["state"] == "exloader");
+        assert_eq!(board["active"], false, "{board}");
+    }
+    // What somebody else has stopped stays so for a while; then it may be begun again.
+    let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
+    assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
+    std::thread::sleep(Duration::from_millis(3100));
+    served.run(&key, &[1]);
+    // One's own does not: with one's own key.
+    assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
+    served.board_when(1, "stopped", |board| board["state"] == "exloader");
+    served.run(&key, &[1]);
+    let log = std::fs::read_to_string(&served.log).expect("the log");
+    for what in ["\"halt\"", "\"command\":\"run\"", "\"joined\""] {
+        assert!(log.contains(what), "{what} in {log}");
+    }
+}
+
+/// A Stop ends what is under way before it moves anything.
+#[test]
+fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
+    let (served, key) = Served::numbered(2);
+    let job = served.begin("POST /api/run", &key, Some(json!({ "active": true })));
+    assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
+    let over = served.over(job);
+    assert_eq!(over["stage"], "cancelled", "{over}");
+    let (_, stopped) = served.event(0, "stopped", |event| event["kind"] == "stopped");
+    assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
+    std::thread::sleep(Duration::from_millis(500));
+    for number in 1..=2 {
+        assert_eq!(served.board(number)["state"], "exloader");
+    }
+}
+
+/// D-51: late after 1.5 s without a heartbeat, lost after 3 s, back with the next one.
+#[test]
+fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
+    let (served, key) = Served::numbered(2);
+    for board in [1, 2] {
+        assert_eq!(served.api(&format!("POST /api/boards/{board}/start"), Some(&key), None).0, 200);
+        served.board_when(board, "alive", |board| board["heartbeat"] == "alive");
+    }
+    let last = served.last_event();
+    let unix = || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let begun = unix().as_secs_f64();
+    served.chain.fault("silent board=2 for_s=5");
+    let mut at = Vec::new();
+    let mut number = last;
+    for change in ["late", "lost", "back"] {
+        let is = |event: &Value| event["kind"] == "heartbeat" && event["change"] == change;
+        let (found, event) = served.event(number, change, is);
+        assert_eq!(event["board"], 2, "{event}");
+        let (_, all) = served.api(&format!("GET /api/events?after={}", found - 1), None, None);
+        at.push(all["events"][0]["unix_s"].as_f64().expect("a time") - begun);
+        number = found;
+        if change == "lost" {
+            assert_eq!(served.board(2)["heartbeat"], "lost");
+            assert_eq!(served.board(1)["heartbeat"], "alive");
+        }
+    }
+    // The last heartbeat was up to a second before the fault.
+    assert!((0.4..1.7).contains(&at[0]) && (1.9..3.2).contains(&at[1]), "{at:?}");
+    assert!((1.4..1.6).contains(&(at[1] - at[0])) && at[2] < 6.7, "{at:?}");
+}
+
+/// D-37, D-50: a board that leaves its control loop by itself is an event, and its values are stale.
+#[test]
+fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
+    let (served, key) = Served::numbered(1);
+    served.run(&key, &[1]);
+    let last = served.last_event();
+    served.chain.fault("deaf board=1 for_s=3");
+    let (_, event) = served.event(last, "left", |event| event["kind"] == "loop");
+    assert_eq!((event["board"].as_u64(), event["change"].as_str()), (Some(1), Some("left-loop")), "{event}");
+    let (_, values) = served.api("GET /api/boards/1/values", None, None);
+    assert_eq!(values["stale"], true, "{values}");
+}
+
+/// D-08: nothing is sent to boards that another PC commands.
+#[test]
+fn d08_with_another_master_on_the_bus_commands_are_refused() {
+    let (served, key) = Served::numbered(1);
+    let mut other = Served::start(1);
+    other.chain.fault("foreign-master");
+    std::thread::sleep(Duration::from_millis(1500));
+    let (_, status) = other.api("GET /api/status", None, None);
+    assert_eq!(status["competing_master"], true, "{status}");
+    let theirs = other.lease("bob", 60.0, "stop");
+    let job = other.job("POST /api/init", &theirs, Some(json!({})));
+    assert_eq!(job["stage"], "failed", "{job}");
+    assert!(job["error"]["message"].as_str().is_some_and(|m| m.contains("PC")), "{job}");
+    other.end();
+    // A bus without one is not concerned.
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
+}
+
+#[test]
+fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
+    let (served, key) = Served::numbered(1);
+    let (status, denied) = served.api("POST /api/lease", None, Some(json!({ "name": "bob" })));
+    assert!(status == 409 && denied["message"].as_str().is_some_and(|m| m.contains("anna")), "{denied}");
+    let ask = json!({ "name": "bob", "ask": true, "lasts_s": 2.0 });
+    let (status, grant) = served.api("POST /api/lease", None, Some(ask));
+    assert_eq!((status, grant["held"].as_bool()), (200, Some(false)));
+    let bob = grant["key"].as_str().expect("a key").to_owned();
+    let (_, state) = served.api("PUT /api/lease", Some(&key), None);
+    assert_eq!((state["held"].as_bool(), state["wanted_by"].as_str()), (Some(true), Some("bob")));
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&bob), None).0, 409);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    assert_eq!(served.api("GET /api/status", None, None).1["lease"]["holder"], "bob");
+    // Unless asked for otherwise, nothing runs on for a client that is gone.
+    served.run(&bob, &[1]);
+    let last = served.last_event();
+    let (number, halt) = served.event(last, "halt", |event| event["kind"] == "halt");
+    assert!(halt["by"].as_str().is_some_and(|by| by.contains("bob")), "{halt}");
+    served.event(number, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1]));
+    // With the other policy it does.
+    let carl = served.lease("carl", 1.0, "continue");
+    std::thread::sleep(Duration::from_millis(3100));
+    let carl = match served.api("PUT /api/lease", Some(&carl), None).1["held"].as_bool() {
+        Some(true) => carl,
+        _ => served.lease("carl", 1.0, "continue"),
+    };
+    served.run(&carl, &[1]);
+    let last = served.last_event();
+    served.event(last, "nobody commands", |event| event["kind"] == "lease" && event["holder"].is_null());
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(served.board(1)["state"], "running");
+}
+
+#[test]
+fn a_stream_has_bus_boards_values_and_events_as_they_come() {
+    let (served, key) = Served::numbered(1);
+    served.run(&key, &[1]);
+    let (mut kinds, mut last) = (std::collections::BTreeMap::new(), 0);
+    served.stream("/api/stream?after=0", |message| {
+        let kind = message["kind"].as_str().expect("a kind").to_owned();
+        if kind == "events" {
+            for event in message["events"].as_array().expect("events") {
+                last += 1;
+                assert_eq!(event["number"], last, "{event}");
+            }
+        }
+        if kind == "values" {
+            assert_eq!(message["values"][0]["board"], 1, "{message}");
+            assert!(!message["values"][0]["outputs"].as_array().expect("outputs").is_empty(), "{message}");
+        }
+        *kinds.entry(kind).or_insert(0) += 1;
+        kinds.len() == 4 && kinds["values"] >= 20
+    });
+    assert!(last > 3, "{kinds:?}");
+}
+
+#[test]
+fn a_bus_that_is_gone_is_named() {
+    let (mut served, key) = Served::numbered(1);
+    served.chain.end();
+    let begun = Instant::now();
+    while served.api("GET /api/status", None, None).1["lost"].is_null() {
+        assert!(begun.elapsed() < WAIT);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let (status, error) = served.api("POST /api/stop", None, None);
+    assert_eq!((status, error["code"].as_str()), (503, Some("no-link")), "{error}");
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 503);
+    served.event(0, "lost", |event| event["kind"] == "lost");
+}

@@ -1,0 +1,218 @@
+//! An agent of a simulated chain in this process, and requests to it as anybody could send them.
+#![allow(dead_code)]
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use agent_kit::access::{Access, Tokens};
+use agent_kit::log::CommandLog;
+use can_link::{CanBus, CanFrame};
+use serde_json::{Value, json};
+use test_kit::http::Http;
+use ucom::Profile;
+use ucom_agent::api::Agent;
+use ucom_agent::{Config, Owner};
+use ucom_sim::{ChainConfig, ChainServer, ChainSim};
+
+pub const WAIT: Duration = Duration::from_secs(60);
+
+/// A simulated chain, on a bus that others can join.
+pub struct Chain {
+    pub url: String,
+    faults: Sender<String>,
+    ended: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Chain {
+    pub fn start(boards: usize) -> Self {
+        let (faults, lines) = channel::<String>();
+        let (ready, url) = channel();
+        let ended: Arc<AtomicBool> = Arc::default();
+        let end = ended.clone();
+        let thread = std::thread::spawn(move || {
+            let profile = Profile::default();
+            let config = ChainConfig::head(&profile).with_boards(boards, &profile);
+            let chain = ChainSim::new(&config, Vec::new(), 1, &profile);
+            let mut server =
+                ChainServer::bind("127.0.0.1:0", chain, profile.bitrate, 1, |text| println!("sim: {text}"))
+                    .expect("an address");
+            ready.send(server.url()).expect("the test waits");
+            while !end.load(Ordering::Relaxed) {
+                lines.try_iter().for_each(|line| server.fault(&line));
+                server.turn(Duration::from_millis(20));
+            }
+        });
+        Self { url: url.recv().expect("it listens"), faults, ended, thread: Some(thread) }
+    }
+
+    /// Begins a fault.
+    pub fn fault(&self, line: &str) {
+        self.faults.send(line.into()).expect("it goes on");
+    }
+
+    /// Joins the bus as a device that knows nothing but frames.
+    pub fn peer(&self) -> Box<dyn CanBus + Send> {
+        can_link::open(&self.url).expect("the bus opens")
+    }
+
+    pub fn end(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("it ends");
+        }
+    }
+}
+
+impl Drop for Chain {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Waits on a bus for a frame with this identifier and these data.
+pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
+    let begun = Instant::now();
+    let is = |frame: &CanFrame| frame.id().value() == id && frame.data() == data;
+    while begun.elapsed() < WAIT {
+        let received = peer.receive(Duration::from_millis(100)).expect("the bus is there");
+        if received.is_some_and(|frame| is(&frame)) {
+            return begun.elapsed();
+        }
+    }
+    panic!("{id:03X}#{data:02X?} never came");
+}
+
+/// An agent that ends with the test.
+pub struct Served {
+    pub chain: Chain,
+    pub tokens: Tokens,
+    pub log: PathBuf,
+    http: Http,
+    ended: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    _dir: tempfile::TempDir,
+}
+
+impl std::ops::Deref for Served {
+    type Target = Http;
+
+    fn deref(&self) -> &Http {
+        &self.http
+    }
+}
+
+impl Served {
+    /// Of a simulated chain of so many boards without numbers.
+    pub fn start(boards: usize) -> Self {
+        let chain = Chain::start(boards);
+        let dir = tempfile::tempdir().expect("a directory");
+        let log_path = dir.path().join("commands.jsonl");
+        let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
+        let owner = Owner::open(&chain.url, Config::default()).expect("the bus opens");
+        let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
+        let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
+        let address = listener.local_addr().expect("it listens");
+        let access = Access::new(tokens.clone(), address, &[]);
+        let agent = Agent::new(&owner, access, log, "simulated", true).expect("random numbers");
+        let ended = Arc::new(AtomicBool::new(false));
+        let end = ended.clone();
+        let thread = std::thread::spawn(move || {
+            agent_kit::serve::serve(agent.router(), listener, move || end.load(Ordering::Relaxed))
+                .expect("it serves");
+            owner.end();
+        });
+        let http = Http { address, operator: tokens.operator.clone() };
+        Self { chain, tokens, log: log_path, http, ended, thread: Some(thread), _dir: dir }
+    }
+
+    /// Of a chain with numbers, and who has given them: the lease is held.
+    pub fn numbered(boards: usize) -> (Self, String) {
+        let served = Self::start(boards);
+        let key = served.lease("anna", 60.0, "continue");
+        let job = served.job("POST /api/init", &key, Some(json!({})));
+        assert_eq!(job["stage"], "finished", "{job}");
+        (served, key)
+    }
+
+    /// Takes the lease.
+    pub fn lease(&self, name: &str, lasts_s: f64, policy: &str) -> String {
+        let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
+        let (status, grant) = self.api("POST /api/lease", None, Some(body));
+        assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
+        grant["key"].as_str().expect("a key").to_owned()
+    }
+
+    /// Begins a job: its number.
+    pub fn begin(&self, request: &str, key: &str, body: Option<Value>) -> u64 {
+        let (status, job) = self.api(request, Some(key), body);
+        assert_eq!(status, 202, "{request}: {job}");
+        job["number"].as_u64().expect("a number")
+    }
+
+    /// A job when it is over.
+    pub fn over(&self, number: u64) -> Value {
+        let begun = Instant::now();
+        while begun.elapsed() < WAIT {
+            let (status, job) = self.api(&format!("GET /api/jobs/{number}"), None, None);
+            assert_eq!(status, 200, "{job}");
+            if job["stage"] != "running" {
+                return job;
+            }
+            std::thread::sleep(Duration::from_millis(30));
+        }
+        panic!("job {number} is not over");
+    }
+
+    /// Begins a job and waits for its end.
+    pub fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
+        self.over(self.begin(request, key, body))
+    }
+
+    /// Control loops of these boards run, and their outputs are enabled.
+    pub fn run(&self, key: &str, boards: &[u8]) {
+        let body = json!({ "boards": boards, "active": true });
+        let job = self.job("POST /api/run", key, Some(body));
+        assert_eq!(job["stage"], "finished", "{job}");
+    }
+
+    pub fn board(&self, number: u8) -> Value {
+        self.api(&format!("GET /api/boards/{number}"), None, None).1
+    }
+
+    /// The board when it `is` so.
+    pub fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
+        let begun = Instant::now();
+        loop {
+            let board = self.board(number);
+            if is(&board) {
+                return board;
+            }
+            assert!(begun.elapsed() < WAIT, "not {what}: {board}");
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
+    pub fn last_event(&self) -> u64 {
+        self.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number")
+    }
+
+    /// Lets the agent end.
+    pub fn end(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("it ends");
+        }
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

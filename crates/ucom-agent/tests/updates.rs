@@ -1,0 +1,138 @@
+//! Firmware by HTTP: uploaded, written, read back.
+mod common;
+
+use std::time::Duration;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use common::Served;
+use serde_json::{Value, json};
+
+/// The image of the page's golden update, whose Program ID is 0x4B3F.
+fn golden(bytes: usize) -> String {
+    STANDARD.encode((0..bytes).map(|i| (37 * i + 11) as u8).collect::<Vec<u8>>())
+}
+
+fn request(boards: Value, bytes: usize) -> Value {
+    json!({ "boards": boards, "image": golden(bytes), "format": "bin", "date": "2009-06-01" })
+}
+
+/// D-44, D-45: what is read back after an update is the checksum of the image and its day.
+#[test]
+fn d44_an_image_is_uploaded_written_and_read_back() {
+    let (served, key) = Served::numbered(2);
+    let before = served.board(2);
+    let flash = before["flash_number"].as_u64().expect("a number");
+    let body = request(json!([{ "board": 2, "flash_number": flash }]), 1000);
+    let number = served.begin("POST /api/updates", &key, Some(body.clone()));
+    // Never two at once, and nothing else meanwhile.
+    let (status, busy) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
+    assert_eq!((status, busy["code"].as_str()), (409, Some("busy")), "{busy}");
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 409);
+    let job = served.over(number);
+    let board = &job["update"]["boards"][0];
+    assert_eq!(
+        (job["stage"].as_str(), board["outcome"].as_str()),
+        (Some("finished"), Some("verified")),
+        "{job}"
+    );
+    assert_eq!((board["verified"].as_bool(), board["program_id_after"].as_u64()), (Some(true), Some(0x4B3F)));
+    assert_ne!(board["program_id_before"], 0x4B3F, "{job}");
+    let after = served.board(2);
+    assert_eq!(
+        (after["program_id"].as_u64(), after["flash_date"].as_str()),
+        (Some(0x4B3F), Some("2009-06-01"))
+    );
+    // Progress as events, up to the end of both cycles.
+    let (_, all) = served.api(&format!("GET /api/events?job={number}"), None, None);
+    let all: Vec<&Value> = all["events"].as_array().expect("events").iter().map(|e| &e["event"]).collect();
+    let progress: Vec<&&Value> = all.iter().filter(|event| event["kind"] == "progress").collect();
+    let bytes: Vec<u64> = progress.iter().filter_map(|event| event["bytes"].as_u64()).collect();
+    assert!(bytes.len() > 4 && bytes.is_sorted() && bytes.last() == Some(&2176), "{bytes:?}");
+    assert_eq!(all.last().map(|event| &event["outcome"]), Some(&json!("finished")));
+    // The same again is there already.
+    let job = served.job("POST /api/updates", &key, Some(body));
+    assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
+}
+
+/// D-46: an image for another board than the one that has the number is not sent.
+#[test]
+fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
+    let (served, key) = Served::numbered(1);
+    let wrong = request(json!([{ "board": 1, "flash_number": 0x7777 }]), 1000);
+    let job = served.job("POST /api/updates", &key, Some(wrong));
+    assert_eq!(
+        (job["stage"].as_str(), job["update"]["boards"][0]["outcome"].as_str()),
+        (Some("failed"), Some("not-started"))
+    );
+    assert_ne!(served.board(1)["program_id"], 0x4B3F);
+    for body in [
+        json!({ "boards": [], "image": golden(10), "format": "bin" }),
+        json!({ "boards": [{ "board": 1 }], "image": "no base64!" }),
+        json!({ "boards": [{ "board": 1 }], "image": STANDARD.encode(":00000001XX"), "format": "hex" }),
+        json!({ "boards": [{ "board": 1 }], "image": golden(10), "format": "bin", "date": "2023-02-29" }),
+        json!({ "boards": [{ "board": 1 }], "image": golden(2 << 20), "format": "bin" }),
+        json!({ "boards": [{ "board": 1 }], "image": golden(10), "format": "exe" }),
+        json!({ "boards": [{ "board": 1 }] }),
+    ] {
+        let (status, error) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
+        assert!(
+            status == 422 && !error["message"].as_str().unwrap_or_default().is_empty(),
+            "{status} {error}"
+        );
+    }
+    assert_eq!(
+        served.api("GET /api/jobs", None, None).1.as_array().map(Vec::len),
+        Some(2),
+        "nothing more was begun"
+    );
+}
+
+/// A Stop is on the bus in the middle of an update, which it does not end; who commands can cancel it.
+#[test]
+fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
+    let (served, key) = Served::numbered(1);
+    let progress = |event: &Value| event["kind"] == "progress";
+    let mut peer = served.chain.peer();
+    let last = served.last_event();
+    let number = served.begin("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
+    served.event(last, "progress", progress);
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    common::frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
+    let running = served.api(&format!("GET /api/jobs/{number}"), None, None).1;
+    let job = served.over(number);
+    assert_eq!(running["stage"], "running", "the Stop did not wait for it: {running}");
+    assert_eq!(
+        (job["stage"].as_str(), job["update"]["boards"][0]["verified"].as_bool()),
+        (Some("finished"), Some(true)),
+        "{job}"
+    );
+    served.event(last, "stopped", |event| event["kind"] == "stopped");
+    // Another image, which is cancelled.
+    let last = served.last_event();
+    let number = served.begin("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 60_000)));
+    served.event(last, "progress", progress);
+    assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 204);
+    let job = served.over(number);
+    assert_eq!(
+        (job["stage"].as_str(), job["update"]["boards"][0]["outcome"].as_str()),
+        (Some("cancelled"), Some("cancelled")),
+        "{job}"
+    );
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
+    // Nothing was erased: it has what it had.
+    let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
+    assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
+}
+
+#[test]
+fn a_doctor_finds_nothing_wrong_and_then_a_board_that_is_silent() {
+    let (served, key) = Served::numbered(2);
+    let worst = |job: &Value| job["findings"][0]["severity"].as_str().map(str::to_owned);
+    let job = served.job("POST /api/doctor", &key, None);
+    assert_eq!((job["stage"].as_str(), worst(&job).as_deref()), (Some("finished"), Some("good")), "{job}");
+    served.chain.fault("foreign-frames");
+    let job = served.job("POST /api/doctor", &key, None);
+    assert!(worst(&job).is_some_and(|worst| worst != "good"), "{job}");
+}

@@ -13,6 +13,7 @@ use mcap::{Compression, McapError, WriteOptions};
 use super::cdr::{Decoder, Encoder};
 use super::frames::Frames;
 use super::gather::{Gatherer, Late};
+use super::messages::{self, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC, STATES_TOPIC};
 use super::{Ending, Found, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
 use crate::trajectory::{Loaded, Trajectory};
@@ -21,10 +22,6 @@ use crate::trajectory::{Loaded, Trajectory};
 const METADATA: &str = "openjtc";
 /// Name of the metadata record with the [`Ending`], behind all messages.
 const END: &str = "openjtc_end";
-const STATES_TOPIC: &str = "/joint_states";
-const COMMANDS_TOPIC: &str = "/joint_commands";
-const CONTROL_TOPIC: &str = "/jtc/control";
-const STATE_TOPIC: &str = "/jtc/state";
 /// A log of a flight recorder as it was fetched (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
 /// The trajectory that is run, in the header-less form of 19 columns of integers.
@@ -155,7 +152,6 @@ pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingErro
 
 impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
-        let j = &s.joints;
         let stamp = self.start_ns + (s.time_s * 1e9).round().max(0.0) as u64;
         let header = |channel_id| MessageHeader {
             channel_id,
@@ -163,50 +159,13 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
             log_time: stamp,
             publish_time: stamp,
         };
-        let joint_message = |cdr: &mut Encoder, position, velocity, effort| {
-            cdr.start().header(stamp, "").u32(6);
-            for name in &self.names {
-                cdr.string(name);
-            }
-            cdr.f64s(position).f64s(velocity).f64s(effort);
-        };
-
-        joint_message(&mut self.cdr, j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque));
+        messages::joints(&mut self.cdr, stamp, &self.names, messages::measured(&s.joints));
         self.out.write_to_known_channel(&header(self.states), self.cdr.bytes())?;
-
-        // The effort commanded is the model's share: what remains of the torque is feedback and friction.
-        let model = j.map(|j| j.torque_model);
-        joint_message(&mut self.cdr, j.map(|j| j.set_position), j.map(|j| j.set_velocity), model);
+        messages::joints(&mut self.cdr, stamp, &self.names, messages::commanded(&s.joints));
         self.out.write_to_known_channel(&header(self.commands), self.cdr.bytes())?;
-
-        self.cdr
-            .start()
-            .header(stamp, "")
-            .array(j.map(|j| j.position_error()))
-            .array(j.map(|j| j.set_acceleration))
-            .array(model)
-            .array(j.map(|j| j.torque_p))
-            .array(j.map(|j| j.torque_i))
-            .array(j.map(|j| j.torque_d))
-            .array(j.map(|j| j.torque_friction))
-            .array(j.map(|j| j.torque))
-            .array(j.map(|j| j.temperature));
+        messages::control(&mut self.cdr, stamp, &s.joints);
         self.out.write_to_known_channel(&header(self.control), self.cdr.bytes())?;
-
-        self.cdr
-            .start()
-            .header(stamp, "")
-            .u8(s.state.byte())
-            .u8(s.trajectory.byte())
-            .u32(s.point)
-            .u16(s.errors)
-            .u32(s.can_current);
-        for joint in j {
-            self.cdr.u8(joint.state.code());
-        }
-        for joint in j {
-            self.cdr.u16(joint.internal);
-        }
+        messages::state(&mut self.cdr, stamp, s);
         self.out.write_to_known_channel(&header(self.state), self.cdr.bytes())?;
 
         if let Some((frames, channel)) = &mut self.frames

@@ -24,6 +24,8 @@ mod live;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
+mod messages;
+#[cfg(feature = "mcap")]
 mod metadata;
 #[cfg(feature = "mcap")]
 mod schema;
@@ -38,6 +40,8 @@ pub use broken_off::{BrokenOff, NothingLeft, Resumption};
 pub use error::RecordingError;
 pub use info::{DeviceIdentity, Ending, JointInfo, RecordingInfo};
 pub use live::{FLUSH, LiveRecorder, SampleSink};
+#[cfg(feature = "mcap")]
+pub use messages::{MessageWriter, Topic};
 
 use crate::sample::Sample;
 

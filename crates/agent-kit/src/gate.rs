@@ -34,6 +34,11 @@ impl Gate {
     pub fn note(&self, what: &str, facts: serde_json::Value) {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
+
+    /// Lines that the log of commands lost.
+    pub fn lost_lines(&self) -> u64 {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner).lost_in_all()
+    }
 }
 
 /// Who asks.

@@ -21,6 +21,7 @@ pub struct CommandLog {
     waiting: Arc<AtomicUsize>,
     /// Lines that found no place since the last that did.
     lost: u64,
+    lost_in_all: u64,
 }
 
 /// What is written whatever else is: what moved something, who stopped it. The rest leaves half of the room free.
@@ -35,14 +36,14 @@ impl CommandLog {
     /// It cannot be opened.
     pub fn open(path: Option<&Path>, failed: impl FnMut(&io::Error) + Send + 'static) -> io::Result<Self> {
         let Some(path) = path else {
-            return Ok(Self { lines: None, writer: None, waiting: Arc::default(), lost: 0 });
+            return Ok(Self { lines: None, writer: None, waiting: Arc::default(), lost: 0, lost_in_all: 0 });
         };
         let file = OpenOptions::new().append(true).create(true).open(path)?;
         let (lines, incoming) = sync_channel(WAITING_MAX);
         let waiting: Arc<AtomicUsize> = Arc::default();
         let done = waiting.clone();
         let writer = std::thread::spawn(move || write(file, &incoming, &done, failed));
-        Ok(Self { lines: Some(lines), writer: Some(writer), waiting, lost: 0 })
+        Ok(Self { lines: Some(lines), writer: Some(writer), waiting, lost: 0, lost_in_all: 0 })
     }
 
     /// Writes a line: what happened, and what is to be known of it. Never waits.
@@ -63,7 +64,15 @@ impl CommandLog {
         } else {
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             self.lost += 1;
+            self.lost_in_all += 1;
         }
+    }
+}
+
+impl CommandLog {
+    /// Lines that found no place.
+    pub fn lost_in_all(&self) -> u64 {
+        self.lost_in_all
     }
 }
 

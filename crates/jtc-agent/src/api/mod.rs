@@ -2,7 +2,9 @@
 mod commands;
 mod error;
 mod events;
+mod identity;
 mod lease;
+mod metrics;
 mod objects;
 mod questions;
 mod runs;
@@ -37,6 +39,8 @@ pub use error::ErrorObject;
 pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
 pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
 
+use identity::Identity;
+
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
 /// Longest of a trajectory: 12,000 points as text, with room to spare. So many of them are read at once.
@@ -67,6 +71,7 @@ pub struct Agent {
     /// Checks of trajectories at once, and requests that wait for an event.
     checks: Arc<Semaphore>,
     waiting: Arc<Semaphore>,
+    identity: Arc<tokio::sync::Mutex<Identity>>,
 }
 
 impl Agent {
@@ -84,6 +89,7 @@ impl Agent {
         simulated: bool,
     ) -> Result<Self, TokenError> {
         let room = |most| Arc::new(Semaphore::new(most));
+        let identity = Arc::new(tokio::sync::Mutex::new(Identity::of(jobs.arm())));
         Ok(Self {
             line,
             jobs,
@@ -96,6 +102,7 @@ impl Agent {
             bodies: room(TRAJECTORIES_AT_ONCE),
             checks: room(CHECKS_AT_ONCE),
             waiting: room(WAITING_MAX),
+            identity,
         })
     }
 
@@ -116,6 +123,11 @@ impl Agent {
 
     fn note(&self, what: &str, facts: serde_json::Value) {
         self.gate.note(what, facts);
+    }
+
+    /// Lines that the log of commands lost.
+    fn lost_lines(&self) -> u64 {
+        self.gate.lost_lines()
     }
 
     /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
@@ -213,6 +225,7 @@ fn described() -> OpenApiRouter<Agent> {
         .layer(DefaultBodyLimit::max(TRAJECTORY_MAX));
     let others = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(status))
+        .routes(routes!(metrics::metrics))
         .routes(routes!(stop))
         .routes(routes!(pause))
         .routes(routes!(events::events))

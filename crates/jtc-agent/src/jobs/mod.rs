@@ -70,6 +70,18 @@ struct Kept {
     commanders: BTreeMap<String, (Arc<Commander>, Duration)>,
     jobs: VecDeque<Job>,
     last: u64,
+    ended: Ended,
+}
+
+/// How many jobs have ended, and how.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ended {
+    /// They came to their end.
+    pub finished: u64,
+    /// Somebody stopped them.
+    pub stopped: u64,
+    /// They failed.
+    pub failed: u64,
 }
 
 /// The jobs of an agent, and who asks for them.
@@ -182,6 +194,12 @@ impl Jobs {
         self.lock().jobs.iter().cloned().collect()
     }
 
+    /// How many go on, and how the others have ended.
+    pub fn counts(&self) -> (usize, Ended) {
+        let kept = self.lock();
+        (kept.jobs.iter().filter(|job| job.stage == Stage::Running).count(), kept.ended)
+    }
+
     fn remember(&self, job: Job) {
         let mut kept = self.lock();
         if kept.jobs.len() == KEPT
@@ -200,10 +218,18 @@ impl Jobs {
             Some(_) => Stage::Failed,
         };
         let outcome = stage.name().to_owned();
-        if let Some(job) = self.lock().jobs.iter_mut().find(|job| job.number == number) {
+        let mut kept = self.lock();
+        match stage {
+            Stage::Running => {}
+            Stage::Finished => kept.ended.finished += 1,
+            Stage::Stopped => kept.ended.stopped += 1,
+            Stage::Failed => kept.ended.failed += 1,
+        }
+        if let Some(job) = kept.jobs.iter_mut().find(|job| job.number == number) {
             (job.stage, job.done) = (stage, done);
             job.error.clone_from(&error);
         }
+        drop(kept);
         self.journal.write(Happening::Ended { job: number, outcome, error });
     }
 

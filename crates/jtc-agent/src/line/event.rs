@@ -3,6 +3,39 @@ use jtc_wire::{FrameType, Response};
 
 use super::{Class, ClientId, Denied, Lease, Policy, PutOut};
 
+/// What has happened on a line since its owner began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Frames written that change something.
+    pub sent: u64,
+    /// Those that the device has accepted.
+    pub accepted: u64,
+    /// Those that it has refused.
+    pub refused: u64,
+    /// Frames that were not passed on.
+    pub denied: u64,
+    /// Clients that were put out.
+    pub put_out: u64,
+    /// Stops and Pauses that the device has not taken after many tries.
+    pub not_taken: u64,
+}
+
+impl Counts {
+    /// One more.
+    pub(super) fn count(&mut self, event: &LineEvent) {
+        let count = match event {
+            LineEvent::Sent { .. } => &mut self.sent,
+            LineEvent::Answered { response, .. } if response.accepted() => &mut self.accepted,
+            LineEvent::Answered { .. } => &mut self.refused,
+            LineEvent::Denied { .. } => &mut self.denied,
+            LineEvent::PutOut { .. } => &mut self.put_out,
+            LineEvent::NotTaken => &mut self.not_taken,
+            LineEvent::Lease(_) | LineEvent::PolicyApplied { .. } => return,
+        };
+        *count += 1;
+    }
+}
+
 /// Something that happened on the line and that somebody may want to know.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineEvent {

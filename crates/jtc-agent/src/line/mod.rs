@@ -14,12 +14,12 @@ mod outbox;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, FrameType, Status, StatusReceiver, fixed};
+use jtc_wire::{ExecCommand, FrameType, Status, StatusCounters, StatusReceiver, fixed};
 
 pub use agent_kit::access::Role;
 pub use class::Class;
 pub use client::{ClientId, Delivery, Introduction, Policy, PutOut};
-pub use event::LineEvent;
+pub use event::{Counts, LineEvent};
 pub use lease::{Denied, Lease};
 
 use class::HostFrame;
@@ -73,6 +73,7 @@ pub struct SharedLine {
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
     events: VecDeque<LineEvent>,
+    counts: Counts,
 }
 
 /// The owner of the line itself, which acts for clients that have gone and for those that have no end of the line of their own.
@@ -98,6 +99,7 @@ impl SharedLine {
             receiver: StatusReceiver::new(),
             status: None,
             events: VecDeque::new(),
+            counts: Counts::default(),
         }
     }
 
@@ -341,7 +343,19 @@ impl SharedLine {
 
     /// What has happened since the last call.
     pub fn take_events(&mut self) -> Vec<LineEvent> {
-        self.events.drain(..).collect()
+        let events: Vec<LineEvent> = self.events.drain(..).collect();
+        events.iter().for_each(|event| self.counts.count(event));
+        events
+    }
+
+    /// How often each has happened, as far as [`take_events`](Self::take_events) has returned it.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// What came from the device.
+    pub fn received(&self) -> StatusCounters {
+        self.receiver.counters()
     }
 
     /// About now: when the last status came.

@@ -191,6 +191,9 @@ pub enum Refusal {
     /// It needs a token.
     #[error("a token is needed: `Authorization: Bearer …`")]
     NoToken,
+    /// An address stands in histories and logs: the operator's token is not to be there.
+    #[error("the operator's token may not stand in an address")]
+    InAddress,
     /// Too many wrong tokens came from there.
     #[error("too many wrong tokens came from this address")]
     TooManyWrong,
@@ -207,6 +210,46 @@ pub struct Request<'a> {
     pub origin: Option<&'a str>,
     /// The token, if it has one.
     pub token: Option<&'a str>,
+    /// The token in its address, of clients that cannot send it otherwise: the viewer's.
+    pub address_token: Option<&'a str>,
+    /// It can only look: what it asks for may be shown to pages of origins that are allowed.
+    pub looks: bool,
+}
+
+/// What a request that is let in may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// By its token.
+    pub role: Role,
+    /// It was made by a page of an origin that is allowed: it may look, and nothing else.
+    pub looks_only: bool,
+}
+
+/// Paths that pages of allowed origins may ask for. With the method GET none of them changes anything.
+const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
+
+/// A request with this method for this path can only look.
+pub fn looks(method: &str, path: &str) -> bool {
+    ["GET", "HEAD"].contains(&method) && LOOKS.contains(&path)
+}
+
+/// An origin as browsers send it: scheme, host and port, or `file://`.
+///
+/// # Errors
+///
+/// It is none, or stands for more than one; the error is for people.
+pub fn origin(text: &str) -> Result<String, String> {
+    let text = text.trim().to_lowercase();
+    if text == "file://" {
+        return Ok(text);
+    }
+    let host = text.split_once("://").map(|(scheme, host)| (scheme, host.strip_suffix('/').unwrap_or(host)));
+    match host {
+        Some((scheme, host)) if !scheme.is_empty() && !host.is_empty() && !host.contains(['/', '*', ' ']) => {
+            Ok(format!("{scheme}://{host}"))
+        }
+        _ => Err("an origin is a scheme and a host, as https://app.foxglove.dev; or file://".to_owned()),
+    }
 }
 
 /// Who is let in.
@@ -214,6 +257,8 @@ pub struct Access {
     tokens: Tokens,
     /// Names and addresses, with the port, that this agent is asked for by.
     hosts: Vec<String>,
+    /// Origins whose pages may look.
+    origins: Vec<String>,
     /// When a wrong token came, and from whom.
     wrong: Mutex<Vec<(IpAddr, Instant)>>,
 }
@@ -230,7 +275,12 @@ impl Access {
         if listen.ip().is_loopback() || listen.ip().is_unspecified() {
             hosts.extend(["localhost", "127.0.0.1", "[::1]"].map(|name| format!("{name}:{port}")));
         }
-        Self { tokens, hosts, wrong: Mutex::new(Vec::new()) }
+        Self { tokens, hosts, origins: Vec::new(), wrong: Mutex::new(Vec::new()) }
+    }
+
+    /// Pages of these origins, as [`origin`] has them, may look.
+    pub fn allowing(self, origins: &[String]) -> Self {
+        Self { origins: origins.to_vec(), ..self }
     }
 
     /// What this request may do.
@@ -238,24 +288,40 @@ impl Access {
     /// # Errors
     ///
     /// [`Refusal`].
-    pub fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
+    pub fn enter(&self, request: &Request<'_>) -> Result<Entry, Refusal> {
+        let looks_only = self.is_foreign(request)?;
+        let role = match (request.token, request.address_token) {
+            (Some(token), _) => self.bearer(token, request.peer)?,
+            (None, Some(token)) => match self.bearer(token, request.peer)? {
+                Role::Operator => return Err(Refusal::InAddress),
+                Role::Viewer => Role::Viewer,
+            },
+            (None, None) if request.peer.to_canonical().is_loopback() => Role::Viewer,
+            (None, None) => return Err(Refusal::NoToken),
+        };
+        Ok(Entry { role: if looks_only { Role::Viewer } else { role }, looks_only })
+    }
+
+    /// Whether a page of an allowed origin made it, by what it says of itself, without its token.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::Host`], [`Refusal::Origin`].
+    pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
         let host = request.host.unwrap_or_default().to_lowercase();
         if !self.hosts.contains(&host) {
             return Err(Refusal::Host(if host.is_empty() { "named".into() } else { host }));
         }
-        if let Some(origin) = request.origin {
-            let site = origin.to_lowercase();
-            let site = site.strip_prefix("http://").or_else(|| site.strip_prefix("https://"));
-            // Its own page, not one of another agent on this computer.
-            if site != Some(host.as_str()) {
-                return Err(Refusal::Origin(origin.to_owned()));
-            }
+        let Some(origin) = request.origin else { return Ok(false) };
+        let site = origin.to_lowercase();
+        // Its own page, not one of another agent on this computer.
+        if site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) == Some(host.as_str()) {
+            return Ok(false);
         }
-        match request.token {
-            Some(token) => self.bearer(token, request.peer),
-            None if request.peer.to_canonical().is_loopback() => Ok(Role::Viewer),
-            None => Err(Refusal::NoToken),
+        if request.looks && self.origins.contains(&site) {
+            return Ok(true);
         }
+        Err(Refusal::Origin(origin.to_owned()))
     }
 
     fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {
@@ -295,7 +361,69 @@ mod tests {
         origin: Option<&str>,
         token: Option<&str>,
     ) -> Result<Role, Refusal> {
-        access.role(&Request { peer: peer.parse().expect("an address"), host, origin, token })
+        let peer = peer.parse().expect("an address");
+        let request = Request { peer, host, origin, token, address_token: None, looks: false };
+        access.enter(&request).map(|entry| entry.role)
+    }
+
+    #[test]
+    fn pages_of_allowed_origins_look_and_do_nothing_else_with_any_token() {
+        let origins = ["https://APP.example/", "file://"].map(|text| origin(text).expect("an origin"));
+        let (access, peer) = (access().allowing(&origins), "127.0.0.1".parse().expect("an address"));
+        let (operator, viewer) = ("o".repeat(43), "v".repeat(43));
+        for from in ["https://app.example", "file://"] {
+            for token in [None, Some(viewer.as_str()), Some(operator.as_str())] {
+                let request = Request {
+                    peer,
+                    host: Some(HERE),
+                    origin: Some(from),
+                    token,
+                    address_token: None,
+                    looks: true,
+                };
+                assert_eq!(access.enter(&request), Ok(Entry { role: Role::Viewer, looks_only: true }));
+                let acts = Request { looks: false, ..request };
+                assert_eq!(access.enter(&acts), Err(Refusal::Origin(from.into())));
+                let rebound = Request { host: Some("evil.example"), ..request };
+                assert!(matches!(access.enter(&rebound), Err(Refusal::Host(_))));
+            }
+        }
+        for from in ["http://app.example", "https://app.example.evil.example", "null", "file:///", "*"] {
+            let request = Request {
+                peer,
+                host: Some(HERE),
+                origin: Some(from),
+                token: None,
+                address_token: None,
+                looks: true,
+            };
+            assert_eq!(access.enter(&request), Err(Refusal::Origin(from.into())), "{from}");
+        }
+        for text in ["*", "null", "", "https://", "https://*.example", "app.example", "https://a.example/b"] {
+            assert!(origin(text).is_err(), "{text}");
+        }
+        for (method, path) in
+            [("POST", "/"), ("GET", "/api/line"), ("GET", "/api/info"), ("POST", "/api/stop")]
+        {
+            assert!(!looks(method, path), "{method} {path}");
+        }
+    }
+
+    #[test]
+    fn an_address_may_have_the_viewers_token_and_never_the_operators() {
+        let access = access();
+        let from = |peer: &str, token: Option<&str>, address_token: Option<&str>| {
+            let peer = peer.parse().expect("an address");
+            access.enter(&Request { peer, host: Some(HERE), origin: None, token, address_token, looks: true })
+        };
+        let (operator, viewer) = ("o".repeat(43), "v".repeat(43));
+        let role = |role| Ok(Entry { role, looks_only: false });
+        for peer in ["127.0.0.1", "10.0.0.9"] {
+            assert_eq!(from(peer, None, Some(&viewer)), role(Role::Viewer));
+            assert_eq!(from(peer, None, Some(&operator)), Err(Refusal::InAddress));
+            assert_eq!(from(peer, None, Some("")), Err(Refusal::WrongToken));
+            assert_eq!(from(peer, Some(&operator), Some("x")), role(Role::Operator));
+        }
     }
 
     #[test]

@@ -4,13 +4,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{ConnectInfo, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::extract::{ConnectInfo, Query, Request, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-use crate::access::{self, Access, Refusal, Role};
+use crate::access::{self, Access, Entry, Refusal, Role, looks};
 use crate::api::Problem;
 use crate::log::CommandLog;
 
@@ -46,6 +46,8 @@ impl Gate {
 pub struct Caller {
     /// What it may do.
     pub role: Role,
+    /// A page of an origin that is allowed to look, and to do nothing else.
+    pub looks_only: bool,
     /// Where it is.
     pub peer: SocketAddr,
 }
@@ -88,17 +90,29 @@ pub async fn let_in(
     next: Next,
 ) -> Response {
     let headers = request.headers();
+    let preflight = request.method() == Method::OPTIONS;
+    let method = if preflight { headers.get(header::ACCESS_CONTROL_REQUEST_METHOD) } else { None };
+    let method = method.and_then(|method| method.to_str().ok()).unwrap_or(request.method().as_str());
+    let address_token = address_token(headers, request.uri());
     let asked = access::Request {
         peer: peer.ip(),
         host: text_of(headers, header::HOST),
         origin: text_of(headers, header::ORIGIN),
         token: text_of(headers, header::AUTHORIZATION)
             .map(|value| value.strip_prefix("Bearer ").unwrap_or("")),
+        address_token: address_token.as_deref(),
+        looks: looks(method, request.uri().path()),
     };
-    match gate.access.role(&asked) {
-        Ok(role) => {
-            request.extensions_mut().insert(Caller { role, peer });
-            let mut response = next.run(request).await;
+    // A browser asks without a token whether its page may ask with one.
+    let origin = headers.get(header::ORIGIN).cloned();
+    if preflight && gate.access.is_foreign(&asked) == Ok(true) {
+        return may_read(StatusCode::NO_CONTENT.into_response(), origin);
+    }
+    match gate.access.enter(&asked) {
+        Ok(Entry { role, looks_only }) => {
+            request.extensions_mut().insert(Caller { role, looks_only, peer });
+            let response = next.run(request).await;
+            let mut response = if looks_only { may_read(response, origin) } else { response };
             let headers = response.headers_mut();
             headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
             headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
@@ -116,6 +130,32 @@ pub async fn let_in(
     }
 }
 
+/// A page of this origin may read it.
+fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
+    let headers = response.headers_mut();
+    if let Some(origin) = origin {
+        headers.insert(header::ACCESS_CONTROL_ALLOW_ORIGIN, origin);
+    }
+    headers.insert(header::ACCESS_CONTROL_ALLOW_METHODS, HeaderValue::from_static("GET"));
+    headers.insert(header::ACCESS_CONTROL_ALLOW_HEADERS, HeaderValue::from_static("Authorization"));
+    headers.insert(header::VARY, HeaderValue::from_static("Origin"));
+    response
+}
+
+/// A token behind the question mark.
+#[derive(serde::Deserialize)]
+struct InAddress {
+    token: Option<String>,
+}
+
+/// The token in the address of a socket, for clients that cannot send headers.
+fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
+    let socket = headers.contains_key(header::SEC_WEBSOCKET_KEY);
+    let looks = ["/", "/api/foxglove", "/api/stream"].contains(&uri.path());
+    let asked = Query::<InAddress>::try_from_uri(uri).ok().filter(|_| socket && looks);
+    asked.and_then(|Query(asked)| asked.token)
+}
+
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     // One that is no text is there, and is nobody's.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
@@ -126,6 +166,9 @@ impl IntoResponse for Refusal {
         let (status, next) = match &self {
             Self::Host(_) => (StatusCode::FORBIDDEN, "use the address that the agent printed"),
             Self::Origin(_) => (StatusCode::FORBIDDEN, "open the agent's own page"),
+            Self::InAddress => {
+                (StatusCode::FORBIDDEN, "use the viewer's token there, or send this one in Authorization")
+            }
             Self::WrongToken => (StatusCode::UNAUTHORIZED, "take the token from the agent's token file"),
             Self::NoToken => (StatusCode::UNAUTHORIZED, "take a token from the agent's token file"),
             Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),

@@ -14,6 +14,73 @@ fn requests_of_other_sites_are_refused_whatever_they_ask() {
 }
 
 #[test]
+fn pages_of_an_allowed_origin_look_and_do_nothing_else_whatever_token_they_have() {
+    let served = Served::start_with(921_600, None, &["https://app.example".into(), "file://".into()]);
+    let host = format!("Host: {}", served.address);
+    let bearer = format!("Authorization: Bearer {}", served.tokens.operator);
+    for origin in ["Origin: https://app.example", "Origin: file://"] {
+        for lines in [&[origin, &host, &bearer][..], &[origin, &host]] {
+            let (status, body) = served.ask("GET /api/status", lines);
+            assert!(status == 200 && body.contains("\"role\":\"viewer\""), "{status} {body}");
+            assert_eq!(served.ask("GET /metrics", lines).0, 200);
+            for request in [
+                "POST /api/stop",
+                "POST /api/pause",
+                "POST /api/lease",
+                "PUT /api/speed",
+                "DELETE /api/lease",
+                "POST /api/status",
+                "POST /",
+                "GET /api/line",
+                "GET /api/jobs",
+                "GET /api/events",
+                "GET /api/info",
+                "GET /openapi.json",
+                "GET /api/foxglove/x",
+                "OPTIONS /api/stop",
+            ] {
+                assert_eq!(served.ask(request, lines).0, 403, "{request} {origin}");
+            }
+        }
+        let wrong = "Authorization: Bearer 0123456789abcdefghij";
+        assert_eq!(served.ask("GET /api/status", &[origin, &host, wrong]).0, 401);
+        let rebound = format!("Host: evil.example:{}", served.address.port());
+        assert_eq!(served.ask("GET /api/status", &[origin, &rebound, &bearer]).0, 403);
+    }
+    for origin in ["Origin: https://evil.example", "Origin: null", "Origin: https://app.example.evil.example"]
+    {
+        for request in
+            ["GET /api/status", "GET /metrics", "GET /api/foxglove", "GET /", "OPTIONS /api/status"]
+        {
+            assert_eq!(served.ask(request, &[origin, &host, &bearer]).0, 403, "{request} {origin}");
+        }
+    }
+    assert_eq!(served.line.last_halt(), 0, "nothing was stopped");
+}
+
+#[test]
+fn a_token_in_an_address_is_the_viewers_for_sockets_that_look_and_is_written_nowhere() {
+    let mut served = Served::start(921_600);
+    let host = format!("Host: {}", served.address);
+    let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    let upgrade = [&host, "Upgrade: websocket", "Sec-WebSocket-Version: 13", key];
+    let (operator, viewer) = (served.tokens.operator.clone(), served.tokens.viewer.clone());
+    for path in ["/", "/api/foxglove", "/api/stream"] {
+        assert_eq!(served.ask(&format!("GET {path}?token={operator}"), &upgrade).0, 403, "{path}");
+        let (status, _) = served.ask(&format!("GET {path}?token=0123456789abcdefghij"), &upgrade);
+        assert_eq!(status, 401, "{path}");
+        // It is let in, and then misses what makes a socket of it.
+        assert!(
+            ![401, 403].contains(&served.ask(&format!("GET {path}?token={viewer}"), &upgrade).0),
+            "{path}"
+        );
+    }
+    served.end();
+    let log = std::fs::read_to_string(&served.log).expect("it was written");
+    assert!(log.contains("refused") && !log.contains(&operator) && !log.contains(&viewer), "{log}");
+}
+
+#[test]
 fn a_socket_of_another_site_gets_no_end_of_the_line() {
     let served = Served::start(921_600);
     http::a_socket_of_another_site_is_refused(&served, "/api/line");

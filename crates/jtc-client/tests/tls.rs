@@ -27,7 +27,8 @@ fn certificate(dir: &tempfile::TempDir, name: &str, mode: u32) -> (PathBuf, Path
 fn a_session_works_over_tls_where_the_certificate_is_trusted() {
     let dir = tempfile::tempdir().expect("a directory");
     let (file, key) = certificate(&dir, "agent", 0o600);
-    let served = Served::start_with(921_600, Some(tls::load(&file, &key).expect("they belong together")));
+    let served =
+        Served::start_with(921_600, Some(tls::load(&file, &key).expect("they belong together")), &[]);
     let url = served.url().replace("http://", "https://");
     let options = |certificates: Option<PathBuf>| Options {
         name: "anna".into(),

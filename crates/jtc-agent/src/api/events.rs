@@ -104,6 +104,9 @@ pub(super) async fn events(
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StreamRequest {
+    /// Was looked at when it was let in.
+    #[serde(default, rename = "token")]
+    _token: Option<serde::de::IgnoredAny>,
     /// Those behind this number; missing: those from now on.
     after: Option<u64>,
 }

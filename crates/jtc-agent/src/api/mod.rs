@@ -2,6 +2,7 @@
 mod commands;
 mod error;
 mod events;
+mod foxglove;
 mod identity;
 mod lease;
 mod metrics;
@@ -18,9 +19,12 @@ use agent_kit::access::{Access, TokenError, random};
 use agent_kit::api::Refusals;
 use agent_kit::gate::{Caller, Gate, let_in};
 use agent_kit::log::CommandLog;
-use axum::extract::{DefaultBodyLimit, State};
-use axum::http::{HeaderMap, StatusCode, header};
-use axum::middleware::from_fn_with_state;
+use axum::body::Body;
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::handler::Handler as _;
+use axum::http::{HeaderMap, Method, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::Response;
 use axum::{Extension, Json, Router};
 use jtc_host::ErrorKind;
 use jtc_wire::ExecCommand;
@@ -115,8 +119,10 @@ impl Agent {
         router
             .route("/api/line", axum::routing::get(socket::line))
             .route("/api/stream", axum::routing::get(events::stream))
+            .route("/api/foxglove", axum::routing::get(foxglove::foxglove))
             .route("/openapi.json", axum::routing::get(openapi))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+            .layer(from_fn_with_state(self.clone(), at_root))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
             .with_state(self)
     }
@@ -297,4 +303,13 @@ async fn pause(
     headers: HeaderMap,
 ) -> Result<Json<SentObject>, ErrorObject> {
     agent.halt(&caller, &headers, ExecCommand::Pause)
+}
+
+/// Programs that are given nothing but the agent's address ask there for what they show.
+async fn at_root(State(agent): State<Agent>, request: Request<Body>, next: Next) -> Response {
+    if request.uri().path() == "/" && request.method() == Method::GET && foxglove::is_asked(request.headers())
+    {
+        return foxglove::foxglove.call(request, agent).await;
+    }
+    next.run(request).await
 }

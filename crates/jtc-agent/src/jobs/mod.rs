@@ -1,6 +1,7 @@
 //! What an agent does for clients that have no connection of their own: it keeps their end of the line, runs what they ask for, and
 //! writes down what happens, so that they can come back and read it.
 mod commander;
+mod followed;
 mod happening;
 mod run;
 mod store;
@@ -14,6 +15,7 @@ use std::time::{Duration, Instant};
 use jtc_host::{Arm, Session};
 
 pub use commander::{Commander, Turn, Unable, Wish};
+pub use followed::Followed;
 pub use happening::{EventObject, Happening, Journal};
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
@@ -92,6 +94,8 @@ pub struct Jobs {
     /// Trajectories by number.
     pub store: Store,
     arm: Arm,
+    /// What the arm follows.
+    pub followed: Followed,
     /// Asks questions for all who may look.
     asker: Arc<Commander>,
     kept: Mutex<Kept>,
@@ -103,8 +107,15 @@ impl Jobs {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
         let asker = Commander::new(&line, introduction);
-        let jobs =
-            Arc::new(Self { line, journal: Journal::default(), store, arm, asker, kept: Mutex::default() });
+        let jobs = Arc::new(Self {
+            line,
+            journal: Journal::default(),
+            store,
+            arm,
+            followed: Followed::default(),
+            asker,
+            kept: Mutex::default(),
+        });
         let watched = Arc::downgrade(&jobs);
         std::thread::spawn(move || watch(&watched));
         jobs
@@ -175,9 +186,9 @@ impl Jobs {
         let work = move |session: &mut Session<ClientPort>, wishes: &Receiver<Wish>| {
             let Some(commander) = whose.upgrade() else { return (Done::default(), None) };
             let Job { number, what, client, .. } = begun;
-            let Self { line, journal, arm, .. } = &*own;
+            let Self { line, journal, arm, followed, .. } = &*own;
             journal.write(Happening::Begun { job: number, what, client });
-            act(&Task { wishes, job: number, journal, line, commander: &commander, arm }, session)
+            act(&Task { wishes, job: number, journal, line, commander: &commander, arm, followed }, session)
         };
         let accepted =
             commander.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));

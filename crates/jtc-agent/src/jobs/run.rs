@@ -196,6 +196,7 @@ impl Run<'_> {
         journal.write(Happening::Executing { job, phase: phase(), duration_s });
         let digest = Rc::new(RefCell::new(Digest::new()));
         let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
+        let following = task.followed.begin(checked.trajectory(), site.options.device.delay_ticks);
         task.commander.set_moving(true);
         let outcome = self.session.run_unkept(
             checked,
@@ -220,6 +221,7 @@ impl Run<'_> {
             },
         );
         task.commander.set_moving(false);
+        drop(following);
         // Those that came too late are known to have: their senders are dropped.
         while wishes.try_recv().is_ok() {}
         done.summary = Some(digest.borrow().summary(&RecordingInfo::of(&site.arm)));

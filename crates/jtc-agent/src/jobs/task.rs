@@ -3,7 +3,7 @@ use std::sync::mpsc::Receiver;
 
 use jtc_host::Arm;
 
-use super::{Commander, Happening, Journal, Wish};
+use super::{Commander, Followed, Happening, Journal, Wish};
 use crate::api::ErrorObject;
 use crate::owner::Line;
 
@@ -24,6 +24,8 @@ pub struct Task<'a> {
     pub commander: &'a Commander,
     /// The arm of controllers that cannot be asked for theirs.
     pub arm: &'a Arm,
+    /// What the arm follows.
+    pub followed: &'a Followed,
 }
 
 impl Task<'_> {

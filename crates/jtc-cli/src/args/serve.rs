@@ -25,6 +25,17 @@ pub struct ServeArgs {
     /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
     #[arg(long = "name", env = "JTC_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
+    /// Origins whose pages may look
+    #[arg(
+        long = "allow-origin",
+        help = "Origin whose pages may look, as https://app.foxglove.dev, or file:// for desktop applications; more than once, or with \
+                commas, for several",
+        env = "JTC_ALLOW_ORIGINS",
+        value_name = "ORIGIN",
+        value_delimiter = ',',
+        value_parser = jtc_agent::access::origin
+    )]
+    pub allow_origins: Vec<String>,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,

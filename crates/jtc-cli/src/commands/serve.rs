@@ -86,7 +86,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
-    let access = Access::new(tokens, listen, &args.names);
+    let access = Access::new(tokens, listen, &args.names).allowing(&args.allow_origins);
     let jobs = Jobs::new(owner.line(), store, arm);
     let agent = Agent::new(owner.line(), jobs.clone(), access, log.clone(), &name, args.sim)?;
     let plcs = match modbus {

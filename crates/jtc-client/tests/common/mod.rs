@@ -41,11 +41,11 @@ impl std::ops::Deref for Served {
 impl Served {
     /// Of a simulated arm on a line at this rate.
     pub fn start(baud: u32) -> Self {
-        Self::start_with(baud, None)
+        Self::start_with(baud, None, &[])
     }
 
-    /// The same, with TLS where it is given.
-    pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>) -> Self {
+    /// The same, with TLS where it is given, and pages of these origins may look.
+    pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
@@ -55,7 +55,7 @@ impl Served {
         let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
         let address = listener.local_addr().expect("it listens");
-        let access = Access::new(tokens.clone(), address, &[]);
+        let access = Access::new(tokens.clone(), address, &[]).allowing(origins);
         let line = owner.line();
         let jobs = Jobs::new(line.clone(), Store::in_memory(), arm);
         let agent = Agent::new(line.clone(), jobs, access, log, "simulated", true).expect("random numbers");

@@ -1,0 +1,144 @@
+//! What can be subscribed to, and what a client has subscribed to.
+use std::collections::BTreeMap;
+
+use jtc_host::recording::Topic;
+
+use super::protocol::{Channel, Service, Shape, Subscription};
+
+/// The channel with words: what the others have as numbers.
+pub const STATUS: u32 = Topic::ALL.len() as u32 + 1;
+const STATUS_SCHEMA: &str = r#"{
+  "type": "object",
+  "properties": {
+    "state": { "type": "string", "description": "State of the controller" },
+    "trajectory": { "type": "string", "description": "What becomes of the trajectory" },
+    "point": { "type": "integer", "description": "The 1 ms point that the controller is at" },
+    "errors": { "type": "array", "items": { "type": "string" }, "description": "Errors now" },
+    "errors_occurred": { "type": "array", "items": { "type": "string" }, "description": "Errors since they were cleared" },
+    "next": { "type": "string", "description": "What helps; empty where nothing is wrong" },
+    "age_ms": { "type": "integer", "description": "Time since the controller reported that" },
+    "commanded_by": { "type": "string", "description": "Who commands; empty: nobody" },
+    "simulated": { "type": "boolean", "description": "No arm moves" }
+  }
+}"#;
+
+/// Services by number.
+pub const STOP: u32 = 1;
+pub const PAUSE: u32 = 2;
+
+/// The topic of a channel; `None` for the one with words, and for those that there are not.
+pub fn topic(channel: u32) -> Option<Topic> {
+    Topic::ALL.get((channel as usize).checked_sub(1)?).copied()
+}
+
+/// All channels.
+pub fn channels() -> Vec<Channel<'static>> {
+    let numbered = (1..).zip(Topic::ALL).map(|(id, topic)| {
+        let (schema_name, schema) = topic.schema();
+        Channel { id, topic: topic.name(), encoding: "cdr", schema_name, schema, schema_encoding: "ros2msg" }
+    });
+    let status = Channel {
+        id: STATUS,
+        topic: "/jtc/status",
+        encoding: "json",
+        schema_name: "openjtc.Status",
+        schema: STATUS_SCHEMA,
+        schema_encoding: "jsonschema",
+    };
+    numbered.chain([status]).collect()
+}
+
+/// Stop and Pause.
+pub fn services() -> Vec<Service<'static>> {
+    let shape =
+        |schema_name, schema| Shape { encoding: "json", schema_name, schema_encoding: "jsonschema", schema };
+    let service = |id, name| Service {
+        id,
+        name,
+        kind: "openjtc.Halt",
+        request: shape("openjtc.HaltRequest", r#"{"type":"object","properties":{}}"#),
+        response: shape(
+            "openjtc.HaltResponse",
+            r#"{"type":"object","properties":{"sent":{"type":"string"}}}"#,
+        ),
+    };
+    vec![service(STOP, "stop"), service(PAUSE, "pause")]
+}
+
+/// A subscription: its channel, and whether what does not change is to be sent yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Subscribed {
+    channel: u32,
+    latched: bool,
+}
+
+/// Subscriptions of a client, one of each channel at most.
+#[derive(Default)]
+pub struct Subscriptions(BTreeMap<u32, Subscribed>);
+
+impl Subscriptions {
+    /// One more; the error is for people.
+    pub fn add(&mut self, Subscription { id, channel_id: channel }: &Subscription) -> Result<(), String> {
+        if topic(*channel).is_none() && *channel != STATUS {
+            return Err(format!("subscription {id} is not taken: there is no channel {channel}"));
+        }
+        if self.0.contains_key(id) || self.0.values().any(|other| other.channel == *channel) {
+            return Err(format!(
+                "subscription {id} is not taken: it exists, or another one of channel {channel}"
+            ));
+        }
+        self.0.insert(
+            *id,
+            Subscribed { channel: *channel, latched: topic(*channel) == Some(Topic::Description) },
+        );
+        Ok(())
+    }
+
+    /// One less.
+    pub fn remove(&mut self, id: u32) {
+        self.0.remove(&id);
+    }
+
+    /// Those of the description that have not had it.
+    pub fn take_latched(&mut self) -> Vec<u32> {
+        let due = |(id, subscribed): (&u32, &mut Subscribed)| {
+            std::mem::take(&mut subscribed.latched).then_some(*id)
+        };
+        self.0.iter_mut().filter_map(due).collect()
+    }
+
+    /// Those of what changes: subscription and channel.
+    pub fn live(&self) -> Vec<(u32, u32)> {
+        let live =
+            self.0.iter().filter(|(_, subscribed)| topic(subscribed.channel) != Some(Topic::Description));
+        live.map(|(id, subscribed)| (*id, subscribed.channel)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_is_subscribed_to_once_and_the_description_comes_once_for_each_time() {
+        let mut subscriptions = Subscriptions::default();
+        let ids: Vec<u32> = channels().iter().map(|channel| channel.id).collect();
+        assert_eq!(ids, (1..=STATUS).collect::<Vec<_>>());
+        for channel_id in [0, STATUS + 1, u32::MAX] {
+            assert!(subscriptions.add(&Subscription { id: 1, channel_id }).is_err());
+        }
+        for channel_id in ids {
+            subscriptions.add(&Subscription { id: 100 + channel_id, channel_id }).expect("it is new");
+            assert!(subscriptions.add(&Subscription { id: 200 + channel_id, channel_id }).is_err());
+        }
+        let described = channels().iter().find(|c| c.topic == "/robot_description").map_or(0, |c| c.id);
+        assert_eq!(subscriptions.live().len(), STATUS as usize - 1);
+        for _ in 0..2 {
+            assert_eq!(subscriptions.take_latched(), [100 + described]);
+            assert!(subscriptions.take_latched().is_empty());
+            subscriptions.remove(100 + described);
+            let again = Subscription { id: 100 + described, channel_id: described };
+            subscriptions.add(&again).expect("it is gone");
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! The arm live in Foxglove, Lichtblick and PlotJuggler: the Foxglove WebSocket protocol, with the messages of recordings.
+//!
+//! A reader gets the latest values 25 times a second at most. Pings show how far it has read: where one has not come back yet nothing more
+//! is sent, so that a slow one loses messages and never lags behind the arm, and one that does not read at all is put out.
+mod channels;
+mod protocol;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+
+use axum::Extension;
+use axum::extract::State;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt as _, StreamExt as _};
+use jtc_host::recording::{MessageWriter, Topic};
+use jtc_host::words;
+use jtc_wire::{ExecCommand, Status};
+use serde_json::json;
+use tokio::sync::Notify;
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+
+use self::channels::{PAUSE, STATUS, STOP, Subscriptions};
+use self::protocol::{Call, FromClient, NAMES, ToClient};
+use super::{Agent, Caller, ErrorObject};
+use crate::line::Role;
+
+/// Longest message of a client.
+const MESSAGE_MAX: usize = 64 << 10;
+/// Messages that a client may send, in a second and at once.
+const MESSAGES_PER_S: f64 = 50.0;
+const MESSAGES_AT_ONCE: f64 = 500.0;
+/// Answers that may wait for a client.
+const ANSWERS_MAX: usize = 64;
+/// How often values are sent, at most.
+const PERIOD: Duration = Duration::from_millis(40);
+/// How often words are sent at least.
+const QUIET: Duration = Duration::from_millis(500);
+/// How often is looked how far a client has read.
+const PING_TIME: Duration = Duration::from_millis(200);
+/// One that has not read for so long gets nothing for now,
+const LATE: Duration = Duration::from_millis(400);
+/// and is put out after this time.
+const GONE: Duration = Duration::from_secs(10);
+/// How long a client may leave a message untaken.
+const SEND_TIME: Duration = Duration::from_secs(5);
+
+/// A request with these headers asks for this protocol.
+pub(super) fn is_asked(headers: &HeaderMap) -> bool {
+    headers
+        .get_all(header::SEC_WEBSOCKET_PROTOCOL)
+        .into_iter()
+        .filter_map(|names| names.to_str().ok())
+        .flat_map(|names| names.split(','))
+        .any(|name| NAMES.contains(&name.trim()))
+}
+
+/// `GET /api/foxglove`, and `GET /` where this protocol is asked for.
+pub(super) async fn foxglove(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if !is_asked(&headers) {
+        let message = format!("this socket speaks {}", NAMES.join(" and "));
+        let next = "ask for one of them in Sec-WebSocket-Protocol; /api/stream needs none";
+        return ErrorObject::new("request", message, next).unreadable().into_response();
+    }
+    let sockets = if caller.role == Role::Operator { &agent.operators } else { &agent.viewers };
+    let Ok(permit) = sockets.clone().try_acquire_owned() else {
+        return StatusCode::SERVICE_UNAVAILABLE.into_response();
+    };
+    let upgrade = upgrade.protocols(NAMES).max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
+    upgrade.on_upgrade(async move |socket| {
+        serve(&agent, &caller, socket).await;
+        drop(permit);
+    })
+}
+
+/// What both directions of a socket have.
+struct Shared {
+    wanted: Mutex<Wanted>,
+    /// Something is to be sent at once.
+    wake: Notify,
+    /// The last ping that came back.
+    read: AtomicU64,
+}
+
+#[derive(Default)]
+struct Wanted {
+    subscriptions: Subscriptions,
+    answers: VecDeque<Message>,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Wanted> {
+        self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// False when the client does not take what it has asked for.
+    fn answer(&self, message: Message) -> bool {
+        let mut wanted = self.lock();
+        wanted.answers.push_back(message);
+        self.wake.notify_one();
+        wanted.answers.len() <= ANSWERS_MAX
+    }
+
+    fn warn(&self, message: String) -> bool {
+        self.answer(Message::Text(ToClient::Status { level: 1, message }.text().into()))
+    }
+}
+
+async fn serve(agent: &Agent, caller: &Caller, socket: WebSocket) {
+    let shared = Shared { wanted: Mutex::default(), wake: Notify::new(), read: AtomicU64::new(0) };
+    let (to, from) = socket.split();
+    // Neither waits for the other: a Stop is taken also from a client that does not read.
+    tokio::select! {
+        () = receive(agent, caller, &shared, from) => {}
+        () = Sender { agent, caller, shared: &shared, to, pinged: 0, pinged_at: Instant::now() }.run() => {}
+    }
+}
+
+/// What the client asks for, until it goes or asks for too much.
+async fn receive(agent: &Agent, caller: &Caller, shared: &Shared, mut from: SplitStream<WebSocket>) {
+    let (mut allowance, mut at) = (MESSAGES_AT_ONCE, Instant::now());
+    while let Some(Ok(message)) = from.next().await {
+        allowance = (allowance + at.elapsed().as_secs_f64() * MESSAGES_PER_S).min(MESSAGES_AT_ONCE) - 1.0;
+        at = Instant::now();
+        let taken = match message {
+            Message::Text(text) => ask(shared, &text),
+            Message::Binary(bytes) => call(agent, caller, shared, &bytes),
+            Message::Pong(number) => {
+                let number = number.as_ref().try_into().map_or(0, u64::from_be_bytes);
+                shared.read.fetch_max(number, Ordering::Relaxed);
+                true
+            }
+            Message::Ping(_) => true,
+            Message::Close(_) => false,
+        };
+        if !taken || allowance < 0.0 {
+            return;
+        }
+    }
+}
+
+/// A text message. False when the client is put out.
+fn ask(shared: &Shared, text: &str) -> bool {
+    match serde_json::from_str(text) {
+        Ok(FromClient::Subscribe { subscriptions }) => subscriptions.iter().all(|subscription| {
+            let added = shared.lock().subscriptions.add(subscription);
+            shared.wake.notify_one();
+            added.map_or_else(|why| shared.warn(why), |()| true)
+        }),
+        Ok(FromClient::Unsubscribe { subscription_ids }) => {
+            let mut wanted = shared.lock();
+            subscription_ids.into_iter().for_each(|id| wanted.subscriptions.remove(id));
+            true
+        }
+        Ok(FromClient::Other) => {
+            shared.warn("not done: this server has announced nothing of that kind".to_owned())
+        }
+        Err(error) => shared.warn(format!("not understood: {error}")),
+    }
+}
+
+/// A binary message: Stop and Pause, of those who may.
+fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
+    let Some(call) = Call::parse(bytes) else {
+        return shared.warn("not done: this server takes no messages on channels".to_owned());
+    };
+    let command = match call.service {
+        STOP => Ok(ExecCommand::Stop),
+        PAUSE => Ok(ExecCommand::Pause),
+        other => Err(format!("there is no service {other}")),
+    };
+    let done = command.and_then(|command| {
+        if caller.looks_only {
+            return Err("pages of this origin may only look".to_owned());
+        }
+        agent.halt(caller, &HeaderMap::new(), command).map_err(|error| error.message.into())
+    });
+    shared.answer(match done {
+        Ok(sent) => {
+            let payload = serde_json::to_vec(&sent.0).unwrap_or_default();
+            Message::Binary(call.answer(&payload).into())
+        }
+        Err(message) => {
+            let (service_id, call_id) = (call.service, call.call);
+            Message::Text(ToClient::ServiceCallFailure { service_id, call_id, message }.text().into())
+        }
+    })
+}
+
+/// The direction to the client.
+struct Sender<'a> {
+    agent: &'a Agent,
+    caller: &'a Caller,
+    shared: &'a Shared,
+    to: SplitSink<WebSocket, Message>,
+    /// The last ping, and when that was.
+    pinged: u64,
+    pinged_at: Instant,
+}
+
+/// The client is gone, or is put out.
+struct Gone;
+
+impl Sender<'_> {
+    async fn run(mut self) {
+        // What it ends with is its end.
+        let _ = self.deliver().await;
+    }
+
+    async fn deliver(&mut self) -> Result<(), Gone> {
+        self.greet().await?;
+        let mut writer = MessageWriter::new(&self.agent.identity().await.arm);
+        let mut statuses = self.agent.line.changes();
+        let mut period = interval(PERIOD);
+        period.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut last, mut quiet) = (None, Instant::now());
+        loop {
+            self.answer(&mut writer).await?;
+            if let Some(why) = self.agent.line.lost() {
+                let message = format!("the port is gone: {why}");
+                return self.text(&ToClient::Status { level: 2, message }).await;
+            }
+            let due = async {
+                period.tick().await;
+                tokio::select! {
+                    changed = statuses.changed() => changed.map_err(|_| Gone),
+                    () = sleep_until(quiet) => Ok(()),
+                }
+            };
+            tokio::select! {
+                due = due => due?,
+                () = self.shared.wake.notified() => continue,
+            }
+            let Some((at, status)) = self.agent.line.with(|line, _| line.status().copied()) else { continue };
+            let (new, overdue) = (last != Some(at), Instant::now() >= quiet);
+            if !(new || overdue) || !self.has_read()? {
+                continue;
+            }
+            (last, quiet) = (Some(at), Instant::now() + QUIET);
+            self.values(&mut writer, at, &status, new).await?;
+            self.ping().await?;
+        }
+    }
+
+    /// What every client is sent first.
+    async fn greet(&mut self) -> Result<(), Gone> {
+        let services: &[&str] = if self.caller.looks_only { &[] } else { &["services"] };
+        let simulated = if self.agent.simulated { " (SIMULATED)" } else { "" };
+        self.text(&ToClient::ServerInfo {
+            name: &format!("openjtc {}{simulated}", self.agent.port),
+            capabilities: services,
+            supported_encodings: &["json"],
+            metadata: BTreeMap::from([("version", env!("CARGO_PKG_VERSION").to_owned())]),
+            session_id: &self.agent.id.clone(),
+        })
+        .await?;
+        self.text(&ToClient::Advertise { channels: channels::channels() }).await?;
+        if self.caller.looks_only {
+            return Ok(());
+        }
+        self.text(&ToClient::AdvertiseServices { services: channels::services() }).await
+    }
+
+    /// Answers, and the description for who has just asked for it.
+    async fn answer(&mut self, writer: &mut MessageWriter) -> Result<(), Gone> {
+        let (answers, latched) = {
+            let mut wanted = self.shared.lock();
+            (std::mem::take(&mut wanted.answers), wanted.subscriptions.take_latched())
+        };
+        for answer in answers {
+            self.send(answer).await?;
+        }
+        let stamp = unix_ns(Duration::ZERO);
+        for id in latched {
+            let sample = jtc_host::sample::Sample::default();
+            if let Some(message) = writer.write(Topic::Description, stamp, &sample) {
+                let message = protocol::data(id, stamp, message);
+                self.send(Message::Binary(message.into())).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the controller reported at a time of the line, to all subscriptions; where it is not new, words alone.
+    async fn values(
+        &mut self,
+        writer: &mut MessageWriter,
+        at: Duration,
+        status: &Status,
+        new: bool,
+    ) -> Result<(), Gone> {
+        let age = self.agent.line.now().saturating_sub(at);
+        let stamp = unix_ns(age);
+        let sample = self.agent.jobs.followed.sample(status);
+        let live = self.shared.lock().subscriptions.live();
+        for (id, channel) in live {
+            let message = match channels::topic(channel) {
+                Some(topic) if new => {
+                    writer.write(topic, stamp, &sample).map(|m| protocol::data(id, stamp, m))
+                }
+                None if channel == STATUS => {
+                    Some(protocol::data(id, unix_ns(Duration::ZERO), &self.in_words(age, status)))
+                }
+                _ => None,
+            };
+            if let Some(message) = message {
+                self.send(Message::Binary(message.into())).await?;
+            }
+        }
+        Ok(())
+    }
+
+    fn in_words(&self, age: Duration, status: &Status) -> Vec<u8> {
+        let by = self.agent.line.with(|line, _| {
+            line.lease().and_then(|lease| line.introduction(lease.holder)).map(|client| client.name.clone())
+        });
+        let words = json!({
+            "state": status.state.name(),
+            "trajectory": status.trajectory.name(),
+            "point": status.point,
+            "errors": words::causes(status),
+            "errors_occurred": words::errors(status.occurred),
+            "next": words::next_step(status).replace('`', ""),
+            "age_ms": age.as_millis() as u64,
+            "commanded_by": by.unwrap_or_default(),
+            "simulated": self.agent.simulated,
+        });
+        words.to_string().into_bytes()
+    }
+
+    /// The client has read what it was sent; false: not yet.
+    fn has_read(&self) -> Result<bool, Gone> {
+        if self.shared.read.load(Ordering::Relaxed) >= self.pinged {
+            return Ok(true);
+        }
+        match self.pinged_at.elapsed() {
+            late if late > GONE => Err(Gone),
+            late => Ok(late < LATE),
+        }
+    }
+
+    /// Behind what was sent: when it comes back that was read.
+    async fn ping(&mut self) -> Result<(), Gone> {
+        let back = self.shared.read.load(Ordering::Relaxed) >= self.pinged;
+        if !back || self.pinged_at.elapsed() < PING_TIME {
+            return Ok(());
+        }
+        (self.pinged, self.pinged_at) = (self.pinged + 1, Instant::now());
+        self.send(Message::Ping(self.pinged.to_be_bytes().to_vec().into())).await
+    }
+
+    async fn text(&mut self, message: &ToClient<'_>) -> Result<(), Gone> {
+        self.send(Message::Text(message.text().into())).await
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), Gone> {
+        match timeout(SEND_TIME, self.to.send(message)).await {
+            Ok(Ok(())) => Ok(()),
+            _ => Err(Gone),
+        }
+    }
+}
+
+/// So long ago, ns since 1970.
+fn unix_ns(ago: Duration) -> u64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(now.saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,173 @@
+//! Messages of the Foxglove WebSocket protocol, version 1: text messages are JSON with an `op`, binary ones begin with a byte that
+//! says what they are; numbers are little-endian.
+use std::collections::BTreeMap;
+
+/// Names of the protocol in the handshake: it has two.
+pub const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
+
+/// Text messages to a client.
+#[derive(serde::Serialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub enum ToClient<'a> {
+    /// The first one.
+    ServerInfo {
+        name: &'a str,
+        capabilities: &'a [&'a str],
+        supported_encodings: &'a [&'a str],
+        metadata: BTreeMap<&'a str, String>,
+        session_id: &'a str,
+    },
+    /// Something to know; 0: information, 1: warning, 2: error.
+    Status { level: u8, message: String },
+    /// Channels that can be subscribed to.
+    Advertise { channels: Vec<Channel<'a>> },
+    /// Services that can be called.
+    AdvertiseServices { services: Vec<Service<'a>> },
+    /// A call was not done.
+    ServiceCallFailure { service_id: u32, call_id: u32, message: String },
+}
+
+impl ToClient<'_> {
+    pub fn text(&self) -> String {
+        // Made of strings and numbers.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+#[derive(serde::Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Channel<'a> {
+    pub id: u32,
+    pub topic: &'a str,
+    pub encoding: &'a str,
+    pub schema_name: &'a str,
+    pub schema: &'a str,
+    pub schema_encoding: &'a str,
+}
+
+#[derive(serde::Serialize)]
+pub struct Service<'a> {
+    pub id: u32,
+    pub name: &'a str,
+    #[serde(rename = "type")]
+    pub kind: &'a str,
+    pub request: Shape<'a>,
+    pub response: Shape<'a>,
+}
+
+/// What a service is sent, or returns.
+#[derive(serde::Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Shape<'a> {
+    pub encoding: &'a str,
+    pub schema_name: &'a str,
+    pub schema_encoding: &'a str,
+    pub schema: &'a str,
+}
+
+/// Text messages of a client.
+#[derive(serde::Deserialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub enum FromClient {
+    Subscribe {
+        subscriptions: Vec<Subscription>,
+    },
+    Unsubscribe {
+        subscription_ids: Vec<u32>,
+    },
+    /// What the server has not announced that it can do.
+    #[serde(other)]
+    Other,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Subscription {
+    pub id: u32,
+    pub channel_id: u32,
+}
+
+/// A message on a channel, for one subscription.
+pub fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(13 + payload.len());
+    bytes.push(1);
+    bytes.extend(subscription.to_le_bytes());
+    bytes.extend(stamp_ns.to_le_bytes());
+    bytes.extend(payload);
+    bytes
+}
+
+/// A call of a service.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Call<'a> {
+    pub service: u32,
+    pub call: u32,
+    pub encoding: &'a [u8],
+}
+
+impl<'a> Call<'a> {
+    /// `None` where a binary message is none.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        let (2, rest) = bytes.split_first()? else { return None };
+        let (service, rest) = number(rest)?;
+        let (call, rest) = number(rest)?;
+        let (length, rest) = number(rest)?;
+        let encoding = rest.get(..usize::try_from(length).ok()?)?;
+        Some(Self { service, call, encoding })
+    }
+
+    /// What it returns, in the encoding of the call.
+    pub fn answer(&self, payload: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![3];
+        bytes.extend(self.service.to_le_bytes());
+        bytes.extend(self.call.to_le_bytes());
+        bytes.extend((self.encoding.len() as u32).to_le_bytes());
+        bytes.extend(self.encoding);
+        bytes.extend(payload);
+        bytes
+    }
+}
+
+fn number(bytes: &[u8]) -> Option<(u32, &[u8])> {
+    let (number, rest) = bytes.split_first_chunk::<4>()?;
+    Some((u32::from_le_bytes(*number), rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Worked out by hand from the tables of the protocol's specification.
+    #[test]
+    fn binary_messages_have_the_bytes_of_the_specification() {
+        assert_eq!(
+            data(0x0403_0201, 0x1122_3344_5566_7788, b"ab"),
+            [1, 1, 2, 3, 4, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11, b'a', b'b']
+        );
+        let bytes = [2, 7, 0, 0, 0, 9, 1, 0, 0, 4, 0, 0, 0, b'j', b's', b'o', b'n', b'{', b'}'];
+        let call = Call::parse(&bytes).expect("a call");
+        assert_eq!(call, Call { service: 7, call: 265, encoding: b"json" });
+        let answer = [3, 7, 0, 0, 0, 9, 1, 0, 0, 4, 0, 0, 0, b'j', b's', b'o', b'n', b'{', b'}'];
+        assert_eq!(call.answer(b"{}"), answer);
+        // What is cut off, of another kind, or longer than it is, is no call.
+        for n in 0..17 {
+            assert_eq!(Call::parse(&bytes[..n]), None, "{n}");
+        }
+        assert_eq!(Call::parse(&answer), None);
+        assert_eq!(Call::parse(&[2, 0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 0]), None);
+    }
+
+    #[test]
+    fn what_is_not_announced_is_known_as_such_and_no_text_is_none() {
+        for text in [r#"{"op":"getParameters","parameterNames":[]}"#, r#"{"op":"fetchAsset"}"#] {
+            assert!(matches!(serde_json::from_str(text), Ok(FromClient::Other)), "{text}");
+        }
+        let text = r#"{"op":"unsubscribe","subscriptionIds":[3,4]}"#;
+        assert!(
+            matches!(serde_json::from_str(text), Ok(FromClient::Unsubscribe { subscription_ids }) if subscription_ids == [3, 4])
+        );
+        for text in ["", "[]", r#"{"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]}"#] {
+            assert!(serde_json::from_str::<FromClient>(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,4 +1,4 @@
-"""Reads what a recording says of its arm with the libraries of others, and checks it with Pinocchio.
+"""Reads what a recording holds of its arm with the libraries of others, and checks it with Pinocchio.
 
 usage: check_standalone.py RECORDING.mcap
 

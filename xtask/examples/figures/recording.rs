@@ -42,7 +42,7 @@ pub fn figures() -> Result<()> {
     Ok(())
 }
 
-/// The most memory that a report takes, MB, where the system says so.
+/// The most memory that a report takes, MB, where the system reports it.
 pub fn memory(path: &Path) -> Result<()> {
     report(path)?;
     let status = std::fs::read_to_string("/proc/self/status")?;

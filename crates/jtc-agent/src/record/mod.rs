@@ -2,7 +2,7 @@
 //!
 //! [`Prepared`] opens the directory, [`Witness`] sees what goes over the line, [`Recorder`] follows the statuses. Two threads do that: one
 //! follows, and one writes, which a slow disk holds up alone. Neither holds up the line: what finds no room between them is counted, and
-//! the recording says so.
+//! the recording states how much.
 mod disk;
 mod motion;
 mod shelf;
@@ -41,7 +41,7 @@ const ARRIVED_MAX: usize = 1 << 12;
 const LOOK: Duration = Duration::from_millis(50);
 /// A line on which nothing was commanded for so long is quiet: the controller may be asked who it is.
 const QUIET: Duration = Duration::from_millis(300);
-/// One that did not say is asked again after this time.
+/// A controller that did not answer is asked again after this time.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
 /// Longest that the end waits for the disk.
 const LAST_WORDS: Duration = Duration::from_secs(5);
@@ -191,7 +191,7 @@ struct Identity {
 }
 
 impl Identity {
-    /// That of a device which does not say. One whose hash is that of the built-in arm need not be asked for more.
+    /// That of a device which does not report it. One whose hash is that of the built-in arm need not be asked for more.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }

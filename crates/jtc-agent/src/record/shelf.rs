@@ -84,7 +84,7 @@ impl Shelf {
         Ok(shelf)
     }
 
-    /// Takes in what the list says; what is no line of a list says nothing.
+    /// Takes in a line of the list; what is no such line is passed over.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -320,7 +320,7 @@ mod tests {
         let error = Shelf::open(dir.path(), 1000).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
         drop(shelf);
-        // A line that was cut off says nothing.
+        // A line that was cut off is passed over.
         let mut list = OpenOptions::new().append(true).open(dir.path().join(LIST)).unwrap();
         list.write_all(b"end 20261123T154412Z-0000").unwrap();
         drop(list);

@@ -1,8 +1,8 @@
 //! What a report needs of its samples, which come one after the other: its memory does not grow with their number.
 
 use super::curves::{Curves, Joined, Runs};
-use super::failure::Watch;
 use super::summary::Figures;
+use super::watch::Watch;
 use super::{RunFailure, Summary};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;

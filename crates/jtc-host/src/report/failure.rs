@@ -1,6 +1,5 @@
 //! What broke first in a run that failed: when, at which joint, and the values around it.
 
-use std::collections::VecDeque;
 use std::fmt::Write;
 
 use jtc_bus::GRIPPER;
@@ -12,7 +11,7 @@ use crate::sample::Sample;
 use crate::words;
 
 /// Samples shown before and after the one that shows the failure.
-const BEFORE: usize = 3;
+pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
 /// A step of the measured position counts above this share of what the velocity limit allows: noise and jitter of the time stay below.
 const STEP_SHARE: f64 = 1.2;
@@ -114,7 +113,7 @@ impl RunFailure {
     }
 
     /// An error that the samples show.
-    fn found(info: &RecordingInfo, around: &Around) -> Self {
+    pub(super) fn found(info: &RecordingInfo, around: &Around) -> Self {
         let words = around.samples.get(around.at).map(Words::of_sample);
         let (mut causes, mut joint) = words.map_or_else(Default::default, |words| causes(&words));
         if joint.is_none()
@@ -126,7 +125,12 @@ impl RunFailure {
         Self::at(info, around, causes, joint)
     }
 
-    fn at(info: &RecordingInfo, around: &Around, causes: Vec<String>, joint: Option<Joint>) -> Self {
+    pub(super) fn at(
+        info: &RecordingInfo,
+        around: &Around,
+        causes: Vec<String>,
+        joint: Option<Joint>,
+    ) -> Self {
         let Around { samples, at, start_s } = around;
         let (at, start_s) = (*at, *start_s);
         let time = |i: usize| samples.get(i).map_or(start_s, |s| s.time_s);
@@ -228,12 +232,12 @@ impl RunFailure {
 }
 
 /// An error shows in this sample.
-fn is_bad(sample: &Sample) -> bool {
+pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
 /// Why a run failed whose samples show no error; `unseen`: the last of them is in motion. `None`: it did not fail.
-fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
+pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault that the recording does not name".to_owned()),
         (true, reason) => Some(reason.to_owned()),
@@ -246,12 +250,12 @@ fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
 
 /// A moment, and the samples before and after it that a person wants to see.
 #[derive(Clone, Debug, Default)]
-struct Around {
-    samples: Vec<Sample>,
+pub(super) struct Around {
+    pub(super) samples: Vec<Sample>,
     /// Which of them.
-    at: usize,
+    pub(super) at: usize,
     /// When the run began, s.
-    start_s: f64,
+    pub(super) start_s: f64,
 }
 
 impl Around {
@@ -262,64 +266,10 @@ impl Around {
     }
 
     /// One more behind it, if it is near.
-    fn follow(&mut self, sample: &Sample) {
+    pub(super) fn follow(&mut self, sample: &Sample) {
         if self.samples.len() <= self.at + AFTER {
             self.samples.push(*sample);
         }
-    }
-}
-
-/// Looks for what broke first in samples that come one after the other; finds what [`RunFailure::of_recording`] finds.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Watch {
-    /// The last ones.
-    recent: VecDeque<Sample>,
-    /// A trajectory was executed.
-    begun: bool,
-    /// When the run began, as the last sample of a motion shows it, else the time of the first sample.
-    start_s: Option<f64>,
-    in_motion: bool,
-    /// The first error before an execution, which counts where there is none, and since then.
-    before: Option<Around>,
-    since: Option<Around>,
-}
-
-impl Watch {
-    pub(super) fn push(&mut self, sample: &Sample) {
-        for around in [&mut self.before, &mut self.since].into_iter().flatten() {
-            around.follow(sample);
-        }
-        if self.recent.len() > BEFORE {
-            self.recent.pop_front();
-        }
-        self.recent.push_back(*sample);
-        self.begun |= sample.is_operating();
-        self.in_motion = sample.is_operating();
-        if sample.state == ControllerState::Operate {
-            self.start_s = Some(began_s(sample));
-        }
-        self.start_s.get_or_insert(sample.time_s);
-        let first = if self.begun { &mut self.since } else { &mut self.before };
-        if first.is_none() && is_bad(sample) {
-            *first = Some(now(&self.recent, self.start_s));
-        }
-    }
-
-    pub(super) fn failure(&self, info: &RecordingInfo, ending: &Ending) -> Option<RunFailure> {
-        if let Some(around) = if self.begun { &self.since } else { &self.before } {
-            return Some(RunFailure::found(info, around));
-        }
-        let reason = why_it_ended(ending, self.in_motion)?;
-        Some(RunFailure::at(info, &now(&self.recent, self.start_s), vec![reason], None))
-    }
-}
-
-/// The last of these samples, and those before it.
-fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
-    Around {
-        samples: recent.iter().copied().collect(),
-        at: recent.len().saturating_sub(1),
-        start_s: start_s.unwrap_or(0.0),
     }
 }
 
@@ -363,7 +313,7 @@ fn start_s(samples: &[Sample], at: usize) -> f64 {
 }
 
 /// When the run began that this sample is of, s.
-fn began_s(sample: &Sample) -> f64 {
+pub(super) fn began_s(sample: &Sample) -> f64 {
     sample.time_s - f64::from(sample.point) * 1e-3
 }
 

@@ -10,9 +10,12 @@ mod failure;
 mod pack;
 mod page;
 mod picture;
+#[cfg(test)]
+mod stream_tests;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 pub use digest::Digest;
 pub use failure::{Moment, RunFailure};

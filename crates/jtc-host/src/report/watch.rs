@@ -1,0 +1,64 @@
+//! Looking for what broke first while samples come.
+
+use std::collections::VecDeque;
+
+use jtc_wire::ControllerState;
+
+use super::RunFailure;
+use super::failure::{Around, BEFORE, began_s, is_bad, why_it_ended};
+use crate::recording::{Ending, RecordingInfo};
+use crate::sample::Sample;
+
+/// Looks for what broke first in samples that come one after the other; finds what [`RunFailure::of_recording`] finds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watch {
+    /// The last ones.
+    recent: VecDeque<Sample>,
+    /// A trajectory was executed.
+    begun: bool,
+    /// When the run began, as the last sample of a motion shows it, else the time of the first sample.
+    start_s: Option<f64>,
+    in_motion: bool,
+    /// The first error before an execution, which counts where there is none, and since then.
+    before: Option<Around>,
+    since: Option<Around>,
+}
+
+impl Watch {
+    pub(super) fn push(&mut self, sample: &Sample) {
+        for around in [&mut self.before, &mut self.since].into_iter().flatten() {
+            around.follow(sample);
+        }
+        if self.recent.len() > BEFORE {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(*sample);
+        self.begun |= sample.is_operating();
+        self.in_motion = sample.is_operating();
+        if sample.state == ControllerState::Operate {
+            self.start_s = Some(began_s(sample));
+        }
+        self.start_s.get_or_insert(sample.time_s);
+        let first = if self.begun { &mut self.since } else { &mut self.before };
+        if first.is_none() && is_bad(sample) {
+            *first = Some(now(&self.recent, self.start_s));
+        }
+    }
+
+    pub(super) fn failure(&self, info: &RecordingInfo, ending: &Ending) -> Option<RunFailure> {
+        if let Some(around) = if self.begun { &self.since } else { &self.before } {
+            return Some(RunFailure::found(info, around));
+        }
+        let reason = why_it_ended(ending, self.in_motion)?;
+        Some(RunFailure::at(info, &now(&self.recent, self.start_s), vec![reason], None))
+    }
+}
+
+/// The last of these samples, and those before it.
+fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
+    Around {
+        samples: recent.iter().copied().collect(),
+        at: recent.len().saturating_sub(1),
+        start_s: start_s.unwrap_or(0.0),
+    }
+}

@@ -147,6 +147,10 @@ def programs(jtc, directory):
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=3))
         assert status == 202, job
         number, _ = anna.event("executing")
+        while True:
+            number, event = anna.event("state", number)
+            if event.trajectory == "Execute":
+                break
         status, _ = anna.ask("pause", lease_key=anna.key)
         assert status == 200
         while True:
@@ -193,7 +197,7 @@ def requests_of_all_kinds(jtc, directory):
             command += ["--exclude-checks", "positive_data_acceptance"]
             if lease:
                 # Whoever has the lease gets further; it cannot be tried without its key then.
-                body = json.dumps({"name": "everything", "lasts_s": 3600.0}).encode()
+                body = json.dumps({"name": "everything", "lasts_s": 60.0}).encode()
                 headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
                 request = urllib.request.Request(f"{url}/api/lease", body, headers)
                 key = json.load(urllib.request.urlopen(request))["key"]

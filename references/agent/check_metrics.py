@@ -421,7 +421,7 @@ def main():
     jtc = str(pathlib.Path(sys.argv[1]).resolve())
     with tempfile.TemporaryDirectory() as directory, agent(jtc, pathlib.Path(directory)) as (url, tokens, log):
         arm = Agent(url, tokens["operator"])
-        arm.key = arm.json("POST", "/api/lease", {"name": "reference", "lasts_s": 600})["key"]
+        arm.key = arm.json("POST", "/api/lease", {"name": "reference", "lasts_s": 60})["key"]
         arm.json("PUT", "/api/trajectories/3", {"name": "sway", "text": sway(0.3, 6)})
         assert arm.over(arm.json("POST", "/api/recover", {"defaults": True})["number"]) == "finished"
         before = check_metrics(arm)

@@ -9,7 +9,7 @@ use crate::api::Problem;
 /// The header with the key of a lease.
 pub const KEY: &str = "lease-key";
 /// How long a lease may last without a request, s.
-pub const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
+pub const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
 /// Clients at once.
 const CLIENTS_MAX: usize = 32;
 /// A client that has asked for nothing for so long behind the end of its lease is forgotten.
@@ -130,13 +130,17 @@ impl<P: Clone> Leases<P> {
         ask: bool,
         now: Duration,
     ) -> Result<(ClientId, bool), Denied> {
-        if self.clients.len() >= CLIENTS_MAX {
-            return Err(Denied::Full);
-        }
         let held = match self.held_by_another(key, now) {
             Some(denied) if !ask => return Err(denied),
             other => other.is_none(),
         };
+        if self.clients.len() >= CLIENTS_MAX {
+            // The one that has been silent longest makes room: a program that is begun again and again keeps nobody out.
+            let holder = self.held.as_ref().map(|held| held.key.clone());
+            let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
+            let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
+            self.clients.remove(&oldest.ok_or(Denied::Full)?);
+        }
         self.last += 1;
         let id = ClientId(self.last);
         let client = Client { id, name: name.to_owned(), lasts, policy, seen: now };
@@ -267,10 +271,15 @@ mod tests {
     }
 
     #[test]
-    fn no_more_clients_come_than_there_is_room_for() {
+    fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
-        let mut admit = |n: usize| leases.admit(&n.to_string(), ("x", s(1), ()), true, s(0)).map(drop);
-        assert!((0..CLIENTS_MAX).all(|n| admit(n).is_ok()));
-        assert_eq!(admit(CLIENTS_MAX), Err(Denied::Full));
+        for n in 0..3 * CLIENTS_MAX {
+            let now = s(n as u64 / 10);
+            leases.admit(&n.to_string(), ("x", s(60), ()), true, now).expect("there is room");
+            leases.command(Some("0"), now).expect("the first one commands");
+            assert!(leases.clients.len() <= CLIENTS_MAX);
+        }
+        let last = (3 * CLIENTS_MAX - 1).to_string();
+        assert!(leases.client(Some(&last), s(10)).is_ok() && leases.client(Some("1"), s(10)).is_err());
     }
 }

@@ -193,10 +193,10 @@ impl Run<'_> {
             return Err(task.stopped());
         }
         let duration_s = checked.trajectory().duration_s();
+        let following = task.followed.begin(checked.trajectory(), site.options.device.delay_ticks);
         journal.write(Happening::Executing { job, phase: phase(), duration_s });
         let digest = Rc::new(RefCell::new(Digest::new()));
         let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
-        let following = task.followed.begin(checked.trajectory(), site.options.device.delay_ticks);
         task.commander.set_moving(true);
         let outcome = self.session.run_unkept(
             checked,

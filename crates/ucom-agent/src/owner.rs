@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use agent_kit::api::Problem;
 use agent_kit::lease::{ClientId, Leases};
+use host_kit::{Diagnose as _, ErrorKind};
 use tokio::sync::{oneshot, watch};
 use ucom::{Profile, Status};
 use ucom_host::files::SignalTable;
@@ -569,7 +570,15 @@ impl Hands {
     /// An error of the session; where a Stop or the agent's end was its cause, that.
     pub fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
-            return Problem::diagnosed(error);
+            let kind = match (error.kind(), error) {
+                // The agent is there, and so is the bus: it is the board that is not.
+                (
+                    ErrorKind::NoLink,
+                    SessionError::Procedure(_) | SessionError::NoBoards | SessionError::NoNumbers { .. },
+                ) => ErrorKind::Device,
+                (kind, _) => kind,
+            };
+            return Problem::diagnosed(error).kind(kind);
         }
         let halts = lock(&self.shared.halts);
         match &halts.last {

@@ -115,7 +115,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     // A reset takes its number.
     let (status, reset) = served.api("POST /api/boards/1/reset", Some(&key), None);
     assert_eq!((status, reset["reports"].as_array().map(Vec::len)), (200, Some(1)), "{reset}");
-    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 503);
+    let (status, error) = served.api("POST /api/boards/1/start", Some(&key), None);
+    assert_eq!((status, error["code"].as_str()), (409, Some("no-answer")), "{error}");
 }
 
 /// A Stop is taken from anyone, without token and lease, is on the bus at once, and each board confirms it.

@@ -81,6 +81,7 @@ pub(super) enum Level {
 pub struct StopRequest {
     /// `application`, unless it is asked for otherwise.
     #[serde(default)]
+    #[param(inline)]
     level: Level,
 }
 

@@ -177,7 +177,7 @@ fn described() -> OpenApiRouter<Agent> {
 #[derive(IntoResponses)]
 #[expect(dead_code, reason = "describes responses")]
 enum Denials {
-    /// Refused: another client commands, something else is going on, a check or a board forbids it
+    /// Refused: another client commands, something else is going on, a check or a board forbids it, or a board does not answer
     #[response(status = 409)]
     Denied(Problem),
     /// More than may be sent at once
@@ -192,7 +192,7 @@ enum Denials {
     /// Something went wrong on the way
     #[response(status = 500)]
     Fault(Problem),
-    /// The bus is gone, or a board does not answer
+    /// The bus is gone
     #[response(status = 503)]
     Lost(Problem),
 }

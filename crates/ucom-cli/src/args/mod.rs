@@ -3,6 +3,7 @@
 mod boards;
 mod firmware;
 mod options;
+mod serve;
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use boards::{Assignment, Boards};
 pub use firmware::{Addresses, RepairArgs, UpdateArgs};
 pub use options::*;
+pub use serve::ServeArgs;
 
 /// Motor boards on a CAN bus from your terminal.
 #[derive(Debug, Parser)]
@@ -168,6 +170,13 @@ pub enum Command {
                             ends after 3 s with exit code 5; with --on-lost report a lost board is waited for."
     )]
     Run(RunArgs),
+    /// Own the bus for many clients: an API by HTTP; one commands at a time, everyone can stop
+    #[command(after_help = "Examples:\n  ucom serve --bus socketcan:can0\n  ucom serve --sim --boards 3\n  \
+                            curl http://127.0.0.1:8781/api/boards\n  curl -X POST http://127.0.0.1:8781/api/stop\n\n\
+                            The commands of this program do not go through an agent: what they do on its bus meets a competing master.\n\
+                            Ctrl-C stops what the agent has started.\n\
+                            Exit codes: 0 ended, 2 the address or a file cannot be used, 3 the bus is gone.")]
+    Serve(ServeArgs),
     /// Live view of boards, bus load and foreign frames; asks once, then listens
     #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5\n\n\
                             Keys: s stops the control loops of all boards, r asks the boards again, arrows, PageUp, PageDown,\n\

@@ -17,6 +17,7 @@ mod record;
 mod repair;
 mod run;
 mod send;
+mod serve;
 mod sim;
 mod typed;
 mod update;
@@ -47,6 +48,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Par(args) => params::par(&args, link, out),
         Command::So(args) => outputs::so(&args, link, out),
         Command::Run(args) => run::run(&args, link, out),
+        Command::Serve(args) => serve::serve(&args, link, out),
         Command::Monitor(args) => monitor::monitor(&args, link, out),
         Command::Conformance(args) => conformance::conformance(&args, link, out),
         Command::Explain(args) => explain::explain(&args, out),

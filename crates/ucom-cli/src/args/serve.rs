@@ -1,0 +1,34 @@
+//! `ucom serve`: the agent.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::FalseyValueParser;
+
+use super::CacheArgs;
+
+/// Options of `ucom serve`.
+#[derive(Args, Debug)]
+pub struct ServeArgs {
+    /// A simulated chain instead of a bus
+    #[arg(long, env = "UCOM_SIM", value_parser = FalseyValueParser::new())]
+    pub sim: bool,
+    /// Number of simulated boards, 0..31; default: the ten of the built-in head
+    #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub boards: Option<u8>,
+    /// Address to listen at; beyond this computer everyone needs a token
+    #[arg(long, env = "UCOM_AGENT_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8781")]
+    pub listen: SocketAddr,
+    /// Tokens of the agent, TOML, made where there are none; default: openjtc/ucom-tokens.toml in $XDG_STATE_HOME or ~/.local/state
+    #[arg(long, env = "UCOM_TOKEN_FILE", value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
+    /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
+    #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
+    pub names: Vec<String>,
+    /// File to which each command is appended: who, what, when, result
+    #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
+    pub command_log: Option<PathBuf>,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+}

@@ -1,0 +1,128 @@
+//! `ucom serve`: the agent that owns a bus.
+
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use agent_kit::access::{Access, Tokens, token_file};
+use agent_kit::log::CommandLog;
+use agent_kit::serve as service;
+use cli_kit::{ErrorKind, Failure, Output};
+use serde_json::json;
+use ucom::Profile;
+use ucom_agent::api::Agent;
+use ucom_agent::{Config, Owner};
+use ucom_host::session::CleanupList;
+use ucom_sim::{ChainConfig, ChainServer, ChainSim};
+
+use crate::args::{LinkArgs, ServeArgs};
+use crate::interrupt::listen;
+
+/// How long nothing that happens outside is waited for.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Owns the bus until SIGINT or SIGTERM; what the agent has started is stopped then.
+pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if args.sim && link.bus.is_some() {
+        return Err(Failure::usage("a bus and --sim: the agent owns one of them")
+            .hint("leave --bus out, and unset UCOM_BUS"));
+    }
+    if args.boards.is_some() && !args.sim {
+        return Err(Failure::usage("--boards is for simulated boards").hint("add --sim"));
+    }
+    let token_file = args.token_file.clone().or_else(|| token_file("ucom-tokens.toml")).ok_or_else(|| {
+        Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
+            .hint("name one with --token-file FILE")
+    })?;
+    let config =
+        Config { profile: link.profile()?, signals: link.signal_table()?, cache: args.cache.cache() };
+    let stop = listen(&CleanupList::default())?;
+    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+        let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
+        Failure::usage(format!("{}: {error}", path.display()))
+    })?;
+    let listener = TcpListener::bind(args.listen).map_err(|error| {
+        Failure::usage(format!("{}: {error}", args.listen))
+            .hint("another agent may listen there: name another address with --listen")
+    })?;
+    let address = listener.local_addr()?;
+    let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
+    // It goes behind the owner of its bus.
+    let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
+    let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
+    let owner = Owner::open(&bus, config)?;
+    if !address.ip().is_loopback() {
+        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it");
+    }
+    if are_new {
+        out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
+    }
+    let access = Access::new(tokens, address, &args.names);
+    let agent = Agent::new(&owner, access, Arc::new(Mutex::new(log)), &bus, args.sim)?;
+    let url = format!("http://{address}");
+    let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim, "bus": bus });
+    out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
+    let lost = owner.lost();
+    let gone = owner.lost();
+    service::serve(agent.router(), listener, move || stop.asked() || lost().is_some())?;
+    let gone = gone();
+    owner.end();
+    drop(simulated);
+    gone.map_or(Ok(()), |why| {
+        Err(Failure::new(ErrorKind::NoLink, "bus", why)
+            .hint("is the bus still there? ucom doctor looks at it"))
+    })
+}
+
+/// Notes that the log of commands cannot be written.
+fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
+    let out = *out;
+    move |error| {
+        out.note(format!("the log of commands cannot be written: {error}; commands are taken all the same"));
+    }
+}
+
+/// A simulated chain that goes on in a thread.
+struct Simulated {
+    url: String,
+    ended: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Simulated {
+    fn start(boards: Option<u8>, profile: Profile, out: &Output) -> Result<Self, Failure> {
+        let (ready, url) = mpsc::channel();
+        let ended: Arc<AtomicBool> = Arc::default();
+        let (end, out) = (ended.clone(), *out);
+        let thread = std::thread::spawn(move || {
+            let head = ChainConfig::head(&profile);
+            let boards = boards.map_or(head.boards.len(), usize::from);
+            let chain = ChainSim::new(&head.with_boards(boards, &profile), Vec::new(), 1, &profile);
+            let bound =
+                ChainServer::bind("127.0.0.1:0", chain, profile.bitrate, 1, move |text| out.note(text));
+            let mut server = match bound {
+                Ok(server) => server,
+                Err(error) => return drop(ready.send(Err(error.to_string()))),
+            };
+            // Who waits for it has not gone.
+            let _ = ready.send(Ok(server.url()));
+            while !end.load(Ordering::Relaxed) {
+                server.turn(LOOK);
+            }
+        });
+        let url = url.recv().unwrap_or_else(|_| Err("the simulated chain has a fault".into()));
+        Ok(Self { url: url.map_err(Failure::usage)?, ended, thread: Some(thread) })
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic of that thread has been printed.
+            drop(thread.join());
+        }
+    }
+}

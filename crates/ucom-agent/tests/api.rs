@@ -293,6 +293,26 @@ fn a_stream_has_bus_boards_values_and_events_as_they_come() {
     assert!(last > 3, "{kinds:?}");
 }
 
+/// D-01: numbers are 0 to 31; others are refused before anything is sent, and the agent goes on.
+#[test]
+fn d01_numbers_that_no_board_can_have_are_refused() {
+    let (served, key) = Served::numbered(1);
+    for (request, body) in [
+        ("POST /api/boards/32/start", None),
+        ("POST /api/boards/143/reset", None),
+        ("POST /api/boards/255/stop", None),
+        ("PUT /api/boards/143/inputs/x", Some(json!({ "value": 1 }))),
+        ("PUT /api/boards/32/outputs", Some(json!({ "active": true }))),
+        ("POST /api/run", Some(json!({ "boards": [1, 32] }))),
+        ("POST /api/init", Some(json!({ "expected": [{ "board": 32, "flash_number": 1 }] }))),
+        ("POST /api/updates", Some(json!({ "boards": [{ "board": 32 }], "image": "AAAA", "format": "bin" }))),
+    ] {
+        let (status, error) = served.api(request, Some(&key), body);
+        assert_eq!((status, error["code"].as_str()), (422, Some("board")), "{request}: {error}");
+    }
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
+}
+
 #[test]
 fn a_bus_that_is_gone_is_named() {
     let (mut served, key) = Served::numbered(1);

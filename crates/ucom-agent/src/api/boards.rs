@@ -12,6 +12,22 @@ pub(super) fn unknown(number: u8) -> Problem {
     Problem::nothing("board", number, "/api/boards")
 }
 
+/// Numbers that boards can have.
+///
+/// # Errors
+///
+/// One of them is none.
+pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Problem> {
+    match boards.into_iter().find(|board| *board > 31) {
+        Some(board) => {
+            let message = format!("{board} is no number of a board: they are 0 to 31");
+            Err(Problem::new("board", message, "GET /api/boards lists what there is")
+                .kind(host_kit::ErrorKind::Usage))
+        }
+        None => Ok(()),
+    }
+}
+
 /// The boards as last seen. They are asked when the agent starts, by a scan, and whenever something is done with them.
 #[utoipa::path(
     get,

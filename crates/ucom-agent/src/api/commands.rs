@@ -13,6 +13,7 @@ use ucom_host::session::{
 };
 use utoipa::{IntoParams, ToSchema};
 
+use super::boards::numbers;
 use super::objects::{AnswerObject, ValueObject};
 use super::{Agent, Denials};
 use crate::owner::Hands;
@@ -101,6 +102,7 @@ impl Agent {
         act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
         let client = self.commander(caller, headers)?;
+        numbers([board])?;
         if moves {
             self.shared.may_move(client.id)?;
         }

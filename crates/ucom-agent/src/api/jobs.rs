@@ -12,6 +12,7 @@ use ucom_host::master::{InitOptions, Outcome, Request, RunOptions, RunReport};
 use ucom_host::session::{Assignment, Boards, Prepared, SessionError, only, plans, remember};
 use utoipa::ToSchema;
 
+use super::boards::numbers;
 use super::commands::{GivenValue, by_names};
 use super::objects::JobObject;
 use super::{Agent, Denials};
@@ -101,6 +102,7 @@ pub(super) async fn init(
     headers: HeaderMap,
     Body(InitRequest { expected }): Body<InitRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    numbers(expected.iter().map(|board| board.board))?;
     let expected = expected.iter().map(|board| (board.board, board.flash_number)).collect();
     let options = InitOptions { expected, force: false };
     agent.begin((&caller, &headers), (Kind::Command, "init"), |hands| {
@@ -185,6 +187,7 @@ pub(super) async fn run(
     headers: HeaderMap,
     Body(request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    numbers(request.boards.iter().copied())?;
     let (ci, par) = (assignments(&request.inputs)?, assignments(&request.parameters)?);
     agent.begin((&caller, &headers), (Kind::Command, "run"), move |hands| {
         let boards = match request.boards.is_empty() {

@@ -17,6 +17,7 @@ use ucom_host::master::update::{
 use ucom_host::master::{Outcome, Request};
 use utoipa::ToSchema;
 
+use super::boards::numbers;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
@@ -147,6 +148,7 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     if request.boards.is_empty() {
         return Err(usage("no board is named", "boards lists them, each with its number"));
     }
+    numbers(request.boards.iter().map(|target| target.board))?;
     let target = |t: &TargetRequest| UpdateTarget { board: t.board, flash_number: t.flash_number };
     let targets = request.boards.iter().map(target).collect();
     let second = request.second.as_deref().map(|text| image(text, request)).transpose()?;

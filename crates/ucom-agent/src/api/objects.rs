@@ -130,7 +130,7 @@ pub struct BoardObject {
     /// Number of its bootloader: who it is; missing before it has answered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
-    /// What it says of itself.
+    /// Its description of itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
     /// `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
@@ -167,7 +167,7 @@ pub struct BoardObject {
 /// Names of what a board's application has.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct OffersObject {
-    /// What the application says of itself.
+    /// The description of the application.
     pub description: String,
     /// Controller inputs.
     pub inputs: Vec<String>,
@@ -311,7 +311,7 @@ pub struct FoundObject {
     pub number: u8,
     /// Number of its bootloader: who it is.
     pub flash_number: u16,
-    /// What it says of itself.
+    /// Its description of itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
     /// Program ID of its application.

@@ -112,7 +112,7 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
     let image = Image::parse(&bytes, &options).map_err(|e| {
         usage(
             e.to_string(),
-            "forms are hex, srec and bin; addresses says what the addresses of records count",
+            "forms are hex, srec and bin; addresses defines what the addresses of records count",
         )
     })?;
     Ok(image.into())

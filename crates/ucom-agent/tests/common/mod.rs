@@ -123,7 +123,7 @@ impl Served {
         let ended = Arc::new(AtomicBool::new(false));
         let end = ended.clone();
         let thread = std::thread::spawn(move || {
-            agent_kit::serve::serve(agent.router(), listener, move || end.load(Ordering::Relaxed))
+            agent_kit::serve::serve(agent.router(), listener, None, move || end.load(Ordering::Relaxed))
                 .expect("it serves");
             owner.end();
         });

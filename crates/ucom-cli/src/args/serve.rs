@@ -29,6 +29,12 @@ pub struct ServeArgs {
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
+    /// Certificate chain, PEM: the agent speaks TLS
+    #[arg(long, env = "UCOM_TLS_CERT", value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+    /// Private key of that certificate, PEM; not every user may read it
+    #[arg(long, env = "UCOM_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
 }

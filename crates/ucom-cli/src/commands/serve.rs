@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use agent_kit::access::{Access, Tokens, token_file};
 use agent_kit::log::CommandLog;
-use agent_kit::serve as service;
+use agent_kit::{serve as service, tls};
 use cli_kit::{ErrorKind, Failure, Output};
 use serde_json::json;
 use ucom::Profile;
@@ -43,6 +43,8 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
+    let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
+    let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
             .hint("another agent may listen there: name another address with --listen")
@@ -53,20 +55,20 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;
-    if !address.ip().is_loopback() {
-        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it");
+    if !address.ip().is_loopback() && tls.is_none() {
+        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
     }
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
     let access = Access::new(tokens, address, &args.names);
     let agent = Agent::new(&owner, access, Arc::new(Mutex::new(log)), &bus, args.sim)?;
-    let url = format!("http://{address}");
+    let url = format!("{}://{address}", if tls.is_some() { "https" } else { "http" });
     let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim, "bus": bus });
     out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
     let lost = owner.lost();
     let gone = owner.lost();
-    service::serve(agent.router(), listener, move || stop.asked() || lost().is_some())?;
+    service::serve(agent.router(), listener, tls, move || stop.asked() || lost().is_some())?;
     let gone = gone();
     owner.end();
     drop(simulated);

@@ -219,9 +219,14 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     }
     let file = open(path)?;
     #[cfg(feature = "mcap")]
-    return mcap::read_log(file).map_err(|e| e.at(path));
+    {
+        mcap::read_log(file).map_err(|e| e.at(path))
+    }
     #[cfg(not(feature = "mcap"))]
-    return Ok(drop(file)).map(|()| None);
+    {
+        drop(file);
+        Ok(None)
+    }
 }
 
 /// A recording that was read back.

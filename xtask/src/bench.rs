@@ -43,6 +43,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         run(&mut cargo(&["build", "--profile", "dist", "--package", package, "--example", example]))?;
     }
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-plan", "--example", "plans"]))?;
+    run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-client", "--example", "stops"]))?;
     python::environment("requirements.txt")?;
     let mut figures = Figures::new();
     let load = Load::now();
@@ -54,6 +55,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut planned()?);
         keep_best(&mut figures, samples);
     }
+    // Once: the worst of many is not the best of some worst.
+    figures.append(&mut stops(quick)?);
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
         figures.insert("sim_times_real_time".into(), 1e6 / ns);
@@ -143,6 +146,13 @@ fn planned() -> Result<Figures> {
     script.arg(root().join("references/plan/bench_plan.py")).arg(shell::target().join("dist/examples/plans"));
     script.env("PYTHONDONTWRITEBYTECODE", "1");
     object(&shell::read(&mut script)?)
+}
+
+/// How soon a Stop is on the line of an agent.
+fn stops(quick: bool) -> Result<Figures> {
+    println!("\nStops of an agent");
+    let count = if quick { "40" } else { "200" };
+    object(&shell::read(command(shell::target().join("dist/examples/stops")).arg(count))?)
 }
 
 /// The numbers of a JSON object.

@@ -1,7 +1,8 @@
-//! Every direct dependency of a manifest has its line in docs/dependencies.md, and no line has lost its dependency.
+//! Every direct dependency of a manifest, of a list of Python's or of Node's, has its line in docs/dependencies.md, and no line has lost its dependency.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
+use serde_json::Value;
 
 use crate::shell::{files, root};
 
@@ -53,6 +54,14 @@ pub fn check() -> Result<()> {
     for path in files(&root().join("references"), &["txt"]) {
         let list = std::fs::read_to_string(path)?;
         used.extend(list.lines().filter_map(|line| line.split_once("==")).map(|(name, _)| name.to_owned()));
+    }
+    for path in files(&root().join("references"), &["json"]) {
+        if path.file_name().is_some_and(|name| name == "package.json") {
+            let package: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
+            used.extend(
+                package["dependencies"].as_object().into_iter().flatten().map(|(name, _)| name.clone()),
+            );
+        }
     }
     let own: BTreeSet<String> = std::fs::read_dir(root().join("crates"))?
         .flatten()

@@ -5,8 +5,8 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::shell::{self, run, run_lines, works};
+use crate::suite::count_results;
 use crate::tally::{Counts, Outcome, Tally};
-use crate::test::count_results;
 use crate::{firmware, python, size};
 
 /// Figures of the boards' programs, kept in the repository so that a change to them is a decision.

@@ -7,8 +7,8 @@ use object::{Object, ObjectSection, ObjectSegment, SectionFlags};
 
 use crate::panics::reachable_panics;
 use crate::shell::{self, run};
+use crate::suite::count_results;
 use crate::tally::{Counts, Outcome};
-use crate::test::count_results;
 
 /// What the board's code is compiled for.
 pub const TARGET: &str = "thumbv7em-none-eabihf";

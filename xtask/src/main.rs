@@ -15,6 +15,7 @@ mod rules;
 mod shell;
 mod size;
 mod soak;
+mod suite;
 mod tally;
 mod test;
 mod worked_bytes;

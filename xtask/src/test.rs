@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
 use crate::shell::{self, Scratch, cargo, run};
-use crate::tally::{Counts, Outcome, Tally};
-use crate::{dependencies, emulate, firmware, links, python, rules, size, worked_bytes};
+use crate::tally::{Outcome, Tally};
+use crate::{dependencies, emulate, firmware, links, python, rules, size, suite, worked_bytes};
 
 /// Crates that run on the board.
 const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core", "ucom"];
@@ -34,7 +34,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             ["clippy", "--package", "jtc-host", "--no-default-features", "--", "-D", "warnings"];
         passed(run(&mut cargo(&without_formats)))
     });
-    tally.step("tests, properties and fuzz regressions", workspace_tests);
+    tally.step("tests, properties and fuzz regressions", suite::run);
     if !quick {
         tally.step("builds for the board (no_std)", || passed(board_builds()));
         tally.step("memory of the controller", || passed(size::check()));
@@ -67,32 +67,6 @@ fn passed(result: Result<()>) -> Result<Outcome> {
 /// What git sees as changed; `None` outside a checkout.
 fn tree() -> Option<String> {
     shell::read(shell::command("git").args(["status", "--porcelain"])).ok()
-}
-
-/// Tests of the workspace; cargo's own counts are summed up.
-fn workspace_tests() -> Result<Outcome> {
-    let mut counts = Counts::default();
-    let mut test = cargo(&["test", "--workspace", "--no-fail-fast"]);
-    let result = shell::run_lines(&mut test, |line| count_results(line, &mut counts));
-    if counts.failed == 0 {
-        result?;
-        ensure!(counts.passed > 0, "cargo ran no test at all");
-    }
-    Ok(Outcome::Counted(counts))
-}
-
-/// Adds the numbers of a line of cargo's, if it is one with results.
-pub fn count_results(line: &str, counts: &mut Counts) {
-    let Some(rest) = line.strip_prefix("test result: ") else { return };
-    counts.passed += count(rest, "passed");
-    counts.failed += count(rest, "failed");
-    counts.skipped += count(rest, "ignored");
-}
-
-/// The number before `word` in cargo's result line.
-fn count(line: &str, word: &str) -> u64 {
-    let Some((before, _)) = line.split_once(&format!(" {word}")) else { return 0 };
-    before.rsplit(' ').next().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
 fn board_builds() -> Result<()> {

@@ -49,6 +49,7 @@ struct Received {
 
 /// The datagram of a frame, stamped with the time of day.
 pub(crate) fn encode(frame: &CanFrame) -> Vec<u8> {
+    #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let sent = Sent {
         timestamp: now.as_secs_f64(),

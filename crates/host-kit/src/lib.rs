@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod clock;
 mod diagnosis;
 mod finding;
 mod kind;
@@ -10,6 +11,7 @@ pub mod mcap;
 mod user_folder;
 mod whole;
 
+pub use clock::unix_time;
 pub use diagnosis::{Diagnose, Diagnosis};
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;

@@ -53,16 +53,33 @@ impl Http {
         (status, serde_json::from_str(&body).unwrap_or(Value::Null))
     }
 
+    /// Status, head and bytes of what somebody gets with this token, or none, for a request without a body.
+    pub fn bytes_as(&self, token: Option<&String>, request: &str) -> (u16, String, Vec<u8>) {
+        let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
+        let host = self.address;
+        let all = self.exchange_bytes(&format!(
+            "{request} HTTP/1.1\r\nHost: {host}\r\n{token}Connection: close\r\n\r\n"
+        ));
+        let end = all.windows(4).position(|four| four == b"\r\n\r\n").unwrap_or(all.len());
+        let head = String::from_utf8_lossy(&all[..end]).into_owned();
+        (status(&head), head, all.get(end + 4..).unwrap_or_default().to_vec())
+    }
+
     fn exchange(&self, request: &str) -> (u16, String) {
+        let all = self.exchange_bytes(request);
+        let all = String::from_utf8_lossy(&all);
+        let body = all.split_once("\r\n\r\n").map_or("", |(_, body)| body);
+        (status(&all), body.to_owned())
+    }
+
+    fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time");
         // One that is refused may be closed before all of it is written.
         let _ = stream.write_all(request.as_bytes());
-        let mut all = String::new();
-        let _ = stream.read_to_string(&mut all);
-        let status = all.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-        let body = all.split_once("\r\n\r\n").map_or("", |(_, body)| body);
-        (status, body.to_owned())
+        let mut all = Vec::new();
+        let _ = stream.read_to_end(&mut all);
+        all
     }
 
     /// The first event behind a number that `is` this one, and its number; none is left out on the way.
@@ -117,6 +134,11 @@ impl Http {
             }
         }
     }
+}
+
+/// The status in the first line of an answer; 0: there is none.
+fn status(answer: &str) -> u16 {
+    answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0)
 }
 
 /// Requests of other sites and with tokens of nobody are refused, whatever they ask.
@@ -191,4 +213,29 @@ pub fn idle_connections_are_closed(http: &Http) {
     let mut rest = Vec::new();
     first.read_to_end(&mut rest).expect("it is closed");
     assert!(!String::from_utf8_lossy(&rest).contains("200"));
+}
+
+/// Requests that wait for an event are so many at once; more are answered at once, and those that wait receive what they wait for. `begin`
+/// begins the first job of the agent.
+pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
+    const MOST: usize = 64;
+    const MORE: usize = 16;
+    let (answered, answers) = std::sync::mpsc::channel();
+    for _ in 0..MOST + MORE {
+        let (http, answered) = (http.clone(), answered.clone());
+        std::thread::spawn(move || {
+            let (status, found) = http.api("GET /api/events?job=1&wait_s=8", None, None);
+            // The test may have failed meanwhile.
+            let _ = answered.send((status, found["events"].as_array().map_or(0, Vec::len)));
+        });
+    }
+    let next = || answers.recv_timeout(3 * PATIENCE).expect("an answer");
+    for _ in 0..MORE {
+        assert_eq!(next(), (200, 0), "one that finds no place is answered at once, and there is nothing yet");
+    }
+    begin();
+    for n in 0..MOST {
+        let (status, events) = next();
+        assert!(status == 200 && events > 0, "{n}: {status}, {events} events: it did not wait for them");
+    }
 }

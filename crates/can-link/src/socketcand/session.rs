@@ -208,6 +208,7 @@ fn count(counter: &AtomicU64, number: usize) {
 /// The lines of the frames and states that have a form; how many frames are there and how many are left out.
 fn write_batch(received: &[Received], text: &mut String) -> (usize, usize) {
     text.clear();
+    #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let (mut carried, mut not_carried) = (0, 0);
     for received in received {

@@ -2,16 +2,19 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use axum::Json;
 use axum::body::Body;
-use axum::extract::{ConnectInfo, Query, Request, State};
+use axum::extract::rejection::ExtensionRejection;
+use axum::extract::{ConnectInfo, FromRequestParts, Query, Request, State};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use serde_json::json;
 
 use crate::access::{self, Access, Entry, Refusal, Role, looks};
 use crate::api::Problem;
+use crate::lease::key_of;
 use crate::log::CommandLog;
 
 /// Longest name of a client.
@@ -50,6 +53,37 @@ pub struct Caller {
     pub looks_only: bool,
     /// Where it is.
     pub peer: SocketAddr,
+}
+
+/// Who asks, and with the key of which lease, if it sends one.
+#[derive(Clone, Debug)]
+pub struct Asker {
+    /// Who it is.
+    pub caller: Caller,
+    key: Option<Box<str>>,
+}
+
+impl Asker {
+    /// The key that it sends.
+    pub fn key(&self) -> Option<&str> {
+        self.key.as_deref()
+    }
+}
+
+impl From<Caller> for Asker {
+    /// Who sends no key.
+    fn from(caller: Caller) -> Self {
+        Self { caller, key: None }
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Asker {
+    type Rejection = ExtensionRejection;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ExtensionRejection> {
+        let Extension(caller) = Extension::from_request_parts(parts, state).await?;
+        Ok(Self { caller, key: key_of(&parts.headers).map(Into::into) })
+    }
 }
 
 /// A name without what would disturb a line of text.

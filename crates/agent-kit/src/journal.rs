@@ -1,9 +1,9 @@
 //! What happened, in its order: events with numbers, so that whoever lost the connection asks for those behind the last one it has.
 use std::collections::VecDeque;
-use std::sync::{Mutex, PoisonError};
-use std::time::SystemTime;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use tokio::sync::watch;
+use utoipa::ToSchema;
 
 /// Events that are kept: some hours of work, or the last minutes of one that reports much.
 const KEPT: usize = 4096;
@@ -15,7 +15,8 @@ pub trait Happening: Clone {
 }
 
 /// An event.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
+#[schema(as = EventObject)]
 pub struct Entry<E> {
     /// Counts up from 1 as long as this agent runs.
     pub number: u64,
@@ -41,23 +42,35 @@ struct Kept<E> {
     last: u64,
 }
 
+/// Who sees each event when it is written.
+type Follower<E> = Box<dyn Fn(&E) + Send + Sync>;
+
 /// The events of an agent.
 pub struct Journal<E> {
     kept: Mutex<Kept<E>>,
     last: watch::Sender<u64>,
+    follower: OnceLock<Follower<E>>,
 }
 
 impl<E> Default for Journal<E> {
     fn default() -> Self {
         let kept = Kept { events: VecDeque::new(), last: 0 };
-        Self { kept: Mutex::new(kept), last: watch::Sender::new(0) }
+        Self { kept: Mutex::new(kept), last: watch::Sender::new(0), follower: OnceLock::new() }
     }
 }
 
 impl<E: Happening> Journal<E> {
+    /// Has each event from now on seen by `follower`, in the thread that writes it; the first one stays.
+    pub fn follow(&self, follower: impl Fn(&E) + Send + Sync + 'static) {
+        let _ = self.follower.set(Box::new(follower));
+    }
+
     /// Something has happened.
     pub fn write(&self, event: E) {
-        let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        if let Some(follower) = self.follower.get() {
+            follower(&event);
+        }
+        let unix = host_kit::unix_time();
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.last += 1;
         let number = kept.last;

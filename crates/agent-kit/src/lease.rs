@@ -3,17 +3,60 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use axum::http::HeaderMap;
+use host_kit::ErrorKind;
+use utoipa::{IntoParams, ToSchema};
 
-use crate::api::Problem;
+use crate::api::{Problem, ProblemWith};
 
 /// The header with the key of a lease.
 pub const KEY: &str = "lease-key";
 /// How long a lease may last without a request, s.
-pub const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
+const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
+/// The same where a client does not ask for it.
+const LASTS_DEFAULT_S: f64 = 10.0;
 /// Clients at once.
 const CLIENTS_MAX: usize = 32;
 /// A client that has asked for nothing for so long behind the end of its lease is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
+
+/// How long a lease lasts without a request of a client that does not ask for it, s.
+pub fn default_lasts_s() -> f64 {
+    LASTS_DEFAULT_S
+}
+
+/// How long a lease is to last without a request.
+///
+/// # Errors
+///
+/// It is to last longer than is possible, or less.
+pub fn lasts(lasts_s: f64) -> Result<Duration, Problem> {
+    if LASTS_S.contains(&lasts_s) {
+        return Ok(Duration::from_secs_f64(lasts_s));
+    }
+    let (least, most) = LASTS_S.into_inner();
+    let message = format!("lasts_s is {lasts_s}: {least} to {most} s are possible");
+    Err(Problem::new("lease", message, "choose how long it may last without a request")
+        .kind(ErrorKind::Usage))
+}
+
+/// The key of a lease, in the description of a request.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Header)]
+pub struct LeaseKey {
+    /// Key of the lease
+    #[param(rename = "Lease-Key")]
+    _key: String,
+}
+
+/// How a lease is.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LeaseState {
+    /// This client commands.
+    pub held: bool,
+    /// Who asks for the lease.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_by: Option<String>,
+}
 
 /// A client by number; numbers are not used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -57,6 +100,14 @@ pub enum Denied {
         /// For how long, s.
         age_s: u64,
     },
+    /// Another client has asked for the lease before.
+    #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
+    Awaited {
+        /// Who commands.
+        holder: String,
+        /// Who waits.
+        by: String,
+    },
     /// It sends no key.
     #[error("commands need a lease")]
     NoKey,
@@ -68,7 +119,7 @@ pub enum Denied {
     Full,
 }
 
-impl From<Denied> for Problem {
+impl<F: Default> From<Denied> for ProblemWith<F> {
     fn from(denied: Denied) -> Self {
         let text = denied.to_string();
         match denied {
@@ -76,6 +127,11 @@ impl From<Denied> for Problem {
                 "denied",
                 text,
                 "GET /api/status shows who commands; ask for the lease with POST /api/lease and ask: true",
+            ),
+            Denied::Awaited { .. } => Self::new(
+                "denied",
+                text,
+                "ask again when that one has had the lease: GET /api/status shows it",
             ),
             Denied::NoKey | Denied::Unknown => Self::new(
                 "no-lease",
@@ -118,11 +174,12 @@ pub fn key_of(headers: &HeaderMap) -> Option<&str> {
 }
 
 impl<P: Clone> Leases<P> {
-    /// A client comes and takes the lease, or waits for it where it is to `ask` the one who has it. True: it commands.
+    /// A client comes and takes the lease, or waits for it where it is to `ask` the one who has it. True: it commands. The first who waits keeps its
+    /// place until it gets the lease, is forgotten, or has not shown for as long as its own lease would last that it is there.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another one commands, or too many have come; this one is not known then.
+    /// [`Denied`]: another one commands or waits, or too many have come; this one is not known then.
     pub fn admit(
         &mut self,
         key: &str,
@@ -132,6 +189,12 @@ impl<P: Clone> Leases<P> {
     ) -> Result<(ClientId, bool), Denied> {
         let held = match self.held_by_another(key, now) {
             Some(denied) if !ask => return Err(denied),
+            Some(_) if self.first(now).is_some() => {
+                let lease = self.lease().zip(self.first(now));
+                let (holder, by) =
+                    lease.map_or_else(Default::default, |(lease, first)| (lease.holder, first.name.clone()));
+                return Err(Denied::Awaited { holder, by });
+            }
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
@@ -182,18 +245,44 @@ impl<P: Clone> Leases<P> {
     /// Lets the lease go, to the client that has asked for it if one has; the client is forgotten.
     pub fn release(&mut self, key: &str, now: Duration) {
         self.clients.remove(key);
-        if let Some(held) = self.held.take_if(|held| held.key == key)
-            && let Some(next) = held.wanted_by.filter(|next| self.clients.contains_key(next))
-        {
-            self.hold(&next, now);
+        if let Some(held) = self.held.take_if(|held| held.key == key) {
+            self.pass_on(held.wanted_by, now);
         }
     }
 
-    /// Ends the lease that has lapsed, and forgets clients that do not come back. Whose lease it was.
+    /// Ends the lease that has lapsed, which the client that has asked for it gets if one has, and forgets clients that do not come back.
+    /// Whose lease it was.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
-        self.clients.retain(|_, client| now.saturating_sub(client.seen) < client.lasts + FORGOTTEN);
+        // Whose lease it is, or was until now, is known for certain: its policy has to be followed.
+        let holder = self.held.as_ref().map(|held| held.key.clone());
+        self.clients.retain(|key, client| {
+            Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
+        });
         let held = self.held.take_if(|held| now >= held.until)?;
+        self.pass_on(held.wanted_by, now);
         self.clients.get(&held.key).cloned()
+    }
+
+    /// Whether this client commands.
+    pub fn holds(&self, client: ClientId, now: Duration) -> bool {
+        let held = self.held.as_ref().filter(|held| now < held.until);
+        held.and_then(|held| self.clients.get(&held.key)).is_some_and(|holder| holder.id == client)
+    }
+
+    /// Who waits for the lease, and is there.
+    fn first(&self, now: Duration) -> Option<&Client<P>> {
+        let first = self.clients.get(self.held.as_ref()?.wanted_by.as_ref()?)?;
+        Some(first).filter(|first| now.saturating_sub(first.seen) < first.lasts)
+    }
+
+    fn pass_on(&mut self, wanted_by: Option<String>, now: Duration) {
+        if let Some(next) = wanted_by.filter(|next| self.clients.contains_key(next)) {
+            self.hold(&next, now);
+            // It is not forgotten sooner than one who takes the lease now.
+            if let Some(client) = self.clients.get_mut(&next) {
+                client.seen = now;
+            }
+        }
     }
 
     /// Who commands.
@@ -248,6 +337,8 @@ mod tests {
         assert_eq!(leases.lease().and_then(|lease| lease.wanted_by), Some("bob".into()));
         leases.release("anna", s(4));
         assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(14))));
+        assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
+        assert!(leases.holds(ClientId(2), s(13)));
         // A command renews it; then it lapses, once.
         assert!(leases.command(Some("bob"), s(13)).is_ok());
         assert_eq!(leases.lapse(s(22)), None);
@@ -257,6 +348,67 @@ mod tests {
         assert!(leases.command(Some("bob"), s(30)).is_ok());
         assert!(leases.lapse(s(40)).is_some() && leases.lapse(s(200)).is_none());
         assert_eq!(leases.command(Some("bob"), s(200)).err(), Some(Denied::Unknown));
+    }
+
+    #[test]
+    fn a_lease_that_lapses_goes_to_the_one_who_has_asked_for_it() {
+        let mut leases = Leases::default();
+        leases.admit("a", ("anna", s(2), ()), false, s(0)).expect("nobody has it");
+        assert_eq!(leases.admit("b", ("bob", s(5), ()), true, s(1)).map(|(_, held)| held), Ok(false));
+        assert_eq!(leases.lapse(s(2)).map(|client| client.name), Some("anna".into()));
+        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(7))));
+        assert!(leases.admit("c", ("carl", s(5), ()), false, s(3)).is_err());
+        assert!(leases.command(Some("b"), s(3)).is_ok() && leases.command(Some("a"), s(3)).is_err());
+        // Nobody waits any more; and one who waited and is forgotten gets nothing.
+        assert!(leases.lapse(s(8)).is_some() && leases.lease().is_none());
+        leases.admit("d", ("dora", s(60), ()), false, s(8)).expect("nobody has it");
+        leases.admit("e", ("emil", s(1), ()), true, s(8)).expect("he may wait");
+        leases.clients.remove("e");
+        assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
+    }
+
+    /// However long before its end it was asked for, and however late that end is looked at: whose lease it was is known, once.
+    #[test]
+    fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
+        for let_go in 1..=70 {
+            for looked in [let_go + 5, let_go + 200] {
+                let mut leases = Leases::default();
+                leases.admit("a", ("anna", s(60), ()), false, s(0)).expect("nobody has it");
+                leases.admit("b", ("bob", s(5), ()), true, s(0)).expect("he may wait");
+                leases.command(Some("a"), s(30)).expect("she commands");
+                leases.lapse(s(let_go - 1));
+                let had = leases.clients.contains_key("b");
+                leases.release("a", s(let_go));
+                assert_eq!(leases.lapse(s(let_go + 4)), None);
+                assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
+                let lapsed = leases.lapse(s(looked)).map(|client| client.name);
+                assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
+                // He may come back as everyone else.
+                assert!(looked > let_go + 5 || leases.command(Some("b"), s(looked)).is_ok() == had);
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_who_asks_keeps_its_place_as_long_as_it_waits() {
+        let mut leases = Leases::default();
+        let ask = |leases: &mut Leases<()>, key: &str, at| {
+            leases.admit(key, (key, s(5), ()), true, s(at)).map(|(_, held)| held)
+        };
+        assert_eq!(ask(&mut leases, "anna", 0), Ok(true));
+        assert_eq!(ask(&mut leases, "bob", 1), Ok(false));
+        let awaited = Err(Denied::Awaited { holder: "anna".into(), by: "bob".into() });
+        assert_eq!(ask(&mut leases, "carl", 2), awaited);
+        // He shows that he waits, as anna that she commands.
+        assert!(leases.command(Some("bob"), s(4)).is_err() && leases.command(Some("anna"), s(4)).is_ok());
+        assert_eq!(ask(&mut leases, "carl", 8), awaited);
+        assert!(leases.command(Some("anna"), s(8)).is_ok());
+        assert_eq!(ask(&mut leases, "carl", 9), Ok(false), "bob is silent");
+        leases.release("carl", s(9));
+        assert_eq!(ask(&mut leases, "dora", 9), Ok(false), "carl has given up");
+        leases.release("anna", s(10));
+        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.wanted_by)), Some(("dora".into(), None)));
+        assert_eq!(ask(&mut leases, "emil", 10), Ok(false));
     }
 
     #[test]
@@ -274,8 +426,10 @@ mod tests {
     fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
         for n in 0..3 * CLIENTS_MAX {
-            let now = s(n as u64 / 10);
-            leases.admit(&n.to_string(), ("x", s(60), ()), true, now).expect("there is room");
+            // Each when the one before waits no more.
+            let now = s(2 * n as u64);
+            let lasts = s(if n == 0 { 60 } else { 1 });
+            leases.admit(&n.to_string(), ("x", lasts, ()), true, now).expect("there is room");
             leases.command(Some("0"), now).expect("the first one commands");
             assert!(leases.clients.len() <= CLIENTS_MAX);
         }

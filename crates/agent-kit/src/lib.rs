@@ -3,9 +3,13 @@
 
 pub mod access;
 pub mod api;
+pub mod events;
 pub mod gate;
 pub mod journal;
 pub mod lease;
 pub mod log;
+pub mod openapi;
+mod problem;
 pub mod serve;
+pub mod socket;
 pub mod tls;

@@ -1,12 +1,11 @@
 //! The log of commands: who, what, when, result; appended to and never rewritten.
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write as _};
+use std::fs::OpenOptions;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::SystemTime;
 
 use serde_json::{Value, json};
 
@@ -22,10 +21,13 @@ pub struct CommandLog {
     /// Lines that found no place since the last that did.
     lost: u64,
     lost_in_all: u64,
+    /// Lines that the disk did not take.
+    unwritten: Arc<AtomicU64>,
 }
 
 /// What is written whatever else is: what moved something, who stopped it. The rest leaves half of the room free.
-const NEEDED: [&str; 7] = ["sent", "answered", "command", "halt", "lease", "policy", "not-taken"];
+const NEEDED: [&str; 10] =
+    ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
     /// Goes on with this file, or begins it; none: nothing is kept. `failed` is called, on the writer's thread, with the first error of
@@ -36,20 +38,30 @@ impl CommandLog {
     /// It cannot be opened.
     pub fn open(path: Option<&Path>, failed: impl FnMut(&io::Error) + Send + 'static) -> io::Result<Self> {
         let Some(path) = path else {
-            return Ok(Self { lines: None, writer: None, waiting: Arc::default(), lost: 0, lost_in_all: 0 });
+            return Ok(Self {
+                lines: None,
+                writer: None,
+                waiting: Arc::default(),
+                lost: 0,
+                lost_in_all: 0,
+                unwritten: Arc::default(),
+            });
         };
-        let file = OpenOptions::new().append(true).create(true).open(path)?;
+        Ok(Self::on(OpenOptions::new().append(true).create(true).open(path)?, failed))
+    }
+
+    fn on(file: impl io::Write + Send + 'static, failed: impl FnMut(&io::Error) + Send + 'static) -> Self {
         let (lines, incoming) = sync_channel(WAITING_MAX);
-        let waiting: Arc<AtomicUsize> = Arc::default();
-        let done = waiting.clone();
-        let writer = std::thread::spawn(move || write(file, &incoming, &done, failed));
-        Ok(Self { lines: Some(lines), writer: Some(writer), waiting, lost: 0, lost_in_all: 0 })
+        let (waiting, unwritten) = (Arc::<AtomicUsize>::default(), Arc::<AtomicU64>::default());
+        let (done, missing) = (waiting.clone(), unwritten.clone());
+        let writer = std::thread::spawn(move || write(file, &incoming, &done, &missing, failed));
+        Self { lines: Some(lines), writer: Some(writer), waiting, lost: 0, lost_in_all: 0, unwritten }
     }
 
     /// Writes a line: what happened, and what is to be known of it. Never waits.
     pub fn write(&mut self, what: &str, mut facts: Value) {
         let Some(lines) = &self.lines else { return };
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let since = host_kit::unix_time();
         let mut line = json!({ "unix_s": since.as_secs_f64(), "what": what });
         if let (Some(line), Some(facts)) = (line.as_object_mut(), facts.as_object_mut()) {
             line.append(facts);
@@ -70,9 +82,9 @@ impl CommandLog {
 }
 
 impl CommandLog {
-    /// Lines that found no place.
+    /// Lines that found no place, or that the disk did not take.
     pub fn lost_in_all(&self) -> u64 {
-        self.lost_in_all
+        self.lost_in_all + self.unwritten.load(Ordering::Relaxed)
     }
 }
 
@@ -86,16 +98,122 @@ impl Drop for CommandLog {
     }
 }
 
-fn write(mut file: File, lines: &Receiver<Value>, waiting: &AtomicUsize, mut failed: impl FnMut(&io::Error)) {
-    let mut fails = false;
-    for line in lines {
+fn write(
+    mut file: impl io::Write,
+    lines: &Receiver<Value>,
+    waiting: &AtomicUsize,
+    unwritten: &AtomicU64,
+    mut failed: impl FnMut(&io::Error),
+) {
+    let (mut fails, mut cut, mut lost) = (false, false, 0);
+    for mut line in lines {
         waiting.fetch_sub(1, Ordering::Relaxed);
-        let written = writeln!(file, "{line}");
-        if let Err(error) = &written
-            && !fails
+        if lost > 0
+            && let Some(line) = line.as_object_mut()
         {
-            failed(error);
+            let before = line.get("lines_lost_before").and_then(Value::as_u64).unwrap_or(0);
+            line.insert("lines_lost_before".into(), (before + lost).into());
+        }
+        // A line that broke off is ended first: only that one is lost.
+        let text = format!("{}{line}\n", if cut { "\n" } else { "" });
+        let (taken, written) = write_whole(&mut file, text.as_bytes());
+        if let Some(last) = taken.checked_sub(1).and_then(|last| text.as_bytes().get(last)) {
+            cut = *last != b'\n';
+        }
+        match &written {
+            Ok(()) => lost = 0,
+            Err(error) => {
+                lost += 1;
+                unwritten.fetch_add(1, Ordering::Relaxed);
+                if !fails {
+                    failed(error);
+                }
+            }
         }
         fails = written.is_err();
+    }
+}
+
+/// How many bytes were taken, and whether all were.
+fn write_whole(file: &mut impl io::Write, bytes: &[u8]) -> (usize, io::Result<()>) {
+    let mut taken = 0;
+    while let Some(rest @ [_, ..]) = bytes.get(taken..) {
+        match file.write(rest) {
+            Ok(0) => return (taken, Err(io::ErrorKind::WriteZero.into())),
+            Ok(n) => taken += n,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return (taken, Err(error)),
+        }
+    }
+    (taken, Ok(()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Mutex, PoisonError};
+
+    use super::*;
+
+    /// A disk with room for so many bytes, and what it has taken.
+    #[derive(Clone, Default)]
+    struct Disk(Arc<Mutex<(usize, Vec<u8>)>>);
+
+    impl Disk {
+        fn with<T>(&self, act: impl FnOnce(&mut (usize, Vec<u8>)) -> T) -> T {
+            act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        }
+    }
+
+    impl io::Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.with(|(room, taken)| {
+                let n = bytes.len().min(*room);
+                *room -= n;
+                taken.extend(&bytes[..n]);
+                if n > 0 { Ok(n) } else { Err(io::ErrorKind::StorageFull.into()) }
+            })
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// However full the disk is when: it is reported once for each time, lines are whole but for the one that broke off, and the next one
+    /// names how many are missing.
+    #[test]
+    fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
+        for room in 0..120 {
+            let (disk, failures) = (Disk::default(), Arc::<AtomicUsize>::default());
+            disk.with(|(left, _)| *left = room);
+            let failed = failures.clone();
+            let mut log = CommandLog::on(disk.clone(), move |_| {
+                failed.fetch_add(1, Ordering::Relaxed);
+            });
+            let done = |log: &CommandLog| {
+                while log.waiting.load(Ordering::Relaxed) > 0 {
+                    std::thread::yield_now();
+                }
+            };
+            (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
+            done(&log);
+            // The last line may be at the disk still: three more are refused for certain, or taken after it.
+            disk.with(|(left, _)| *left = usize::MAX);
+            (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
+            log.writer.take().map(|writer| {
+                log.lines = None;
+                writer.join()
+            });
+            let text = disk.with(|(_, taken)| String::from_utf8(taken.clone()).expect("text"));
+            let whole: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+            let lost = log.lost_in_all();
+            // One of which the end of the line alone was not taken is counted, and there.
+            assert!((8..=9).contains(&(whole.len() as u64 + lost)), "{room}: {text}");
+            assert!(text.lines().count() <= whole.len() + 1, "{room}: one line breaks off: {text}");
+            assert_eq!(whole.last().map(|line| line["n"].clone()), Some(7.into()));
+            let named: u64 = whole.iter().filter_map(|line| line["lines_lost_before"].as_u64()).sum();
+            assert_eq!(named, lost, "{room}: {text}");
+            assert_eq!(failures.load(Ordering::Relaxed), usize::from(lost > 0), "{room}");
+        }
     }
 }

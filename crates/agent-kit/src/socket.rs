@@ -1,0 +1,75 @@
+//! Sockets: how many at once, and what those send and receive that only look.
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse as _, Response};
+use serde::Serialize;
+use tokio::sync::Semaphore;
+
+use crate::access::Role;
+
+/// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
+const VIEWERS_MAX: usize = 128;
+const OPERATORS_MAX: usize = 32;
+/// Longest message of a client that only looks, bytes.
+pub const MESSAGE_MAX: usize = 1024;
+/// Pings of a client between two messages to it.
+const NOISE_MAX: u32 = 100;
+/// How long a client may leave a message untaken.
+const SEND_TIME: Duration = Duration::from_secs(5);
+
+/// The places for sockets.
+#[derive(Clone)]
+pub struct Sockets {
+    viewers: Arc<Semaphore>,
+    operators: Arc<Semaphore>,
+}
+
+impl Default for Sockets {
+    fn default() -> Self {
+        let places = |most| Arc::new(Semaphore::new(most));
+        Self { viewers: places(VIEWERS_MAX), operators: places(OPERATORS_MAX) }
+    }
+}
+
+impl Sockets {
+    /// Serves the socket that is asked for in such a role, where there is a place for it.
+    pub fn serve<F: Future<Output = ()> + Send + 'static>(
+        &self,
+        role: Role,
+        upgrade: WebSocketUpgrade,
+        serve: impl FnOnce(WebSocket) -> F + Send + 'static,
+    ) -> Response {
+        let places = match role {
+            Role::Operator => &self.operators,
+            Role::Viewer => &self.viewers,
+        };
+        let Ok(place) = places.clone().try_acquire_owned() else {
+            return StatusCode::SERVICE_UNAVAILABLE.into_response();
+        };
+        upgrade.on_upgrade(async move |socket| {
+            serve(socket).await;
+            drop(place);
+        })
+    }
+}
+
+/// Waits until the client has gone, or sends what it has no business to.
+pub(crate) async fn ended(socket: &mut WebSocket) {
+    let mut noise = 0;
+    while let Some(Ok(Message::Ping(_) | Message::Pong(_))) = socket.recv().await {
+        noise += 1;
+        if noise > NOISE_MAX {
+            return;
+        }
+    }
+}
+
+/// Sends a message as JSON. False when the client does not take it.
+pub(crate) async fn pass(socket: &mut WebSocket, message: &impl Serialize) -> bool {
+    // Made of strings and numbers.
+    let text = serde_json::to_string(message).unwrap_or_default();
+    matches!(tokio::time::timeout(SEND_TIME, socket.send(Message::Text(text.into()))).await, Ok(Ok(())))
+}

@@ -1,6 +1,7 @@
 //! Errors of reading, giving and keeping an arm as one thing.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use jtc_core::settings::SettingError;
 use jtc_wire::{Code, ControllerState, Joint, StoreState, TrajectoryState};
 
 use crate::arm::Difference;
@@ -40,6 +41,9 @@ pub enum ExtensionError {
         /// What the device is in.
         state: Code<ControllerState>,
     },
+    /// Settings that no controller takes, or not beside those that this one has (J-53).
+    #[error("{0}")]
+    Setting(#[source] SettingError),
     /// A payload that is no body, or none that a controller takes (J-60).
     #[error("{why}")]
     NoBody {
@@ -114,6 +118,11 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "powered",
                 "an arm is stored while it has no torque: `jtc disable` (an arm without brakes falls), then push again",
+            ),
+            Self::Setting(_) => Diagnosis::new(
+                ErrorKind::Usage,
+                "setting",
+                "docs/settings.md has all settings with their ranges; nothing was changed",
             ),
             Self::NoBody { .. } => Diagnosis::new(
                 ErrorKind::Usage,

@@ -1,9 +1,14 @@
 //! Where an error is, and by how much: what a program looks at instead of the words.
 
+use jtc_core::ConfigError;
+use jtc_core::settings::SettingError;
+use jtc_plan::kinematics::PoseError;
 use jtc_wire::{Joint, Status};
 
 use super::{CheckError, Error, ExtensionError, MotionError, StateError};
-use crate::check::Verdict;
+use crate::check::{ProblemKind, Verdict};
+use crate::plan::{ApproachError, PlanError};
+use crate::waypoints::WaypointError;
 use crate::{explain, words};
 
 /// What is known of an error beside its words; each part where it applies.
@@ -39,6 +44,110 @@ impl Facts {
         }
     }
 
+    /// Those of a motion that cannot be planned.
+    pub fn of_plan(error: &PlanError) -> Self {
+        use jtc_plan::PlanError as Of;
+        let known = |joint: Option<Joint>, value: f64, limit: f64| Self {
+            joint,
+            value: Some(value),
+            limit: Some(limit),
+            ..Self::default()
+        };
+        match error {
+            PlanError::Refused(verdict) => Self::of_verdict(verdict),
+            PlanError::Speed { percent, most } => known(None, *percent, *most),
+            PlanError::TooManyCorners { corners, most } => known(None, *corners as f64, *most as f64),
+            PlanError::Plan(Of::Position { joint, value, min, max, .. }) => {
+                let limit = if value < min { *min } else { *max };
+                known(Some(*joint), *value, limit).caused_by(ProblemKind::Position)
+            }
+            PlanError::Plan(Of::Torque { joint, torque, limit, .. }) => {
+                known(Some(*joint), *torque, *limit).caused_by(ProblemKind::Torque)
+            }
+            PlanError::Plan(Of::TooEarly { joint, given, shortest, .. }) => {
+                known(Some(*joint), *given, *shortest)
+            }
+            PlanError::Plan(Of::Time { time, before, .. }) => known(None, *time, *before),
+            PlanError::Plan(Of::NotFinite { joint, .. } | Of::Range { joint, .. }) => {
+                Self { joint: Some(*joint), ..Self::default() }
+            }
+            PlanError::Plan(Of::Limit { joint, value, .. }) => {
+                Self { joint: Some(*joint), value: Some(*value), ..Self::default() }
+            }
+            PlanError::Plan(Of::Flange(error)) => Self::of_pose(error),
+            _ => Self::default(),
+        }
+    }
+
+    /// Those of a pose that the flange cannot have.
+    fn of_pose(error: &PoseError) -> Self {
+        match error {
+            PoseError::Waypoint { source, .. } | PoseError::Leg { source, .. } => Self::of_pose(source),
+            PoseError::OutsideLimits { joint, value, low, high } => {
+                let limit = if value < low { *low } else { *high };
+                let known =
+                    Self { joint: Some(*joint), value: Some(*value), limit: Some(limit), ..Self::default() };
+                known.caused_by(ProblemKind::Position)
+            }
+            PoseError::JointStep { joint, .. } => Self { joint: Some(*joint), ..Self::default() },
+            PoseError::Configuration { joint, value, wanted } => {
+                Self { joint: Some(*joint), value: Some(*value), limit: Some(*wanted), ..Self::default() }
+            }
+            _ => Self::default(),
+        }
+    }
+
+    /// Those of waypoints that the arm cannot be led through.
+    pub fn of_waypoints(error: &WaypointError) -> Self {
+        match error {
+            WaypointError::Route(error) => Self::of_plan(error),
+            WaypointError::Flange { source, .. } => Self::of_pose(source),
+            WaypointError::File(_) | WaypointError::Pose { .. } => Self::default(),
+        }
+    }
+
+    /// Those of a way to the first point that there is not.
+    pub fn of_approach(error: &ApproachError) -> Self {
+        match error {
+            ApproachError::Plan(error) => Self::of_plan(error),
+            ApproachError::Check(CheckError::Refused(verdict)) => Self::of_verdict(verdict),
+            ApproachError::Check(_) => Self::default(),
+        }
+    }
+
+    /// Those of a setting that is not taken.
+    fn of_setting(error: &SettingError) -> Self {
+        let known =
+            |joint, value, limit| Self { joint, value: Some(value), limit: Some(limit), ..Self::default() };
+        let nearest = |value: f64, low: f64, high: f64| if value < low { low } else { high };
+        match *error {
+            SettingError::Unknown { joint, .. } => {
+                Self { joint: Joint::from_number(joint.into()), ..Self::default() }
+            }
+            SettingError::Value { joint, value, low, high, .. } => {
+                known(Joint::from_number(joint.into()), value, nearest(value, low, high))
+            }
+            SettingError::Config(
+                ConfigError::Position { joint, value, limit }
+                | ConfigError::Range { joint, value, limit }
+                | ConfigError::TorqueScale { joint, value, limit }
+                | ConfigError::SpeedScale { joint, value, limit }
+                | ConfigError::SpeedTrip { joint, value, limit },
+            ) => known(Joint::from_number(joint), value, limit),
+            SettingError::Config(ConfigError::Braking { value, limit }) => {
+                known(None, value.into(), limit.into())
+            }
+            SettingError::Bounds(bounds) => {
+                known(None, bounds.value, nearest(bounds.value, bounds.low, bounds.high))
+            }
+            SettingError::Config(_) | SettingError::Payload(_) => Self::default(),
+        }
+    }
+
+    fn caused_by(self, kind: ProblemKind) -> Self {
+        Self { cause: cause(kind.words()), ..self }
+    }
+
     /// Those of the errors that a controller reports.
     pub fn of_status(status: &Status) -> Self {
         Self {
@@ -66,12 +175,13 @@ impl Error {
                 MotionError::RunFault { point, status }
                 | MotionError::PausedByController { point, status, .. },
             ) => Facts { point: Some(*point), ..Facts::of_status(status) },
-            Self::Motion(MotionError::RestRefused { point, .. }) => {
-                Facts { point: Some(*point), ..Facts::default() }
+            Self::Motion(MotionError::RestRefused { point, why }) => {
+                Facts { point: Some(*point), ..Facts::of_plan(why) }
             }
             Self::Extension(ExtensionError::TooHeavy { joint, torque, limit, .. }) => {
                 Facts { joint: Some(*joint), value: Some(*torque), limit: Some(*limit), ..Facts::default() }
             }
+            Self::Extension(ExtensionError::Setting(error)) => Facts::of_setting(error),
             _ => Facts::default(),
         }
     }
@@ -81,6 +191,7 @@ impl Error {
 mod tests {
     use super::*;
     use crate::check::CheckOptions;
+    use crate::plan::Planner;
     use crate::{Arm, CheckedTrajectory, Point, Trajectory};
 
     #[test]
@@ -97,6 +208,33 @@ mod tests {
         // As a frame carries it.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
+    }
+
+    /// A place outside the limits, one that takes more torque than there is, and a way there from outside: what planning refuses has the same
+    /// facts as what a check refuses.
+    #[test]
+    fn what_planning_refuses_has_joint_value_limit_and_cause() {
+        let arm = Arm::avena();
+        let config = arm.config().clone();
+        let planner = Planner { model: Some(&arm.model), ..Planner::new(&config) };
+        let rest = [0.0; 6];
+        let (low, high) = (config.joints[3].position_min, config.joints[1].position_max);
+        for (joint, place, limit) in [(4, low - 0.25, low), (2, high + 0.5, high)] {
+            let mut goal = rest;
+            goal[joint - 1] = place;
+            let facts = Facts::of_plan(&planner.to(&rest, &goal).expect_err("outside its limits"));
+            assert_eq!((facts.joint, facts.value), (Joint::from_number(joint), Some(place)));
+            assert_eq!((facts.limit, facts.point), (Some(limit), None));
+            assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
+        }
+        let mut weak = config.clone();
+        weak.joints[1].torque_max = 1.0;
+        let planner = Planner { model: Some(&arm.model), ..Planner::new(&weak) };
+        let refused = planner.to(&[0.0, 0.5, 0.0, 0.0, 0.0, 0.0], &[0.5, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        let facts = Facts::of_plan(&refused.expect_err("no torque"));
+        assert_eq!(facts.joint, Joint::from_number(2));
+        let (Some(value), Some(limit)) = (facts.value, facts.limit) else { panic!("{facts:?}") };
+        assert!(value > limit && limit <= 1.0 && facts.cause.is_some(), "{facts:?}");
     }
 
     #[test]

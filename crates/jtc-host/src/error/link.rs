@@ -106,6 +106,9 @@ impl Diagnose for LinkError {
                         "a number is beyond its bounds (`jtc arm check FILE`), or a joint cannot hold this arm where it stands, with its \
                          payload: `jtc payload show`, `jtc payload clear`",
                     ),
+                    FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => Some(
+                        "settings change without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
+                    ),
                     _ => None,
                 };
                 Diagnosis::new(ErrorKind::Device, "refused", next.unwrap_or_else(|| after_refusal(*code, *state)))

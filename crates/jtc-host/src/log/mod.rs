@@ -4,10 +4,12 @@
 //! needs. [`FlightLog::replay`] gives every tick of it with everything that the controller computed, and says which of them are known to be
 //! what was, bit for bit. [`Story`] puts what happened in order, what broke first in front.
 
+mod account;
 mod container;
 mod replay;
 mod story;
 
+pub use account::Account;
 pub use container::LogFileError;
 pub use replay::{Difference, Gap, Replayed, Tick, Worth};
 pub use story::{Event, Story};

@@ -26,6 +26,7 @@ mod samples;
 mod speed;
 #[cfg(test)]
 mod tests;
+mod way;
 
 use jtc_core::{Config, Friction, JOINTS};
 use jtc_dynamics::ArmModel;
@@ -39,6 +40,7 @@ pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use rest_of::rest_of;
 pub use speed::at_speed;
+pub use way::{Way, WayOptions};
 
 use crate::check::{Checker, HOLD_SHARE, Problem, ProblemKind, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};

@@ -37,6 +37,11 @@ pub trait Port {
     fn take_denial(&mut self) -> Option<String> {
         None
     }
+    /// What is written from now on was asked for now. A line that is shared with others passes on nothing that was asked for before
+    /// somebody stopped the arm; on others this has nothing to do.
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
 }
 
 impl<P: Port + ?Sized> Port for Box<P> {
@@ -57,6 +62,9 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
     fn take_denial(&mut self) -> Option<String> {
         (**self).take_denial()
+    }
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        (**self).ask_to_move()
     }
 }
 

@@ -86,6 +86,8 @@ pub struct RecordingInfo {
     pub arm: String,
     /// "simulator", or the serial port.
     pub source: String,
+    /// Who commanded the motion, where several may; empty otherwise.
+    pub commanded_by: String,
     /// Name of the trajectory.
     pub trajectory: String,
     /// Wall-clock time of sample time 0, ns since 1970; 0 when virtual time was recorded.

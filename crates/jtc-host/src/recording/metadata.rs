@@ -34,7 +34,12 @@ impl RecordingInfo {
         put("trajectory".into(), self.trajectory.clone());
         put("start_unix_ns".into(), self.start_unix_ns.to_string());
         put("flange_origin".into(), join(&self.flange));
-        for (key, value) in [("outcome", &self.ending.outcome), ("reason", &self.ending.reason)] {
+        let optional = [
+            ("commanded_by", &self.commanded_by),
+            ("outcome", &self.ending.outcome),
+            ("reason", &self.ending.reason),
+        ];
+        for (key, value) in optional {
             if !value.is_empty() {
                 put(key.into(), value.clone());
             }
@@ -94,6 +99,7 @@ impl RecordingInfo {
         Self {
             arm: text("arm"),
             source: text("source"),
+            commanded_by: text("commanded_by"),
             trajectory: text("trajectory"),
             start_unix_ns: text("start_unix_ns").parse().unwrap_or(0),
             joints,

@@ -33,7 +33,7 @@ mod schema;
 mod tests;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter};
+use std::io::{BufRead, BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 pub use broken_off::{BrokenOff, NothingLeft, Resumption};
@@ -179,13 +179,14 @@ pub fn write_into(
     Recorder::on(file, path, info)?.finish_with(samples)
 }
 
-/// Writes a whole recording and the log of a flight recorder that it was made of, into an MCAP file that is open already.
+/// Writes a whole recording and the log of a flight recorder that it was made of, as MCAP, into what is open already; `path` is what errors
+/// call it.
 ///
 /// # Errors
 ///
 /// A file that cannot be written, or a program that was built without MCAP.
 pub fn write_with_log(
-    file: File,
+    file: impl Write + Seek + Send,
     path: &Path,
     info: &RecordingInfo,
     samples: &[Sample],

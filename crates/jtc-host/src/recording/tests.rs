@@ -32,7 +32,12 @@ fn same(a: f64, b: f64) -> bool {
 fn check(name: &str) -> Recording {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
-    let mut info = RecordingInfo { arm: "avena".into(), source: "simulator".into(), ..Default::default() };
+    let mut info = RecordingInfo {
+        arm: "avena".into(),
+        source: "simulator".into(),
+        commanded_by: "anna".into(),
+        ..Default::default()
+    };
     for (j, joint) in info.joints.iter_mut().enumerate() {
         *joint = JointInfo {
             name: format!("joint_{}", j + 1),

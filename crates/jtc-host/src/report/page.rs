@@ -80,6 +80,7 @@ fn data(input: &ReportInput<'_>) -> Value {
         "version": env!("CARGO_PKG_VERSION"),
         "arm": info.arm,
         "source": info.source,
+        "commanded_by": info.commanded_by,
         "trajectory": info.trajectory,
         "start_unix_ms": info.start_unix_ns / 1_000_000,
         "joints": joints,

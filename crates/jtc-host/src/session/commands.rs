@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ControllerState, DataStatus, ExecCommand, FrameType, Status, TrajectoryState, fixed};
+use jtc_wire::{
+    ALL_NODES, ControllerState, DataStatus, ExecCommand, FrameType, Status, TrajectoryState, fixed,
+};
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
@@ -49,6 +51,17 @@ impl Parameter {
 }
 
 impl<P: Port> Session<P> {
+    /// Somebody asks for a motion now: one who has a session for longer than for one motion calls this before each of them. On a line that is
+    /// shared with others nothing moves the arm that was asked for before somebody else stopped it; what asks is the session's beginning, or
+    /// the last call of this.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::Port`].
+    pub fn ask_to_move(&mut self) -> Result<(), LinkError> {
+        Ok(self.port.ask_to_move()?)
+    }
+
     /// Clears current errors: the controller's own, and those of the nodes in `nodes` (bits 0..6).
     ///
     /// # Errors
@@ -68,6 +81,16 @@ impl<P: Port> Session<P> {
         self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
+    /// Clears the errors of the controller and of all nodes, and those that have occurred.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::clear`].
+    pub fn clear_all(&mut self) -> Result<(), LinkError> {
+        self.clear(true, ALL_NODES)?;
+        self.clear_occurred()
+    }
+
     /// Resets the nodes in `nodes` (bits 0..6).
     ///
     /// # Errors
@@ -81,16 +104,26 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`]; [`StateError::Timeout`] when teaching does not begin, because the arm does not come to rest.
+    /// Those of [`Session::clear`]; [`StateError::Timeout`] when teaching does not begin, because the arm does not come to rest;
+    /// [`StateError::Device`] when the controller has an error instead.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
-        if !on {
-            return Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?);
+        if on {
+            return self.teach_until(|| false);
         }
+        Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
+    }
+
+    /// Teaching on, and no more waiting for it once `ended` returns true.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::teach`]; [`Error::Cancelled`].
+    pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
-        let taught = self.wait_for("teaching", TEACHING, |s| {
-            s.state.is_in(&[ControllerState::Teaching, ControllerState::Error])
-        });
-        taught.map(drop)
+        let status = self.wait_for("teaching", TEACHING, |s| {
+            s.state.is_in(&[ControllerState::Teaching, ControllerState::Error]) || ended()
+        })?;
+        if without_error(status)?.state == ControllerState::Teaching { Ok(()) } else { Err(Error::Cancelled) }
     }
 
     /// Pump on or off.
@@ -151,6 +184,7 @@ impl<P: Port> Session<P> {
     /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
     /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
+        self.ask_to_move()?;
         let status = self.fresh_status()?;
         if status.trajectory != TrajectoryState::Pause {
             return Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into());

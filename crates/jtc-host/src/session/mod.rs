@@ -14,6 +14,7 @@ mod payload;
 mod ready;
 mod recover;
 mod run;
+mod settings;
 mod statistics;
 mod upload;
 

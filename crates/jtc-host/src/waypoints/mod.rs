@@ -134,6 +134,11 @@ impl WaypointFile {
         Ok(Self { path: path.to_owned(), ..file })
     }
 
+    /// The same waypoints, in errors as those of this file.
+    pub fn in_file(self, path: &Path) -> Self {
+        Self { path: path.to_owned(), ..self }
+    }
+
     /// From the text of such a file.
     ///
     /// # Errors
@@ -299,6 +304,14 @@ impl WaypointFile {
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
             // There is one where a waypoint asks for it.
             (Target::Flange(..), None) => Ok(*before),
+        }
+    }
+
+    /// What is wrong with a plan through these waypoints, with the place of the one that it is about.
+    pub fn located(&self, error: &PlanError) -> String {
+        match error.waypoint().and_then(|waypoint| self.place_of(waypoint)) {
+            Some(place) => format!("{place}: {error}"),
+            None => error.to_string(),
         }
     }
 

@@ -44,7 +44,7 @@
   // --- heading -------------------------------------------------------------------------------------------------------
   const summary = data.summary;
   const best = (figure) => summary.joints.map((j, i) => [j[figure], i]).filter(([v]) => known(v)).sort((a, b) => b[0] - a[0])[0] || [null, 0];
-  $("eyebrow").textContent = [data.arm, data.source].filter(Boolean).join(" · ");
+  $("eyebrow").textContent = [data.arm, data.source, data.commanded_by].filter(Boolean).join(" · ");
   $("title").textContent = data.trajectory || "Recorded run";
   const when = data.start_unix_ms ? new Date(data.start_unix_ms).toLocaleString() + " · " : "";
   $("lede").textContent = `${when}${round(last, 2)} s ${plan ? "planned" : "recorded"}, ${data.samples.toLocaleString("en")} ${plan ? "points" : "samples"}` +

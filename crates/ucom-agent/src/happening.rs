@@ -27,12 +27,15 @@ pub enum Happening {
     Halt {
         /// Who it was.
         by: String,
+        /// So many Stops, within a tenth of a second, of which this was the last; missing: one.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        times: Option<u64>,
     },
     /// After a Stop each board was asked.
     Stopped {
         /// Boards that have confirmed it.
         boards: Vec<u8>,
-        /// Boards that may still run, each with the reason.
+        /// Boards that may still run, each with the reason: also those that ran and from which nothing is received any more.
         not_stopped: Vec<String>,
     },
     /// Heartbeats of a board have changed.
@@ -101,7 +104,7 @@ pub enum Happening {
         /// In words.
         text: String,
     },
-    /// An update goes on.
+    /// An update goes on; at most five times a second within a cycle.
     Progress {
         /// The job.
         job: u64,
@@ -126,6 +129,20 @@ pub enum Happening {
         #[serde(skip_serializing_if = "Option::is_none")]
         error: Option<Problem>,
     },
+}
+
+impl Happening {
+    /// What it is called in the log of commands: who commanded and stopped, and what came of that.
+    pub(crate) fn logged(&self) -> Option<&'static str> {
+        match self {
+            Self::Lease { .. } => Some("lease"),
+            Self::Halt { .. } => Some("stop"),
+            Self::Stopped { .. } => Some("stopped"),
+            Self::Ended { .. } => Some("ended"),
+            Self::Lost { .. } => Some("lost"),
+            _ => None,
+        }
+    }
 }
 
 impl agent_kit::journal::Happening for Happening {

@@ -85,11 +85,6 @@ impl Jobs {
         job
     }
 
-    /// One that was not begun.
-    pub fn remove(&self, number: u64) {
-        self.lock().jobs.retain(|job| job.number != number);
-    }
-
     /// One is over. False: it was before.
     pub fn end(&self, number: u64, stage: Stage, done: Option<Done>, error: Option<Problem>) -> bool {
         let mut kept = self.lock();

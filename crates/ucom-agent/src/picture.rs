@@ -16,8 +16,8 @@ pub(crate) struct Values {
     pub known: Arc<Known>,
     /// Outputs as they came last.
     pub outputs: Option<Snapshot>,
-    /// Inputs as last set.
-    pub inputs: Vec<u16>,
+    /// Inputs as last set, or read.
+    pub inputs: Vec<Option<u16>>,
     /// Parameters as this agent believes them to be.
     pub parameters: Vec<ParValue>,
 }

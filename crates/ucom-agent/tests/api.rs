@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use common::{Served, WAIT, frame};
 use serde_json::{Value, json};
 use ucom::Profile;
+use ucom_agent::Config;
+use ucom_host::session::Cache;
 use ucom_sim::ChainConfig;
 
 fn value<'a>(values: &'a Value, list: &str, name: &str) -> &'a Value {
@@ -56,7 +58,33 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
     let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
-    served.run(&key, &[1, 2]);
+    // What was neither set nor read is not known: whoever writes back what it read must not write zeros.
+    let known = |of: &Value| {
+        of["inputs"]
+            .as_array()
+            .expect("inputs")
+            .iter()
+            .map(|input| !input["value"].is_null())
+            .collect::<Vec<_>>()
+    };
+    let (_, values) = served.api("GET /api/boards/1/values", None, None);
+    assert!(known(&values).len() > 1 && known(&values).iter().all(|known| !known), "{values}");
+    let body = Some(json!({ "value": 7 }));
+    assert_eq!(served.api("PUT /api/boards/1/inputs/set_position", Some(&key), body).0, 200);
+    let (_, values) = served.api("GET /api/boards/1/values", None, None);
+    assert_eq!(known(&values).iter().filter(|known| **known).count(), 1, "{values}");
+    assert_eq!(value(&values, "inputs", "set_position")["value"], 7.0, "{values}");
+    // Each board once, however often it is named; its inputs are read then.
+    let (mut peer, boards) = (served.chain.peer(), [vec![1; 200], vec![2]].concat());
+    let job = served.job("POST /api/run", &key, Some(json!({ "boards": boards, "active": true })));
+    assert_eq!(job["stage"], "finished", "{job}");
+    let mut asked = 0;
+    while let Some(frame) = peer.receive(Duration::ZERO).expect("the bus is there") {
+        asked += u32::from(frame.id().value() == 0x201);
+    }
+    assert!((1..100).contains(&asked), "asked who it is {asked} times");
+    let (_, values) = served.api("GET /api/boards/1/values", None, None);
+    assert!(known(&values).iter().all(|known| *known), "{values}");
     let board = served.board_when(1, "running", |board| board["state"] == "running");
     assert_eq!(
         (board["heartbeat"].as_str(), board["active"].as_bool()),
@@ -183,8 +211,7 @@ fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
         served.board_when(board, "alive", |board| board["heartbeat"] == "alive");
     }
     let last = served.last_event();
-    let unix = || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
-    let begun = unix().as_secs_f64();
+    let begun = host_kit::unix_time().as_secs_f64();
     served.chain.fault("silent board=2 for_s=5");
     let mut at = Vec::new();
     let mut number = last;
@@ -221,19 +248,59 @@ fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
 /// D-08: nothing is sent to boards that another PC commands.
 #[test]
 fn d08_with_another_master_on_the_bus_commands_are_refused() {
-    let (served, key) = Served::numbered(1);
+    let (served, key) = Served::numbered(2);
     let mut other = Served::start(1);
     other.chain.fault("foreign-master");
     std::thread::sleep(Duration::from_millis(1500));
     let (_, status) = other.api("GET /api/status", None, None);
     assert_eq!(status["competing_master"], true, "{status}");
     let theirs = other.lease("bob", 60.0, "stop");
+    // As long as it goes on, not only when it begins; a doctor asks nothing then.
+    for _ in 0..40 {
+        std::thread::sleep(Duration::from_millis(100));
+        let (_, status) = other.api("GET /api/status", None, None);
+        assert_eq!(status["competing_master"], true, "{status}");
+    }
+    let mut peer = other.chain.peer();
+    let job = other.job("POST /api/doctor", &theirs, None);
+    let found = job["findings"].to_string();
+    assert!(found.contains("another PC talks on this bus"), "{job}");
+    while let Some(frame) = peer.receive(Duration::ZERO).expect("the bus is there") {
+        assert!([0x680, 0x21F].contains(&frame.id().value()), "{frame:?}");
+    }
     let job = other.job("POST /api/init", &theirs, Some(json!({})));
     assert_eq!(job["stage"], "failed", "{job}");
     assert!(job["error"]["message"].as_str().is_some_and(|m| m.contains("PC")), "{job}");
     other.end();
     // A bus without one is not concerned.
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
+    // Nor is anything asked for a viewer.
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    served.chain.fault("foreign-master");
+    std::thread::sleep(Duration::from_millis(1000));
+    let mut peer = served.chain.peer();
+    assert_eq!(served.api_as(None, "GET /api/boards/1/values", None, None).0, 200, "its names are known");
+    let (status, error) = served.api_as(None, "GET /api/boards/2/values", None, None);
+    assert_eq!((status, error["code"].as_str()), (409, Some("competing-master")), "{error}");
+    while let Some(frame) = peer.receive(Duration::ZERO).expect("the bus is there") {
+        assert_ne!(frame.id().value(), 0x202, "{frame:?}");
+    }
+}
+
+#[test]
+fn a_lease_lasts_as_long_as_the_description_says_and_no_longer() {
+    let served = Served::start(1);
+    let description: Value = serde_json::from_str(&ucom_agent::api::description()).expect("JSON");
+    let lasts = &description["components"]["schemas"]["LeaseRequest"]["properties"]["lasts_s"];
+    let (least, most) =
+        (lasts["minimum"].as_f64().expect("a bound"), lasts["maximum"].as_f64().expect("a bound"));
+    for (lasts_s, status) in [(least - 0.01, 422), (least, 200), (most + 0.01, 422), (most, 200)] {
+        let body = json!({ "name": "anna", "lasts_s": lasts_s, "ask": true });
+        let (got, answer) = served.api("POST /api/lease", None, Some(body));
+        assert_eq!(got, status, "{lasts_s}: {answer}");
+        let named = answer["message"].as_str().is_some_and(|m| m.contains(&format!("{least} to {most} s")));
+        assert_eq!(named, status == 422, "{answer}");
+    }
 }
 
 #[test]
@@ -241,7 +308,7 @@ fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
     let (served, key) = Served::numbered(1);
     let (status, denied) = served.api("POST /api/lease", None, Some(json!({ "name": "bob" })));
     assert!(status == 409 && denied["message"].as_str().is_some_and(|m| m.contains("anna")), "{denied}");
-    let ask = json!({ "name": "bob", "ask": true, "lasts_s": 2.0 });
+    let ask = json!({ "name": "bob", "ask": true, "lasts_s": 5.0 });
     let (status, grant) = served.api("POST /api/lease", None, Some(ask));
     assert_eq!((status, grant["held"].as_bool()), (200, Some(false)));
     let bob = grant["key"].as_str().expect("a key").to_owned();
@@ -263,8 +330,8 @@ fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
         Some(true) => carl,
         _ => served.lease("carl", 1.0, "continue"),
     };
-    served.run(&carl, &[1]);
     let last = served.last_event();
+    served.run(&carl, &[1]);
     served.event(last, "nobody commands", |event| event["kind"] == "lease" && event["holder"].is_null());
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(served.board(1)["state"], "running");
@@ -326,4 +393,92 @@ fn a_bus_that_is_gone_is_named() {
     assert_eq!((status, error["code"].as_str()), (503, Some("no-link")), "{error}");
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 503);
     served.event(0, "lost", |event| event["kind"] == "lost");
+}
+
+/// D-08, D-50: heartbeats are for what was commanded here, so no board of another PC is kept alive when that one dies.
+#[test]
+fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none() {
+    let (served, key) = Served::numbered(1);
+    let is_master = |wanted: bool| {
+        let begun = Instant::now();
+        while served.api("GET /api/status", None, None).1["is_master"] != wanted {
+            assert!(begun.elapsed() < Duration::from_secs(5), "never {wanted}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    is_master(true);
+    // What runs needs them also when nobody commands.
+    served.run(&key, &[1]);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    std::thread::sleep(Duration::from_millis(500));
+    is_master(true);
+    let stop = || {
+        let last = served.last_event();
+        assert_eq!(served.api("POST /api/stop", None, None).0, 200);
+        served.event(last, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1]));
+    };
+    stop();
+    is_master(false);
+    // Another PC is the master now: whoever stops, and whoever has the lease but does nothing.
+    served.chain.fault("foreign-master");
+    std::thread::sleep(Duration::from_millis(1500));
+    for lease in [false, true] {
+        if lease {
+            served.lease("bob", 60.0, "stop");
+        }
+        stop();
+        is_master(false);
+        let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
+        let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);
+        while begun.elapsed() < Duration::from_millis(1500) {
+            let received = peer.receive(Duration::from_millis(100)).expect("the bus is there");
+            beats += u32::from(received.is_some_and(|frame| beat(&frame)));
+        }
+        assert!((1..=4).contains(&beats), "those of the other PC alone: {beats}");
+    }
+}
+
+/// A disk that does not answer keeps neither a Stop nor heartbeats waiting, and no question either.
+#[cfg(unix)]
+#[test]
+fn a_stop_does_not_wait_for_the_disk_with_the_names() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let config = Config { cache: Cache::new(Some(dir.path().into()), false), ..Config::default() };
+    let (served, key) = Served::numbered_as(2, config);
+    served.run(&key, &[1]);
+    let kept = || std::fs::read_dir(dir.path()).expect("a directory").flatten().next();
+    let begun = Instant::now();
+    while kept().is_none() {
+        assert!(begun.elapsed() < WAIT, "its names are never kept");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // Whoever opens the file of the other board waits for ever.
+    let name = kept().expect("a file").file_name().into_string().expect("a name");
+    let date = name.split('-').nth(2).expect("a date");
+    let board = served.board(2);
+    let number = |key: &str| board[key].as_u64().expect("a number");
+    let file = format!("io-{:04X}-{date}-{:04X}.json", number("program_id"), number("flash_number"));
+    let pipe = dir.path().join(file);
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()));
+    let asker = std::thread::spawn({
+        let http = served.clone();
+        // Its names are read, and written.
+        move || {
+            [http.get("GET /api/boards/2/values").0, http.api("POST /api/boards/2/start", Some(&key), None).0]
+        }
+    });
+    std::thread::sleep(Duration::from_millis(2500));
+    let mut peer = served.chain.peer();
+    let last = served.last_event();
+    assert_eq!(served.api("POST /api/stop", None, None).0, 200);
+    let stop = (0..200).any(|_| {
+        let received = peer.receive(Duration::from_millis(10)).expect("the bus is there");
+        received.is_some_and(|frame| frame.id().value() == 0x600)
+    });
+    // The disk is back.
+    drop(std::fs::OpenOptions::new().read(true).write(true).open(&pipe));
+    assert!(stop, "a Stop waits for the disk");
+    assert_eq!(asker.join().expect("it is answered"), [409, 200]);
+    let (_, stopped) = served.event(last, "stopped", |event| event["kind"] == "stopped");
+    assert_eq!(stopped["boards"], json!([1, 2]), "{stopped}");
 }

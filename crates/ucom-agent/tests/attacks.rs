@@ -1,6 +1,10 @@
 //! What somebody could try who is not to be let in, as docs/security.md lists it: the same as with an arm's agent.
 mod common;
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
 use common::Served;
 use serde_json::json;
 use test_kit::http;
@@ -37,6 +41,25 @@ fn what_is_long_or_wrong_changes_nothing() {
 #[test]
 fn connections_that_ask_for_nothing_are_closed_and_keep_nobody_out() {
     http::idle_connections_are_closed(&Served::start(1));
+}
+
+#[test]
+fn the_address_of_a_stream_may_have_the_viewers_token_and_never_the_operators() {
+    let served = Served::start(1);
+    let with = |token: &str| format!("/api/stream?token={token}");
+    served.stream(&with(&served.tokens.viewer), |message| message["role"] == "viewer");
+    let (host, key) = (format!("Host: {}", served.address), "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==");
+    let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key];
+    assert_eq!(served.ask(&format!("GET {}", with(&served.tokens.operator)), &upgrade).0, 403);
+}
+
+#[test]
+fn requests_that_wait_for_events_are_so_many_and_no_more() {
+    let served = Served::start(1);
+    let key = served.lease("anna", 60.0, "stop");
+    http::waiting_requests_are_bounded(&served, || {
+        served.begin("POST /api/scan", &key, None);
+    });
 }
 
 #[test]
@@ -77,4 +100,88 @@ fn who_may_look_changes_nothing() {
     assert_eq!(served.api("GET /api/jobs", None, None).1, json!([]), "nothing was begun");
     let log = std::fs::read_to_string(&served.log).expect("the log");
     assert!(!log.contains("\"command\""), "{log}");
+}
+
+/// Nothing of it is kept in memory for who may not command, and of who may only two at a time.
+#[test]
+fn images_are_read_of_who_commands_alone_and_two_at_once() {
+    let served = Served::start(1);
+    let key = served.lease("anna", 60.0, "stop");
+    let tokens = served.tokens.clone();
+    let begin = |lines: &[String]| {
+        let mut stream = TcpStream::connect(served.address).expect("it listens");
+        stream.set_read_timeout(Some(Duration::from_secs(5))).expect("a time");
+        let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
+        let (host, json) = (served.address, "Content-Type: application/json\r\nContent-Length: 6000000");
+        let head = format!("POST /api/updates HTTP/1.1\r\nHost: {host}\r\n{json}\r\n{head}\r\n");
+        stream.write_all(head.as_bytes()).expect("it reads");
+        stream
+    };
+    let bearer = |token: &str| format!("Authorization: Bearer {token}");
+    let lease = format!("Lease-Key: {key}");
+    for lines in [
+        vec![],
+        vec![lease.clone()],
+        vec![bearer(&tokens.viewer), lease.clone()],
+        vec![bearer(&tokens.operator)],
+    ] {
+        let mut answer = [0; 12];
+        begin(&lines).read_exact(&mut answer).expect("an answer before the images are there");
+        assert_eq!(answer, *b"HTTP/1.1 403", "{lines:?}");
+    }
+    let slow: Vec<TcpStream> = (0..2).map(|_| begin(&[bearer(&tokens.operator), lease.clone()])).collect();
+    std::thread::sleep(Duration::from_millis(300));
+    let third = std::thread::spawn({
+        let (http, key) = ((*served).clone(), key.clone());
+        move || http.api("POST /api/updates", Some(&key), Some(json!({ "boards": [], "image": "" }))).0
+    });
+    std::thread::sleep(Duration::from_millis(700));
+    assert!(!third.is_finished(), "a third one is read");
+    assert_eq!(served.api("POST /api/stop", None, None).0, 200);
+    drop(slow);
+    assert_eq!(third.join().expect("it is answered"), 422);
+}
+
+/// Whoever may stop can do so without end: that fills neither the bus nor the events.
+#[test]
+fn stops_without_end_are_counted_and_sent_together() {
+    let served = Served::start(1);
+    // Its scan at the start is over, and each Stop is taken.
+    let (status, _) = served.get("POST /api/stop");
+    assert_eq!(status, 200);
+    served.event(0, "stopped", |event| event["kind"] == "stopped");
+    let (last, mut peer) = (served.last_event(), served.chain.peer());
+    let begun = Instant::now();
+    let stoppers: Vec<_> = (0..4)
+        .map(|_| {
+            let http = (*served).clone();
+            std::thread::spawn(move || {
+                let mut taken = 0;
+                while begun.elapsed() < Duration::from_secs(1) {
+                    assert_eq!(http.get("POST /api/stop").0, 200);
+                    taken += 1;
+                }
+                taken
+            })
+        })
+        .collect();
+    let mut frames = 0;
+    while begun.elapsed() < Duration::from_millis(1500) {
+        let received = peer.receive(Duration::from_millis(50)).expect("the bus is there");
+        frames += u64::from(received.is_some_and(|frame| frame.id().value() == 0x600));
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    let taken: u64 = stoppers.into_iter().map(|stopper| stopper.join().expect("it is taken")).sum();
+    assert!(taken > 100, "{taken}");
+    assert!((3..).contains(&frames) && (frames as f64) < 80.0 * seconds, "{frames} in {seconds} s");
+    let (_, all) = served.api(&format!("GET /api/events?after={last}"), None, None);
+    let halts: Vec<&serde_json::Value> = all["events"]
+        .as_array()
+        .expect("events")
+        .iter()
+        .map(|e| &e["event"])
+        .filter(|e| e["kind"] == "halt")
+        .collect();
+    let times: u64 = halts.iter().map(|halt| halt["times"].as_u64().unwrap_or(1)).sum();
+    assert!(times == taken && (halts.len() as f64) < 12.0 * seconds, "{times} of {taken}: {halts:?}");
 }

@@ -28,7 +28,7 @@ impl LinkArgs {
 impl CacheArgs {
     /// Where names are remembered.
     pub fn cache(&self) -> Cache {
-        Cache { directory: self.directory(), fresh: self.fresh }
+        Cache::new(self.directory(), self.fresh)
     }
 
     /// Where things are remembered; `None` when there is no place for them.

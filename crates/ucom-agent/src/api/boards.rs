@@ -5,7 +5,6 @@ use axum::extract::State;
 
 use super::objects::{BoardObject, ValuesObject};
 use super::{Agent, Denials};
-use crate::work::Kind;
 
 /// A board that is not known.
 pub(super) fn unknown(number: u8) -> Problem {
@@ -83,8 +82,15 @@ pub(super) async fn values(
     if let Some(values) = picture.values.get(&number) {
         return Ok(Json(ValuesObject::of(&picture, values)));
     }
-    let asked = agent.shared.call(Kind::Question, move |hands| {
-        let known = hands.known(number).map_err(|error| hands.problem(&error))?;
+    if picture.competing_us.is_some() {
+        // Even questions could mix with its own.
+        let message = format!(
+            "the names of board {number} are not known, and another PC commands on this bus: it is not asked"
+        );
+        return Err(Problem::new("competing-master", message, "end the other program, or ask it"));
+    }
+    let asked = agent.shared.call(None, move |hands| {
+        let known = hands.known_to_viewers(number)?;
         Ok(hands.values_of(&known))
     });
     let values = asked.await?;

@@ -1,9 +1,11 @@
 //! Commands that are soon over, for who has the lease.
+use std::sync::Arc;
+
 use agent_kit::api::{Asked, Body, Number, Problem, Refusals};
-use agent_kit::gate::Caller;
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
 use axum::extract::State;
-use axum::http::HeaderMap;
-use axum::{Extension, Json};
 use serde_json::json;
 use ucom_host::files::SignalValue;
 use ucom_host::master::io::Kind as Buffer;
@@ -14,13 +16,13 @@ use ucom_host::session::{
 use utoipa::{IntoParams, ToSchema};
 
 use super::boards::numbers;
+use super::line::Line;
 use super::objects::{AnswerObject, ValueObject};
 use super::{Agent, Denials};
 use crate::owner::Hands;
-use crate::work::Kind;
 
 /// A value as it is given.
-#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[derive(Clone, Debug, serde::Deserialize, serde::Serialize, ToSchema)]
 #[serde(untagged)]
 pub(super) enum GivenValue {
     /// On or off.
@@ -97,20 +99,35 @@ impl Agent {
     /// Has the owner do something for the client that commands, and logs that it was asked for.
     async fn command<T: Send + 'static>(
         &self,
-        (caller, headers): (&Caller, &HeaderMap),
-        (what, board, moves): (&'static str, u8, bool),
+        asker: &Asker,
+        what: (&'static str, u8, bool),
         act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
-        let client = self.commander(caller, headers)?;
+        self.command_with(asker, what, json!({}), act).await
+    }
+
+    /// The same; what was asked for is in the log, too.
+    async fn command_with<T: Send + 'static>(
+        &self,
+        asker: &Asker,
+        (what, board, moves): (&'static str, u8, bool),
+        asked: serde_json::Value,
+        act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let client = self.commander(asker)?;
         numbers([board])?;
-        if moves {
-            self.shared.may_move(client.id)?;
-        }
-        let act = move |hands: &mut Hands| act(hands).map_err(|error| hands.problem(&error));
-        let done = self.shared.call(Kind::Command, act).await;
-        let why = done.as_ref().err().map(|error| error.message.clone());
-        self.gate
-            .note("command", json!({ "client": client.id, "command": what, "board": board, "why_not": why }));
+        let turn = self.shared.asked(client.id, moves)?;
+        let facts = json!({ "client": client.id, "command": what, "board": board, "asked": asked });
+        let line = Arc::new(Line::new(&self.gate, facts));
+        let own = line.clone();
+        let act = move |hands: &mut Hands| {
+            let done = act(hands).map_err(|error| hands.problem(&error));
+            // Here, as who has asked may have gone.
+            own.end(&done);
+            done
+        };
+        let done = self.shared.call(Some(turn), act).await;
+        line.end(&done);
         done
     }
 }
@@ -155,14 +172,15 @@ fn set(
 impl Agent {
     async fn set(
         &self,
-        asker: (&Caller, &HeaderMap),
+        asker: &Asker,
         (what, buffer): (&'static str, Buffer),
         (board, name): (u8, String),
         request: &ValueRequest,
     ) -> Result<Json<ValueObject>, Problem> {
         let value = request.value.parsed(&name)?;
+        let asked = json!({ "name": name, "value": request.value });
         let set = move |hands: &mut Hands| set(hands, buffer, board, &name, &value);
-        Ok(Json(self.command(asker, (what, board, true), set).await?))
+        Ok(Json(self.command_with(asker, (what, board, true), asked, set).await?))
     }
 }
 
@@ -174,19 +192,18 @@ impl Agent {
     params(
         ("number" = u8, Path, description = "Number of the board"),
         ("name" = String, Path, description = "Name of the input, with or without its unit in brackets; or its place"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     request_body = ValueRequest,
     responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
 )]
 pub(super) async fn set_input(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(place): Number<(u8, String)>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(request): Body<ValueRequest>,
 ) -> Result<Json<ValueObject>, Problem> {
-    agent.set((&caller, &headers), ("input", Buffer::Ci), place, &request).await
+    agent.set(&asker, ("input", Buffer::Ci), place, &request).await
 }
 
 /// Writes a parameter by its name. Boards have no way to read it back.
@@ -197,19 +214,18 @@ pub(super) async fn set_input(
     params(
         ("number" = u8, Path, description = "Number of the board"),
         ("name" = String, Path, description = "Name of the parameter, with or without its unit in brackets; or its place"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     request_body = ValueRequest,
     responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
 )]
 pub(super) async fn set_parameter(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(place): Number<(u8, String)>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(request): Body<ValueRequest>,
 ) -> Result<Json<ValueObject>, Problem> {
-    agent.set((&caller, &headers), ("parameter", Buffer::Par), place, &request).await
+    agent.set(&asker, ("parameter", Buffer::Par), place, &request).await
 }
 
 /// Enables or disables the outputs of a running board.
@@ -219,22 +235,25 @@ pub(super) async fn set_parameter(
     operation_id = "set_outputs",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     request_body = OutputsRequest,
     responses((status = 204, description = "The board has confirmed it"), Refusals, Denials)
 )]
 pub(super) async fn set_outputs(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(board): Number<u8>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(OutputsRequest { active }): Body<OutputsRequest>,
 ) -> Result<axum::http::StatusCode, Problem> {
     let change = AdminChange { active: Some(active), ..AdminChange::default() };
     let request = Request::Admin { board, change, force: false };
-    let act = move |hands: &mut Hands| hands.driver.run(request).map(drop);
-    agent.command((&caller, &headers), ("outputs", board, active), act).await?;
+    let act = move |hands: &mut Hands| match active {
+        true => hands.starting(&[board], |hands| hands.driver.run(request).map(drop)),
+        false => hands.driver.run(request).map(drop),
+    };
+    let asked = json!({ "active": active });
+    agent.command_with(&asker, ("outputs", board, active), asked, act).await?;
     Ok(axum::http::StatusCode::NO_CONTENT)
 }
 
@@ -244,26 +263,26 @@ pub(super) async fn set_outputs(
     path = "/api/boards/{number}/start",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     responses((status = 200, description = "The application is up", body = AnswerObject), Refusals, Denials)
 )]
 pub(super) async fn start_board(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(board): Number<u8>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<Json<AnswerObject>, Problem> {
     let act = move |hands: &mut Hands| {
-        hands.has_started(board);
-        let all = hands.driver.change_each(&[board], |board| Request::Start { board, force: false })?;
+        let all = hands.starting(&[board], |hands| {
+            hands.driver.change_each(&[board], |board| Request::Start { board, force: false })
+        })?;
         // Its names are there from now on; without them it is started all the same.
         let _ = hands.known(board);
         all.first()
             .map(|one| AnswerObject::of(one, &hands.driver.master.profile()))
             .ok_or(SessionError::NoBoards)
     };
-    Ok(Json(agent.command((&caller, &headers), ("start", board, true), act).await?))
+    Ok(Json(agent.command(&asker, ("start", board, true), act).await?))
 }
 
 /// Stops the control loop of a board, and its application.
@@ -273,16 +292,15 @@ pub(super) async fn start_board(
     params(
         ("number" = u8, Path, description = "Number of the board"),
         StopRequest,
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     responses((status = 200, description = "The board has confirmed it", body = AnswerObject), Refusals, Denials)
 )]
 pub(super) async fn stop_board(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(board): Number<u8>,
     Asked(StopRequest { level }): Asked<StopRequest>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<Json<AnswerObject>, Problem> {
     let act = move |hands: &mut Hands| {
         let to = match level {
@@ -300,7 +318,7 @@ pub(super) async fn stop_board(
         let profile = hands.driver.master.profile();
         stopped.boards.first().map(|one| AnswerObject::of(one, &profile)).ok_or(SessionError::NoBoards)
     };
-    Ok(Json(agent.command((&caller, &headers), ("stop", board, false), act).await?))
+    Ok(Json(agent.command(&asker, ("stop", board, false), act).await?))
 }
 
 /// Resets a board: its outputs become safe, and its number is gone.
@@ -309,15 +327,14 @@ pub(super) async fn stop_board(
     path = "/api/boards/{number}/reset",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     responses((status = 200, description = "Who reported", body = ResetObject), Refusals, Denials)
 )]
 pub(super) async fn reset_board(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(board): Number<u8>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<Json<ResetObject>, Problem> {
     let act = move |hands: &mut Hands| match hands
         .driver
@@ -329,7 +346,7 @@ pub(super) async fn reset_board(
         }
         other => Err(other.into()),
     };
-    Ok(Json(agent.command((&caller, &headers), ("reset", board, false), act).await?))
+    Ok(Json(agent.command(&asker, ("reset", board, true), act).await?))
 }
 
 /// Does something by names; where a board turns out to have others than were kept, once more by those that it sends.

@@ -2,14 +2,15 @@
 use std::time::Duration;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
-use agent_kit::gate::Caller;
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
-use axum::{Extension, Json};
+use axum::http::StatusCode;
 use host_kit::ErrorKind;
 use serde_json::json;
 use ucom_host::master::{InitOptions, Outcome, Request, RunOptions, RunReport};
-use ucom_host::session::{Assignment, Boards, Prepared, SessionError, only, plans, remember};
+use ucom_host::session::{Assignment, Boards, Cache, Prepared, SessionError, only, plans, remember};
 use utoipa::ToSchema;
 
 use super::boards::numbers;
@@ -27,16 +28,14 @@ impl Agent {
     /// Begins a job for the client that commands.
     pub(super) fn begin(
         &self,
-        (caller, headers): (&Caller, &HeaderMap),
+        asker: &Asker,
         (kind, what): (Kind, &'static str),
         act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), SessionError> + Send + 'static,
     ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-        let client = self.commander(caller, headers)?;
-        if kind == Kind::Command {
-            self.shared.may_move(client.id)?;
-        }
+        let client = self.commander(asker)?;
+        let asked = self.shared.asked(client.id, kind != Kind::Question)?;
         let act = move |hands: &mut Hands| act(hands).map_err(|error| hands.problem(&error));
-        let job = self.shared.begin(kind, what, &client.name, act);
+        let job = self.shared.begin((kind, asked), (what, &client.name), act);
         let why = job.as_ref().err().map(|error| error.message.clone());
         let number = job.as_ref().ok().map(|job| job.number);
         self.gate
@@ -53,19 +52,16 @@ fn texts(findings: &[impl ToString]) -> Vec<String> {
 #[utoipa::path(
     post,
     path = "/api/scan",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn scan(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&caller, &headers), (Kind::Question, "scan"), |hands| {
-        match hands.driver.run(Request::Scan)? {
-            Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
-            other => Err(other.into()),
-        }
+    agent.begin(&asker, (Kind::Question, "scan"), |hands| match hands.driver.run(Request::Scan)? {
+        Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
+        other => Err(other.into()),
     })
 }
 
@@ -92,23 +88,24 @@ pub struct InitRequest {
 #[utoipa::path(
     post,
     path = "/api/init",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = InitRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn init(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(InitRequest { expected }): Body<InitRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     numbers(expected.iter().map(|board| board.board))?;
     let expected = expected.iter().map(|board| (board.board, board.flash_number)).collect();
     let options = InitOptions { expected, force: false };
-    agent.begin((&caller, &headers), (Kind::Command, "init"), |hands| {
+    agent.begin(&asker, (Kind::Command, "init"), |hands| {
         let outcome = hands.driver.run(Request::Init(options));
-        // Whatever came of it, the numbers are not those of before.
-        hands.forget_all();
+        hands.renumbered(match &outcome {
+            Ok(Outcome::Init(report)) => Some(report),
+            _ => None,
+        });
         let Outcome::Init(report) = outcome? else { return Err(SessionError::NoBoards) };
         let findings = texts(&report.findings);
         let error = report.failure().map(|kind| {
@@ -122,15 +119,14 @@ pub(super) async fn init(
 #[utoipa::path(
     post,
     path = "/api/doctor",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn doctor(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&caller, &headers), (Kind::Question, "doctor"), |hands| {
+    agent.begin(&asker, (Kind::Question, "doctor"), |hands| {
         let seen = hands.driver.examine(LISTEN)?;
         Ok((Done::Findings(seen.findings), None))
     })
@@ -177,19 +173,21 @@ fn assignments(values: &[NamedValue]) -> Result<Vec<Assignment>, Problem> {
 #[utoipa::path(
     post,
     path = "/api/run",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn run(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-    Body(request): Body<RunRequest>,
+    asker: Asker,
+    Body(mut request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
+    // Each once, however often it is named.
+    request.boards.sort_unstable();
+    request.boards.dedup();
     numbers(request.boards.iter().copied())?;
     let (ci, par) = (assignments(&request.inputs)?, assignments(&request.parameters)?);
-    agent.begin((&caller, &headers), (Kind::Command, "run"), move |hands| {
+    agent.begin(&asker, (Kind::Command, "run"), move |hands| {
         let boards = match request.boards.is_empty() {
             true => Boards::All,
             false => Boards::Some(request.boards.clone()),
@@ -197,13 +195,14 @@ pub(super) async fn run(
         let numbers = hands.driver.numbers(&boards)?;
         only(&numbers, &ci, "run")?;
         only(&numbers, &par, "run")?;
-        let (report, prepared) = by_names(hands, |hands, cache| {
+        let begin = |hands: &mut Hands, cache: &Cache| {
             let mut prepared = Prepared::default();
             let started = start(hands, cache, &numbers, (&ci, &par), request.active, &mut prepared);
             // What the procedure began it has taken back itself.
             let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
             Ok((report, prepared))
-        })?;
+        };
+        let (report, prepared) = hands.starting(&numbers, |hands| by_names(hands, begin))?;
         for known in prepared.known.into_values() {
             hands.knows(known);
         }
@@ -215,7 +214,7 @@ pub(super) async fn run(
 /// Names, plans, and the start of all boards.
 fn start(
     hands: &mut Hands,
-    cache: &ucom_host::session::Cache,
+    cache: &Cache,
     numbers: &[u8],
     (ci, par): (&[Assignment], &[Assignment]),
     active: bool,
@@ -272,7 +271,7 @@ pub(super) async fn get(
     operation_id = "cancel_job",
     params(
         ("number" = u64, Path, description = "Number of the job"),
-        ("Lease-Key" = String, Header, description = "Key of the lease")
+        LeaseKey
     ),
     responses(
         (status = 204, description = "It will end"),
@@ -282,16 +281,15 @@ pub(super) async fn get(
 )]
 pub(super) async fn cancel(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
     Number(number): Number<u64>,
-    headers: HeaderMap,
+    asker: Asker,
 ) -> Result<StatusCode, Problem> {
-    let client = agent.commander(&caller, &headers)?;
+    let client = agent.commander(&asker)?;
     if agent.shared.jobs.get(number).is_none() {
         return Err(Problem::nothing("job", number, "/api/jobs"));
     }
     agent.gate.note("command", json!({ "client": client.id, "command": "cancel", "job": number }));
-    if agent.shared.cancel(number) {
+    if agent.shared.cancel_job(number) {
         return Ok(StatusCode::NO_CONTENT);
     }
     let message = format!("job {number} does not go on");

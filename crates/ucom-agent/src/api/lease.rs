@@ -1,15 +1,11 @@
 //! The lease: who commands shows by each request that it is there.
-use std::sync::{MutexGuard, PoisonError};
-use std::time::Duration;
-
 use agent_kit::access::random;
 use agent_kit::api::{Body, Problem, Refusals};
-use agent_kit::gate::Caller;
-use agent_kit::lease::{Client, LASTS_S, Leases, key_of};
+use agent_kit::gate::{Asker, Caller};
+use agent_kit::lease::{Client, LeaseKey, LeaseState, default_lasts_s, lasts};
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::StatusCode;
 use axum::{Extension, Json};
-use host_kit::ErrorKind;
 use serde_json::json;
 use utoipa::ToSchema;
 
@@ -23,8 +19,8 @@ pub struct LeaseRequest {
     /// What people are to call it: the first 64 characters.
     name: String,
     /// How long the lease lasts without a request of this client, s.
-    #[serde(default = "ten")]
-    #[schema(minimum = 1, maximum = 3600)]
+    #[serde(default = "default_lasts_s")]
+    #[schema(minimum = 1, maximum = 60)]
     lasts_s: f64,
     /// What becomes of running boards when it has lapsed.
     #[serde(default)]
@@ -32,10 +28,6 @@ pub struct LeaseRequest {
     /// Where another client commands: ask it for the lease, and wait for it.
     #[serde(default)]
     ask: bool,
-}
-
-fn ten() -> f64 {
-    10.0
 }
 
 /// A client that may command, or waits for it.
@@ -51,32 +43,18 @@ pub struct LeaseGrant {
     policy: Policy,
 }
 
-/// How a lease is.
-#[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LeaseState {
-    /// This client commands.
-    held: bool,
-    /// Who asks for the lease.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    wanted_by: Option<String>,
-}
-
 impl Agent {
-    fn leases(&self) -> MutexGuard<'_, Leases<Policy>> {
-        // What one that has lapsed leaves behind comes first.
-        self.shared.look_at_lease();
-        self.shared.leases.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The client that asks with a key.
-    pub(super) fn client(&self, headers: &HeaderMap) -> Result<Client<Policy>, Problem> {
-        Ok(self.leases().client(key_of(headers), self.shared.now())?)
+    pub(super) fn client(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
+        let (mut leases, now) = self.shared.leases();
+        Ok(leases.client(asker.key(), now)?)
     }
 
     /// The client that asks, with its lease renewed: it commands, or it is an error.
-    pub(super) fn commander(&self, caller: &Caller, headers: &HeaderMap) -> Result<Client<Policy>, Problem> {
-        caller.operator()?;
-        Ok(self.leases().command(key_of(headers), self.shared.now())?)
+    pub(super) fn commander(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
+        asker.caller.operator()?;
+        let (mut leases, now) = self.shared.leases();
+        Ok(leases.command(asker.key(), now)?)
     }
 }
 
@@ -98,15 +76,14 @@ pub(super) async fn take(
 ) -> Result<Json<LeaseGrant>, Problem> {
     caller.operator()?;
     let LeaseRequest { name, lasts_s, policy, ask } = request;
-    if !LASTS_S.contains(&lasts_s) {
-        let message = format!("lasts_s is {lasts_s}: 1 to 3600 s are possible");
-        return Err(Problem::new("lease", message, "choose how long it may last without a request")
-            .kind(ErrorKind::Usage));
-    }
+    let lasts = lasts(lasts_s)?;
     let name = caller.named(&name);
     let key = random().map_err(|e| Problem::diagnosed(&e))?;
-    let terms = (name.as_str(), Duration::from_secs_f64(lasts_s), policy);
-    let (client, held) = agent.leases().admit(&key, terms, ask, agent.shared.now())?;
+    let terms = (name.as_str(), lasts, policy);
+    let (client, held) = {
+        let (mut leases, now) = agent.shared.leases();
+        leases.admit(&key, terms, ask, now)?
+    };
     let from = caller.peer.to_string();
     agent.gate.note("joined", json!({ "client": client, "name": name, "held": held, "from": from }));
     Ok(Json(LeaseGrant { key, held, lasts_s, policy }))
@@ -117,41 +94,45 @@ pub(super) async fn take(
     put,
     path = "/api/lease",
     operation_id = "renew_lease",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses(
         (status = 200, description = "Whether this client commands", body = LeaseState),
         Refusals, Denials
     )
 )]
-pub(super) async fn renew(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<Json<LeaseState>, Problem> {
-    caller.operator()?;
-    agent.client(&headers)?;
-    let mut leases = agent.leases();
-    let held = leases.command(key_of(&headers), agent.shared.now()).is_ok();
+pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Json<LeaseState>, Problem> {
+    asker.caller.operator()?;
+    agent.client(&asker)?;
+    let (mut leases, now) = agent.shared.leases();
+    let held = leases.command(asker.key(), now).is_ok();
     let wanted_by = leases.lease().filter(|_| held).and_then(|lease| lease.wanted_by);
     Ok(Json(LeaseState { held, wanted_by }))
 }
 
-/// Lets the lease go: to the client that has asked for it, if one has. What runs goes on.
+/// Lets the lease go: to the client that has asked for it, if one has. What runs goes on. Refused while something goes on or waits for
+/// this client that may move boards.
 #[utoipa::path(
     delete,
     path = "/api/lease",
     operation_id = "release_lease",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 204, description = "It is let go"), Refusals, Denials)
 )]
-pub(super) async fn release(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<StatusCode, Problem> {
-    caller.operator()?;
-    let client = agent.client(&headers)?;
-    agent.leases().release(key_of(&headers).unwrap_or_default(), agent.shared.now());
+pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
+    asker.caller.operator()?;
+    let client = agent.client(&asker)?;
+    {
+        let (mut leases, now) = agent.shared.leases();
+        // Outputs would be enabled later, for nobody.
+        if leases.holds(client.id, now) && agent.shared.moves_for(client.id) {
+            return Err(Problem::new(
+                "busy",
+                "something goes on for this client that may move boards: nobody would command them",
+                "wait until it is over, or cancel it with DELETE /api/jobs/NUMBER",
+            ));
+        }
+        leases.release(asker.key().unwrap_or_default(), now);
+    }
     agent.gate.note("left", json!({ "client": client.id, "name": client.name }));
     Ok(StatusCode::NO_CONTENT)
 }

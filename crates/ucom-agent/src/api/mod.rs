@@ -4,40 +4,46 @@ mod commands;
 mod events;
 mod jobs;
 mod lease;
+mod line;
 mod objects;
 mod updates;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use agent_kit::access::{Access, Role, TokenError, random};
 use agent_kit::api::{Problem, Refusals};
-use agent_kit::gate::{Caller, Gate, let_in};
+use agent_kit::events::Events;
+use agent_kit::gate::{Asker, Caller, Gate, let_in};
 use agent_kit::log::CommandLog;
+use agent_kit::openapi::{Bearer, denials, served, text};
+use agent_kit::socket::Sockets;
 use axum::extract::{DefaultBodyLimit, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::StatusCode;
 use axum::middleware::from_fn_with_state;
 use axum::{Extension, Json, Router};
 use serde_json::json;
 use tokio::sync::Semaphore;
 use tower_http::timeout::TimeoutLayer;
-use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
-use utoipa::{IntoResponses, Modify, OpenApi, ToSchema};
+use utoipa::openapi::{self, RefOr};
+use utoipa::{IntoResponses, OpenApi, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::happening::Happening;
 use crate::owner::{Owner, Shared};
+use events::EventObject;
 use objects::{LeaseObject, StatusObject};
 
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
 /// Longest with images: 1 MiB each, as text.
 const IMAGES_MAX: usize = 6 << 20;
+/// Requests with images that are read at once.
+const UPDATES_READ: usize = 2;
 /// Longest that a request may take.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
-/// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
-const VIEWERS_MAX: usize = 128;
-const OPERATORS_MAX: usize = 32;
 
 /// What every handler has.
 #[derive(Clone)]
@@ -48,8 +54,10 @@ pub struct Agent {
     id: Arc<str>,
     bus: Arc<str>,
     simulated: bool,
-    viewers: Arc<Semaphore>,
-    operators: Arc<Semaphore>,
+    sockets: Sockets,
+    events: Arc<Events>,
+    /// Room for requests with images.
+    images: Arc<Semaphore>,
 }
 
 impl Agent {
@@ -65,35 +73,45 @@ impl Agent {
         bus: &str,
         simulated: bool,
     ) -> Result<Self, TokenError> {
+        let gate = Gate::new(access, log);
+        owner.shared.journal.follow({
+            let gate = gate.clone();
+            move |event| {
+                if let Some(what) = event.logged() {
+                    gate.note(what, json!({ "event": event }));
+                }
+            }
+        });
+        let id: Arc<str> = random()?.get(..8).unwrap_or_default().into();
         Ok(Self {
             shared: owner.shared.clone(),
-            gate: Gate::new(access, log),
-            id: random()?.get(..8).unwrap_or_default().into(),
+            gate,
+            events: Arc::new(Events::new(id.clone())),
+            id,
             bus: bus.into(),
             simulated,
-            viewers: Arc::new(Semaphore::new(VIEWERS_MAX)),
-            operators: Arc::new(Semaphore::new(OPERATORS_MAX)),
+            sockets: Sockets::default(),
+            images: Arc::new(Semaphore::new(UPDATES_READ)),
         })
     }
 
     /// Everything that is served.
     pub fn router(self) -> Router {
         let (router, description) = described().split_for_parts();
-        let description: Arc<str> = text(&description).into();
-        let openapi =
-            move || async move { ([(header::CONTENT_TYPE, "application/json")], description.to_string()) };
         router
             .route("/api/stream", axum::routing::get(events::stream))
-            .route("/openapi.json", axum::routing::get(openapi))
+            .route("/openapi.json", served(&description))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
             .with_state(self)
     }
 
     fn status(&self, caller: &Caller) -> StatusObject {
-        let now = self.shared.now();
-        let lease = self.shared.leases.lock().unwrap_or_else(PoisonError::into_inner).lease();
-        let lease = lease.filter(|lease| lease.until > now).map(|lease| LeaseObject {
+        let (lease, now) = {
+            let (leases, now) = self.shared.leases();
+            (leases.lease(), now)
+        };
+        let lease = lease.map(|lease| LeaseObject {
             holder: lease.holder,
             age_ms: now.saturating_sub(lease.since).as_millis() as u64,
             left_ms: lease.until.saturating_sub(now).as_millis() as u64,
@@ -117,11 +135,6 @@ pub fn description() -> String {
     text(&described().into_openapi())
 }
 
-fn text(description: &utoipa::openapi::OpenApi) -> String {
-    // It is made of strings.
-    description.to_pretty_json().unwrap_or_default()
-}
-
 #[derive(OpenApi)]
 #[openapi(
     info(
@@ -130,21 +143,11 @@ fn text(description: &utoipa::openapi::OpenApi) -> String {
                        the operator's from elsewhere. A Stop is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(Problem)),
+    components(schemas(Problem, EventObject, Happening)),
     modifiers(&Bearer),
     security((), ("token" = []))
 )]
 struct Description;
-
-/// A token, which those on the same computer need for commands alone.
-struct Bearer;
-
-impl Modify for Bearer {
-    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
-        let scheme = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
-        description.components.get_or_insert_default().add_security_scheme("token", scheme);
-    }
-}
 
 fn described() -> OpenApiRouter<Agent> {
     let images =
@@ -174,27 +177,15 @@ fn described() -> OpenApiRouter<Agent> {
 }
 
 /// What a command may be refused with beside what every request may.
-#[derive(IntoResponses)]
-#[expect(dead_code, reason = "describes responses")]
-enum Denials {
-    /// Refused: another client commands, something else is going on, a check or a board forbids it, or a board does not answer
-    #[response(status = 409)]
-    Denied(Problem),
-    /// More than may be sent at once
-    #[response(status = 413)]
-    TooLarge(Problem),
-    /// The body is no JSON
-    #[response(status = 415)]
-    NoJson(Problem),
-    /// What was asked for is none
-    #[response(status = 422)]
-    Invalid(Problem),
-    /// Something went wrong on the way
-    #[response(status = 500)]
-    Fault(Problem),
-    /// The bus is gone
-    #[response(status = 503)]
-    Lost(Problem),
+struct Denials;
+
+impl IntoResponses for Denials {
+    fn responses() -> BTreeMap<String, RefOr<openapi::Response>> {
+        denials(
+            "Refused: another client commands, something else is going on, a check or a board forbids it, or a board does not answer",
+            "The bus is gone",
+        )
+    }
 }
 
 /// The bus, and who commands.
@@ -230,19 +221,15 @@ struct SentObject {
         Refusals
     )
 )]
-async fn stop(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<Json<SentObject>, Problem> {
+async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
     // Who it is does not matter, but for going on later.
-    let client = match caller.role {
-        Role::Operator => agent.client(&headers).ok(),
+    let client = match asker.caller.role {
+        Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,
     };
-    let by = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
+    let by = client.as_ref().map_or_else(|| asker.caller.peer.to_string(), |client| client.name.clone());
     let lost = agent.shared.lost();
-    let facts = json!({ "command": "stop", "from": caller.peer.to_string(), "by": by, "lost": lost });
+    let facts = json!({ "command": "stop", "from": asker.caller.peer.to_string(), "by": by, "lost": lost });
     agent.gate.note("halt", facts);
     if let Some(lost) = lost {
         let message = format!("{lost}: nothing was sent; boards that run become safe without heartbeats");

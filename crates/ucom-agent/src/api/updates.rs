@@ -1,9 +1,11 @@
 //! Updates: images that are uploaded, checked, written and read back.
 use agent_kit::api::{Body, Problem, Refusals};
-use agent_kit::gate::Caller;
-use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
-use axum::{Extension, Json};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::{FromRequest as _, Request, State};
+use axum::http::StatusCode;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use host_kit::ErrorKind;
@@ -14,13 +16,14 @@ use ucom_host::files::{Image, ImageOptions};
 use ucom_host::master::update::{
     UpdateImage, UpdateMode, UpdateOptions, UpdateReport, UpdateTarget, has_header,
 };
-use ucom_host::master::{Outcome, Request};
+use ucom_host::master::{Outcome, Request as BusRequest};
 use utoipa::ToSchema;
 
 use super::boards::numbers;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
+use crate::owner::fault;
 use crate::work::Kind;
 
 /// A board that is to be updated.
@@ -166,6 +169,20 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     })
 }
 
+/// Reads a request; what is long is parsed beside the threads that serve.
+async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Problem> {
+    let (parts, body) = request.into_parts();
+    let body = Bytes::from_request(Request::from_parts(parts.clone(), body), &()).await;
+    let body = body.map_err(|e| Problem::rejected(e.status(), e.body_text()))?;
+    let request = Request::from_parts(parts, body.into());
+    let runtime = tokio::runtime::Handle::current();
+    let parsed = tokio::task::spawn_blocking(move || {
+        let Body(request) = runtime.block_on(Body::<UpdateRequest>::from_request(request, &()))?;
+        options(&request, &profile)
+    });
+    parsed.await.unwrap_or_else(|_| Err(fault()))
+}
+
 /// What an update that did not end well ended with.
 fn failed(report: &UpdateReport) -> Option<Problem> {
     let kind = report.failure()?;
@@ -187,27 +204,26 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
 #[utoipa::path(
     post,
     path = "/api/updates",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = UpdateRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn update(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-    Body(request): Body<UpdateRequest>,
+    asker: Asker,
+    request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Before the image is looked at.
-    agent.commander(&caller, &headers)?;
-    let options = options(&request, &agent.shared.picture().profile)?;
-    agent.begin((&caller, &headers), (Kind::Update, "update"), |hands| {
-        let started: Vec<u8> = options.targets.iter().filter(|_| options.start).map(|t| t.board).collect();
-        let targets: Vec<u8> = options.targets.iter().map(|t| t.board).collect();
-        let outcome = hands.driver.run(Request::Update(options));
-        targets.iter().for_each(|board| hands.forget(*board));
-        started.iter().for_each(|board| hands.has_started(*board));
-        match outcome? {
+    // Before the images are read.
+    agent.commander(&asker)?;
+    let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
+    let profile = agent.shared.picture().profile;
+    let options = read(request, profile).await?;
+    drop(room);
+    agent.begin(&asker, (Kind::Update, "update"), |hands| {
+        let start = options.start;
+        match hands.driver.run(BusRequest::Update(options))? {
             Outcome::Update(report) => {
+                hands.updated(&report, start);
                 let error = failed(&report);
                 Ok((Done::Update(report), error))
             }

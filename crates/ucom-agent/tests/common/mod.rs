@@ -24,14 +24,14 @@ pub const WAIT: Duration = Duration::from_secs(60);
 /// A simulated chain, on a bus that others can join.
 pub struct Chain {
     pub url: String,
-    faults: Sender<String>,
+    faults: Sender<(String, Sender<()>)>,
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Chain {
     pub fn start(boards: usize) -> Self {
-        let (faults, lines) = channel::<String>();
+        let (faults, lines) = channel::<(String, Sender<()>)>();
         let (ready, url) = channel();
         let ended: Arc<AtomicBool> = Arc::default();
         let end = ended.clone();
@@ -44,16 +44,22 @@ impl Chain {
                     .expect("an address");
             ready.send(server.url()).expect("the test waits");
             while !end.load(Ordering::Relaxed) {
-                lines.try_iter().for_each(|line| server.fault(&line));
+                let given: Vec<_> = lines.try_iter().collect();
+                given.iter().for_each(|(line, _)| server.fault(line));
                 server.turn(Duration::from_millis(20));
+                // It begins in a turn: whoever waits for it goes on now.
+                drop(given);
             }
         });
         Self { url: url.recv().expect("it listens"), faults, ended, thread: Some(thread) }
     }
 
-    /// Begins a fault.
+    /// Begins a fault, which has begun when this returns.
     pub fn fault(&self, line: &str) {
-        self.faults.send(line.into()).expect("it goes on");
+        let (begun, begins) = channel();
+        self.faults.send((line.into(), begun)).expect("it goes on");
+        // Nothing is ever sent: what waits here ends with the other side.
+        begins.recv().unwrap_or_default();
     }
 
     /// Joins the bus as a device that knows nothing but frames.
@@ -110,11 +116,16 @@ impl std::ops::Deref for Served {
 impl Served {
     /// Of a simulated chain of so many boards without numbers.
     pub fn start(boards: usize) -> Self {
+        Self::start_as(boards, Config::default())
+    }
+
+    /// The same of an agent that knows this beforehand.
+    pub fn start_as(boards: usize, config: Config) -> Self {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
         let log_path = dir.path().join("commands.jsonl");
         let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
-        let owner = Owner::open(&chain.url, Config::default()).expect("the bus opens");
+        let owner = Owner::open(&chain.url, config).expect("the bus opens");
         let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
         let address = listener.local_addr().expect("it listens");
@@ -133,7 +144,12 @@ impl Served {
 
     /// Of a chain with numbers, and who has given them: the lease is held.
     pub fn numbered(boards: usize) -> (Self, String) {
-        let served = Self::start(boards);
+        Self::numbered_as(boards, Config::default())
+    }
+
+    /// The same of an agent that knows this beforehand.
+    pub fn numbered_as(boards: usize, config: Config) -> (Self, String) {
+        let served = Self::start_as(boards, config);
         let key = served.lease("anna", 60.0, "continue");
         let job = served.job("POST /api/init", &key, Some(json!({})));
         assert_eq!(job["stage"], "finished", "{job}");

@@ -1,7 +1,7 @@
 //! `ucom record` and `ucom replay`: frames of a bus to a file and back.
 
 use std::path::Path;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use cli_kit::{Diagnose, ErrorKind, Failure, Output, OutputFile, Stop};
 use serde_json::json;
@@ -74,6 +74,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     files.into_iter().for_each(OutputFile::is_written);
     let (start, mut flushed) = (Instant::now(), Instant::now());
+    let began_at = host_kit::unix_time();
     let mut silence = Silence::begins(out);
     while !stop.asked() && recorder.frames() < args.count.unwrap_or(u64::MAX) {
         let rest = args.duration.map_or(Duration::MAX, |d| d.saturating_sub(start.elapsed()));
@@ -88,7 +89,8 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         bus.news().iter().for_each(|news| out.note(news));
         silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
-        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        // However the clock is set meanwhile, time does not run backwards in a file.
+        let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
             // `ucom record - | head` has what it wanted.

@@ -5,10 +5,11 @@ use std::task::{Context, Poll, Waker};
 
 use crate::master::engine::{Boards, Core, Event, Link, Mailbox, Session, Statistics, lock};
 use crate::master::error::{Error, MasterError, SignalError};
+use crate::master::io::process_data::ProcessData;
 use crate::master::io::{DescriptionKey, IoDescription, Kind, ParValue, SnapshotAssembler};
 use crate::master::procedures::work::{Work, work};
 use crate::master::reports::{ProcedureId, Request};
-use ucom::{Foreign, Frame, Profile, Sequence};
+use ucom::{Foreign, Frame, Function, Profile, Sequence};
 
 /// The PC side of one bus.
 pub struct Master {
@@ -135,6 +136,11 @@ impl Master {
         lock(&self.core).session != Session::Quiet
     }
 
+    /// Another PC's last frame (D-08): when it came, what it was, and to which number.
+    pub fn competing_master(&self) -> Option<(u64, Function, u8)> {
+        lock(&self.core).competing_master
+    }
+
     /// No more heartbeats and repeated inputs: boards that run become safe by themselves (D-50).
     pub fn end_session(&mut self) {
         let mut core = lock(&self.core);
@@ -165,6 +171,7 @@ impl Master {
             && let Some(place) = data.ci.get_mut(usize::from(index))
         {
             *place = value;
+            data.ci_known.insert(index);
             core.send_input(board, index);
         }
         Ok(index)
@@ -200,9 +207,9 @@ impl Master {
         lock(&self.core).descriptions.insert(key, description);
     }
 
-    /// Inputs of a board as last set.
-    pub fn inputs(&self, board: u8) -> Vec<u16> {
-        lock(&self.core).data.get(&board).map(|d| d.ci.clone()).unwrap_or_default()
+    /// Inputs of a board as last set, or as it wants them first; `None`: neither is known since its application started.
+    pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
+        lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()
     }
 
     /// Parameters of a board as this PC believes them to be.

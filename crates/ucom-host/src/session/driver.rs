@@ -98,7 +98,16 @@ impl Driver {
 
     /// What a board reports of itself.
     pub fn seen(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
-        match self.run(Request::Info { board })? {
+        self.ask(board, true)
+    }
+
+    /// The same, also after Ctrl-C: what was begun and cancelled may have left the board in any state.
+    pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
+        self.ask(board, false)
+    }
+
+    fn ask(&mut self, board: u8, can_be_cancelled: bool) -> Result<BoardSeen, SessionError> {
+        match self.drive(Request::Info { board }, can_be_cancelled, &mut |_| {})? {
             Outcome::Info(seen) => Ok(seen),
             other => Err(other.into()),
         }

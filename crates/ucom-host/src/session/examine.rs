@@ -9,7 +9,7 @@ use super::driver::Driver;
 use super::error::SessionError;
 use super::link::Link;
 use crate::master::doctor::{Controller, Observation, findings};
-use crate::master::{BoardSeen, Event, Outcome, Request};
+use crate::master::{BoardSeen, Outcome, Request};
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -37,17 +37,15 @@ impl Driver {
     /// # Errors
     /// The bus failed, or the operator asked for an end.
     pub fn examine(&mut self, listen: Duration) -> Result<Examination, SessionError> {
-        let start = Instant::now();
-        let mut competing_master = None;
+        let (start, start_us) = (Instant::now(), self.now_us());
         while start.elapsed() < listen && !self.stop_asked() {
             self.turn(Duration::from_millis(50))?;
             while let Some(event) = self.master.take_event() {
-                if let Event::CompetingMaster { function, to } = event {
-                    competing_master = Some((function, to));
-                }
                 self.pass_over(&event);
             }
         }
+        let received = self.master.competing_master().filter(|(at, ..)| *at >= start_us);
+        let competing_master = received.map(|(_, function, to)| (function, to));
         let scan = match competing_master {
             Some(_) => None,
             None => match self.run(Request::Scan)? {

@@ -2,13 +2,11 @@
 //! read-back, and a restart of the application, which nobody has to notice, ends it (D-35).
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use ucom::{BoardInfo, DateForm};
 
-use super::known::Cache;
+use super::cache::Cache;
 
 /// One parameter.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
@@ -20,35 +18,35 @@ pub struct Written {
 }
 
 /// Parameters of one board by their place in the buffer, as last written.
-#[derive(Clone, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(default)]
 pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
+    /// Where it is kept.
     #[serde(skip)]
-    file: Option<PathBuf>,
+    kept: (Cache, String),
 }
 
 impl History {
     /// What is remembered of a board; nothing when it has another program by now.
     pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
-        let file =
-            cache.directory.as_ref().map(|dir| dir.join(format!("written-{:04X}.json", info.flash_number)));
-        let text = file.as_ref().and_then(|file| std::fs::read_to_string(file).ok());
-        let kept = text.and_then(|text| serde_json::from_str::<Self>(&text).ok()).unwrap_or_default();
-        let same = (kept.program_id, kept.date) == (info.program_id, info.date);
-        let par = if same { kept.par } else { BTreeMap::new() };
-        Self { program_id: info.program_id, date: info.date, par, file }
+        let file = format!("written-{:04X}.json", info.flash_number);
+        let text = cache.read(&file);
+        let last = text.and_then(|text| serde_json::from_str::<Self>(&text).ok()).unwrap_or_default();
+        let same = (last.program_id, last.date) == (info.program_id, info.date);
+        let par = if same { last.par } else { BTreeMap::new() };
+        Self { program_id: info.program_id, date: info.date, par, kept: (cache.clone(), file) }
     }
 
     /// Remembers words that were written now. What cannot be kept is forgotten: that is no error.
     pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
-        let at = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        let at = host_kit::unix_time().as_secs();
         self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
-        if let (Some(file), Ok(text)) = (&self.file, serde_json::to_string_pretty(self)) {
-            let made = file.parent().map_or(Ok(()), std::fs::create_dir_all);
-            let _ = made.and_then(|()| std::fs::write(file, text));
+        if let Ok(text) = serde_json::to_string_pretty(self) {
+            let (cache, file) = &self.kept;
+            cache.write(file.clone(), text);
         }
     }
 
@@ -84,7 +82,7 @@ mod tests {
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();
-        let cache = Cache { directory: Some(dir.path().into()), fresh: false };
+        let cache = Cache::new(Some(dir.path().into()), false);
         let info =
             BoardInfo { flash_number: 0x21, sequence: 1, status: Status(0x8B), program_id: 7, date: 8 };
         History::of(&cache, &info).wrote([(2, 0xFFEC)].into_iter());

@@ -1,9 +1,8 @@
 //! Names of boards' inputs, outputs and parameters that were read before (D-36), and what their words mean (D-11).
 
-use std::path::PathBuf;
-
 use ucom::{BoardInfo, Profile};
 
+use super::cache::Cache;
 use super::driver::Driver;
 use super::error::SessionError;
 use crate::files::params::ParamsWord;
@@ -26,21 +25,7 @@ pub struct Known {
     strays: Vec<String>,
 }
 
-/// Where names are remembered from session to session, and whether they are taken from there.
-#[derive(Clone, Debug, Default)]
-pub struct Cache {
-    /// The directory; `None`: nothing is remembered.
-    pub directory: Option<PathBuf>,
-    /// Boards are asked although their names are known.
-    pub fresh: bool,
-}
-
 impl Cache {
-    fn file(&self, key: DescriptionKey) -> Option<PathBuf> {
-        let DescriptionKey { program_id, date, flash_number } = key;
-        Some(self.directory.as_ref()?.join(format!("io-{program_id:04X}-{date:04X}-{flash_number:04X}.json")))
-    }
-
     /// A board with its names. They are known from before, or its application runs and is asked; what cannot be kept is
     /// read anew next time: that is no error.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
@@ -63,10 +48,8 @@ impl Cache {
             Outcome::Description { description, .. } => description,
             other => return Err(other.into()),
         };
-        if let (Some(directory), Some(file), Ok(text)) =
-            (&self.directory, self.file(DescriptionKey::of(&info)), serde_json::to_string_pretty(&names))
-        {
-            let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
+        if let Ok(text) = serde_json::to_string_pretty(&names) {
+            self.write(file(DescriptionKey::of(&info)), text);
         }
         Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
@@ -106,11 +89,17 @@ impl Cache {
         if let Some(names) = driver.master.descriptions().remove(&key) {
             return Some(names);
         }
-        let text = std::fs::read_to_string(self.file(key)?).ok()?;
+        let text = self.read(&file(key))?;
         let names: IoDescription = serde_json::from_str(&text).ok()?;
         driver.master.know_description(key, names.clone());
         Some(names)
     }
+}
+
+/// Where the names of a program are kept.
+fn file(key: DescriptionKey) -> String {
+    let DescriptionKey { program_id, date, flash_number } = key;
+    format!("io-{program_id:04X}-{date:04X}-{flash_number:04X}.json")
 }
 
 impl Known {

@@ -9,6 +9,7 @@
 //! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
 pub mod bus_off;
+mod cache;
 mod changes;
 mod cleanup;
 mod driver;
@@ -28,6 +29,7 @@ mod selection;
 mod values;
 mod watch;
 
+pub use cache::Cache;
 pub use changes::{Numbered, Stopped};
 pub use cleanup::CleanupList;
 pub use driver::{Driver, Operator, event_text, nothing_shared};
@@ -35,7 +37,7 @@ pub use error::{SessionError, ValuesError};
 pub use examine::Examination;
 pub use followed::{Change, Followed, Notice};
 pub use history::{History, Written};
-pub use known::{Cache, Known};
+pub use known::Known;
 pub use link::{Link, from_wire, protocol_frame, recorded, replayed, to_wire};
 pub use parameters::{
     FileWords, ParameterFile, Parameters, arrived, become_master, inventory, name_of, write,

@@ -1,9 +1,10 @@
 //! With which inputs and parameters a run starts each board.
 
+use super::cache::Cache;
 use super::driver::Driver;
 use super::error::SessionError;
 use super::history::History;
-use super::known::{Cache, Known};
+use super::known::Known;
 use super::parameters::ParameterFile;
 use super::selection::{Assignment, for_board};
 use super::values::{Prepared, Word, note_rounded, words};

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use host_kit::{Diagnose, ErrorKind};
 
+use super::cache::Cache;
 use super::driver::Driver;
 use super::error::{SessionError, ValuesError};
-use super::known::{Cache, Known};
+use super::known::Known;
 use super::selection::Assignment;
 use crate::files::SignalTable;
 use crate::files::params::ParamsWord;
@@ -58,7 +59,7 @@ pub fn with_names<T>(
     match act(cache) {
         Err(SessionError::Procedure(
             Error::Signal(SignalError::StaleNames { .. }) | Error::Signal(SignalError::NoSignal { .. }),
-        )) if !cache.fresh => act(&Cache { fresh: true, ..cache.clone() }),
+        )) if !cache.fresh => act(&cache.refreshed()),
         other => other,
     }
 }

@@ -76,7 +76,7 @@ pub enum Event {
     },
     /// A frame that is not of this protocol (D-02); the first of each kind, all are counted.
     Foreign(Foreign),
-    /// A competing master: another PC sends on the bus (D-08).
+    /// A competing master: another PC sends on the bus (D-08), and has not for a second; [`Master::competing_master`](crate::master::Master::competing_master) also shows one that goes on.
     CompetingMaster {
         /// What it sent.
         function: Function,

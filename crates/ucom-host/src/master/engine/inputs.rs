@@ -73,11 +73,12 @@ impl Core {
         self.queue_frame(None, frame, Forget::Nothing);
     }
 
-    /// After a restart of its application nothing is known of a board's parameters (D-35).
+    /// After a restart of its application nothing is known of a board's parameters (D-35), nor of its inputs.
     pub(crate) fn forget_parameters(&mut self, board: u8) {
         self.stop_inputs(board);
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
+            data.ci_known.clear();
             // Another application may have started.
             data.sent = false;
         }

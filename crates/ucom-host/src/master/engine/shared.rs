@@ -329,7 +329,7 @@ impl Core {
             // The reports that follow answer the other PC: nobody has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // Once a second at most.
+        // One that goes on is no news.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

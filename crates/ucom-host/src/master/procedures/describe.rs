@@ -251,7 +251,7 @@ pub(crate) async fn initial_inputs_procedure(link: Link, board: u8) -> Result<Ou
     let values = read_initial_inputs(&link, board, description.dimensions().ci).await?;
     link.with(|core| {
         if let Some(data) = core.data.get_mut(&board) {
-            data.ci.clone_from(&values);
+            data.know_inputs(values.clone());
         }
     });
     Ok(Outcome::InitialInputs { board, values })

@@ -11,8 +11,9 @@ use crate::master::procedures::byte_order::{exchanged, flash_numbers};
 use crate::master::procedures::exchange::{confirmed, info, set_status};
 use crate::master::procedures::one_board::one_board_each;
 use crate::master::procedures::repair::given_back;
+use crate::master::procedures::stop::stop_board;
 use crate::master::procedures::take_number::take_number;
-use crate::master::reports::{BoardSeen, InitFinding, InitOptions, InitReport, Outcome, Reports};
+use crate::master::reports::{BoardSeen, InitFinding, InitOptions, InitReport, Outcome, Reports, StopLevel};
 use std::collections::BTreeSet;
 use ucom::{Sequence, Status, ToBoard};
 
@@ -35,8 +36,25 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
             }
         }
     }
+    stop_unreset(&link, &mut report).await;
     verify(&link, &options, &mut report).await;
     Ok(Outcome::Init(report))
+}
+
+/// A board that did not receive the reset has kept its number, and runs on with inputs that nobody repeats: it is stopped.
+async fn stop_unreset(link: &Link, report: &mut InitReport) {
+    for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
+        let stopped = stop_board(link, seen.number, StopLevel::Application).await;
+        report.findings.push(InitFinding::NotReset { board: seen.number, stopped: stopped.is_ok() });
+        if let Ok(info) = stopped {
+            seen.info = info;
+        }
+    }
+}
+
+/// By itself a board starts its application after a reset where it is to, and never its control loop.
+fn runs_on(status: Status) -> bool {
+    status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
 /// PC_RESET to all and their reports. When nobody reports although boards are there, the reset was lost: once more.

@@ -144,7 +144,7 @@ async fn start_loop(
     }
     link.with(|core| {
         if let Some(data) = core.data.get_mut(&board) {
-            data.ci = ci;
+            data.know_inputs(ci);
         }
         if give {
             core.send_inputs(board);

@@ -86,6 +86,14 @@ pub enum InitFinding {
         /// Its number.
         board: u8,
     },
+    /// A board that ran on: it did not receive the reset.
+    #[error("board {board} did not receive PC_RESET and ran on: {}", if *stopped { "it was stopped" } else { "it may still run" })]
+    NotReset {
+        /// Its number.
+        board: u8,
+        /// It has confirmed since that its application is stopped.
+        stopped: bool,
+    },
     /// Two boards with one flash number.
     #[error("duplicate flash number 0x{flash_number:04X}: boards {first} and {second}")]
     DuplicateFlash {

@@ -1,0 +1,157 @@
+//! Boards: as last seen, as found by a scan, as they answer a command.
+use ucom::{Profile, Status};
+use ucom_host::date_text;
+use ucom_host::master::{Board, BoardSeen, Life};
+use utoipa::ToSchema;
+
+use crate::picture::Picture;
+
+/// A board as last seen.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct BoardObject {
+    /// Its number.
+    pub number: u8,
+    /// Number of its bootloader: who it is; missing before it has answered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flash_number: Option<u16>,
+    /// Its description of itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
+    pub state: String,
+    /// Its heartbeats: `alive`, `late`, `lost`, or `none` where none is expected.
+    pub heartbeat: String,
+    /// Since the last heartbeat, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heartbeat_age_s: Option<f64>,
+    /// The bits of its status that are set.
+    pub status: Vec<String>,
+    /// Its outputs are enabled, as it last reported.
+    pub active: bool,
+    /// It has an application.
+    pub application: bool,
+    /// Program ID of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub program_id: Option<u16>,
+    /// When that was flashed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flash_date: Option<String>,
+    /// Errors that it has reported.
+    pub errors: u64,
+    /// The last of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_error: Option<String>,
+    /// Frames of it in the last second.
+    pub frames_per_s: u64,
+    /// What it offers; missing before its names are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offers: Option<OffersObject>,
+}
+
+/// Names of what a board's application has.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct OffersObject {
+    /// The description of the application.
+    pub description: String,
+    /// Controller inputs.
+    pub inputs: Vec<String>,
+    /// Sensor outputs.
+    pub outputs: Vec<String>,
+    /// Parameters.
+    pub parameters: Vec<String>,
+}
+
+fn bits(status: Status) -> Vec<String> {
+    Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| (*name).to_owned()).collect()
+}
+
+impl BoardObject {
+    /// All boards of a picture.
+    pub(crate) fn all(picture: &Picture) -> Vec<Self> {
+        picture.boards.iter().map(|(number, board)| Self::of(picture, number, board)).collect()
+    }
+
+    /// One of them.
+    pub(crate) fn of(picture: &Picture, number: u8, board: &Board) -> Self {
+        let now_us = picture.clock_us();
+        let info = board.info;
+        let program = info.filter(|info| info.has_application());
+        let offers = picture.values.get(&number).map(|values| &values.known.names);
+        Self {
+            number,
+            flash_number: info.map(|info| info.flash_number),
+            description: board.description.clone(),
+            state: board.state_name(now_us).into(),
+            heartbeat: if board.life == Life::Unarmed { "none" } else { board.life.name() }.into(),
+            heartbeat_age_s: board.alive_age_s(now_us),
+            status: board.status().filter(|_| board.is_known()).map(bits).unwrap_or_default(),
+            active: board.admin.is_some_and(|admin| admin.active),
+            application: program.is_some(),
+            program_id: program.map(|info| info.program_id),
+            flash_date: program.map(|info| date_text(&picture.profile, info.date)),
+            errors: board.error_count,
+            last_error: board.errors.last().map(|(_, code)| code.name().into()),
+            frames_per_s: picture.statistics.frames_per_s(number, now_us),
+            offers: offers.map(|names| OffersObject {
+                description: names.description.clone(),
+                inputs: names.ci.clone(),
+                outputs: names.so.clone(),
+                parameters: names.par.clone(),
+            }),
+        }
+    }
+}
+
+/// A board as it answered.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct FoundObject {
+    /// Its number.
+    pub number: u8,
+    /// Number of its bootloader: who it is.
+    pub flash_number: u16,
+    /// Its description of itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// Program ID of its application.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub program_id: Option<u16>,
+    /// The bits of its status that are set.
+    pub status: Vec<String>,
+}
+
+impl FoundObject {
+    pub(super) fn of(seen: &BoardSeen) -> Self {
+        Self {
+            number: seen.number,
+            flash_number: seen.info.flash_number,
+            description: seen.description.clone(),
+            program_id: seen.info.has_application().then_some(seen.info.program_id),
+            status: bits(seen.info.status),
+        }
+    }
+}
+
+/// A board after a command, as it answered.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct AnswerObject {
+    /// Its number.
+    pub board: u8,
+    /// What it does: `exloader`, `programming`, `started`, `running`.
+    pub state: String,
+    /// The bits of its status that are set.
+    pub status: Vec<String>,
+    /// When its application was flashed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flash_date: Option<String>,
+}
+
+impl AnswerObject {
+    pub(crate) fn of((board, info): &ucom_host::session::Numbered, profile: &Profile) -> Self {
+        Self {
+            board: *board,
+            state: ucom_host::master::state_name(info.status).into(),
+            status: bits(info.status),
+            flash_date: info.has_application().then(|| date_text(profile, info.date)),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Values of boards, by name and in units where the signal table has them.
+use serde_json::Value;
+use ucom_host::files::Signal;
+use ucom_host::master::Life;
+use ucom_host::master::io::{Kind, ParValue};
+use utoipa::ToSchema;
+
+use crate::picture::{Picture, Values};
+
+/// Outputs that are older are not those of now, µs.
+const OLD_US: u64 = 500_000;
+
+/// Values of a board.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ValuesObject {
+    /// Its number.
+    pub board: u8,
+    /// Since its outputs came, s; missing before the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_s: Option<f64>,
+    /// These are not the outputs of now: they are older than half a second, or the board is late or lost, or has left its control loop.
+    pub stale: bool,
+    /// Sensor outputs; empty before the first.
+    pub outputs: Vec<ValueObject>,
+    /// Controller inputs as last set, or as the board began with them; without a value where this agent has neither set nor read them
+    /// since the application started.
+    pub inputs: Vec<ValueObject>,
+    /// Parameters as this agent believes them to be: boards have no way to read them back.
+    pub parameters: Vec<ValueObject>,
+}
+
+/// A value.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ValueObject {
+    /// Its name.
+    pub name: String,
+    /// Its place in the buffer.
+    pub index: usize,
+    /// The number in its unit, true or false, or a word as text, by the signal table; missing where it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Value>)]
+    pub value: Option<Value>,
+    /// For people, with its unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+    /// Its unit, where the signal table has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+}
+
+impl ValueObject {
+    /// A word of a signal.
+    pub(crate) fn of(name: &str, index: usize, signal: Option<&Signal>, word: Option<u16>) -> Self {
+        let value = |word: u16| signal.map_or_else(|| Value::from(word as i16), |signal| signal.json(word));
+        let unit = signal.filter(|signal| signal.known && !signal.unit.is_empty());
+        Self {
+            name: name.to_owned(),
+            index,
+            value: word.map(value),
+            text: word.map(|word| signal.map_or_else(|| word.to_string(), |s| s.text_with_unit(word))),
+            unit: unit.map(|signal| signal.unit.clone()),
+        }
+    }
+}
+
+impl ValuesObject {
+    pub(crate) fn of(picture: &Picture, values: &Values) -> Self {
+        let (known, now_us) = (&values.known, picture.clock_us());
+        let board = picture.boards.get(known.board);
+        let list = |kind: Kind, words: Vec<Option<u16>>| {
+            let (names, signals) = (known.names.names(kind), known.signals.all(kind));
+            let value = |(index, word): (usize, Option<u16>)| {
+                let name = names.get(index).map_or("", String::as_str);
+                ValueObject::of(name, index, signals.get(index), word)
+            };
+            words.into_iter().enumerate().map(value).collect()
+        };
+        let outputs = values.outputs.as_ref();
+        let age_us = outputs.map(|outputs| now_us.saturating_sub(outputs.time_us));
+        let runs =
+            board.is_some_and(|b| b.is_known() && b.life != Life::Late && b.admin.is_none_or(|a| a.run));
+        let parameter = |value: &ParValue| match value {
+            ParValue::Assumed(word) => Some(*word),
+            ParValue::Unknown => None,
+        };
+        Self {
+            board: known.board,
+            age_s: age_us.map(|us| us as f64 * 1e-6),
+            stale: !runs || age_us.is_none_or(|us| us > OLD_US),
+            outputs: list(
+                Kind::So,
+                outputs.map(|o| o.words.iter().copied().map(Some).collect()).unwrap_or_default(),
+            ),
+            inputs: list(Kind::Ci, values.inputs.clone()),
+            parameters: list(Kind::Par, values.parameters.iter().map(parameter).collect()),
+        }
+    }
+}

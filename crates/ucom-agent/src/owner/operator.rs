@@ -1,0 +1,198 @@
+//! The operator of the session: what happens on the bus becomes events and a picture, also in the middle of a procedure.
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use agent_kit::api::Problem;
+use ucom_host::master::io::{DescriptionKey, Snapshot};
+use ucom_host::master::{Event, Master, Supervision};
+use ucom_host::session::{Followed, Known, Link, Operator};
+
+use super::shared::Shared;
+use crate::happening::Happening;
+use crate::picture::{Picture, Values};
+
+/// How often the picture is made anew.
+const PICTURE: Duration = Duration::from_millis(40);
+/// Another PC that has sent nothing for so long is gone, µs.
+const COMPETING_US: u64 = 3_000_000;
+
+/// So long a Stop is repeated, µs.
+const SERIES_US: u64 = 60_000;
+/// How often progress within a cycle is written down, µs.
+const PROGRESS_US: u64 = 200_000;
+
+/// Job, boards, attempt and cycle of an update.
+type Step = (u64, Vec<u8>, u32, u32);
+
+/// What the owner's thread remembers, also in the middle of a procedure.
+#[derive(Default)]
+pub(super) struct Local {
+    pub followed: Followed,
+    pub snapshots: BTreeMap<u8, Snapshot>,
+    pub known: BTreeMap<u8, Arc<Known>>,
+    /// Boards that gave no names when somebody asked who only looks: when, and why.
+    pub nameless: BTreeMap<u8, (Instant, Problem)>,
+    pub states: BTreeMap<u8, &'static str>,
+    /// Boards whose applications this agent has started, and those whose control loops.
+    pub started: BTreeSet<u8>,
+    pub running: BTreeSet<u8>,
+    /// Stops that have been sent, and when the last one began to be.
+    pub halts_sent: u64,
+    pub halted_us: Option<u64>,
+    /// Job, boards, attempt and cycle of the last progress that was written down, and when, µs.
+    pub progress: Option<(Step, u64)>,
+    /// The Stop at the agent's end is on the bus.
+    pub end_sent: bool,
+    pub job: Option<u64>,
+    /// When another PC was last news.
+    pub competing_us: Option<u64>,
+    pub now_us: u64,
+    /// When the picture was made; `None`: it is to be made anew at once.
+    pub published: Option<Instant>,
+    /// What has happened and is written down behind the next picture: who reads of it finds it there.
+    pub happened: Vec<Happening>,
+}
+
+/// The operator of the session.
+pub(super) struct Hand {
+    pub shared: Arc<Shared>,
+    pub local: Rc<RefCell<Local>>,
+}
+
+impl Operator for Hand {
+    fn stop_asked(&self) -> bool {
+        self.shared.is_cancelled()
+    }
+
+    fn note(&self, text: String) {
+        let mut local = self.local.borrow_mut();
+        let note = match local.job {
+            Some(job) => Happening::JobNote { job, text },
+            None => Happening::Note { text },
+        };
+        local.happened.push(note);
+    }
+
+    fn happened(&self, event: &Event, text: Option<String>) {
+        let mut local = self.local.borrow_mut();
+        let now_us = local.now_us;
+        local.followed.see(event, now_us);
+        let job = local.job;
+        let mut write = Vec::new();
+        match event {
+            Event::Snapshot { board, snapshot } => drop(local.snapshots.insert(*board, snapshot.clone())),
+            Event::Supervision { board, change } => {
+                let (board, change) = match change {
+                    Supervision::Late => (Some(*board), "late"),
+                    Supervision::Lost => (Some(*board), "lost"),
+                    Supervision::Back => (Some(*board), "back"),
+                    Supervision::Rebooted { .. } => (Some(*board), "rebooted"),
+                    Supervision::UnknownRebooted { .. } => (None, "rebooted"),
+                };
+                write.push(Happening::Heartbeat { board, change: change.into() });
+            }
+            Event::BoardError { board, code, .. } => write.push(Happening::BoardError {
+                board: *board,
+                code: code.number(),
+                name: code.name().into(),
+                meaning: code.meaning().into(),
+            }),
+            Event::Debug { board, text } => write.push(Happening::Text { board: *board, text: text.clone() }),
+            Event::Progress { progress, .. } => {
+                if let Some(job) = job {
+                    let (boards, attempt, cycle) =
+                        (progress.boards.clone(), progress.attempt, progress.cycle);
+                    let (bytes, total) = (progress.bytes, progress.total);
+                    let step = (job, boards.clone(), attempt, cycle);
+                    let soon = |(last, at): &(Step, u64)| {
+                        *last == step && now_us.saturating_sub(*at) < PROGRESS_US && bytes < total
+                    };
+                    if !local.progress.as_ref().is_some_and(soon) {
+                        local.progress = Some((step, now_us));
+                        write.push(Happening::Progress { job, boards, attempt, cycle, bytes, total });
+                    }
+                }
+            }
+            Event::CompetingMaster { .. } => {
+                let new = local.competing_us.is_none_or(|at| now_us.saturating_sub(at) > COMPETING_US);
+                local.competing_us = Some(now_us);
+                if let Some(text) = text.filter(|_| new) {
+                    write.push(Happening::Note { text });
+                }
+            }
+            _ => write.extend(text.map(|text| match job {
+                Some(job) => Happening::JobNote { job, text },
+                None => Happening::Note { text },
+            })),
+        }
+        local.happened.extend(write);
+    }
+
+    fn turned(&self, master: &mut Master, link: &mut Link) {
+        // Whatever goes on and waits: nobody keeps a lease from lapsing.
+        drop(self.shared.leases());
+        let mut local = self.local.borrow_mut();
+        local.now_us = link.now_us();
+        self.shared.show_halts();
+        let halts = self.shared.halts();
+        // One that comes meanwhile has the repetitions of the one before, then its own: a flood of Stops does not fill the bus.
+        let repeated = local.halted_us.is_some_and(|at| local.now_us.saturating_sub(at) < SERIES_US);
+        if local.halts_sent < halts && !repeated {
+            (local.halts_sent, local.halted_us) = (halts, Some(local.now_us));
+            master.stop_at_once(local.now_us, None);
+        }
+        if self.shared.has_ended() && !local.end_sent {
+            // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
+            local.end_sent = true;
+            let started: Vec<u8> = local.started.iter().copied().collect();
+            master.stop_at_once(local.now_us, Some(&started));
+        }
+        if !local.happened.is_empty() || local.published.is_none_or(|at| at.elapsed() >= PICTURE) {
+            local.published = Some(Instant::now());
+            self.publish(&mut local, master, link);
+        }
+    }
+}
+
+impl Hand {
+    fn publish(&self, local: &mut Local, master: &Master, link: &mut Link) {
+        let boards = master.boards();
+        let states: BTreeMap<u8, &'static str> =
+            boards.iter().map(|(number, board)| (number, board.state_name(local.now_us))).collect();
+        for (number, state) in &states {
+            if local.states.get(number) != Some(state) {
+                let state = (*state).to_owned();
+                local.happened.push(Happening::State { board: *number, state });
+            }
+        }
+        local.states = states;
+        // Another application has other names.
+        let is_its = |(number, known): &(&u8, &Arc<Known>)| {
+            let info = boards.get(**number).and_then(|board| board.info);
+            info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))
+        };
+        let values = |(number, known): (&u8, &Arc<Known>)| {
+            let outputs = local.snapshots.get(number).cloned();
+            let (inputs, parameters) = (master.inputs(*number), master.parameters(*number));
+            (*number, Values { known: known.clone(), outputs, inputs, parameters })
+        };
+        let values = local.known.iter().filter(is_its).map(values).collect();
+        let competing_us = master.competing_master().map(|(at, ..)| at);
+        let picture = Picture {
+            now_us: local.now_us,
+            at: Instant::now(),
+            profile: master.profile(),
+            boards,
+            statistics: master.statistics(),
+            controller: link.controller(),
+            is_master: master.is_master(),
+            competing_us: competing_us.filter(|at| local.now_us.saturating_sub(*at) <= COMPETING_US),
+            shared: master.shared_numbers().iter().map(ToString::to_string).collect(),
+            values,
+        };
+        self.shared.publish(picture, std::mem::take(&mut local.happened));
+    }
+}

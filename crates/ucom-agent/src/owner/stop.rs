@@ -1,0 +1,60 @@
+//! What follows a Stop when its frames are on the bus: each board is asked.
+use std::collections::BTreeSet;
+
+use ucom::Status;
+use ucom_host::master::StopLevel;
+use ucom_host::session::{Boards, SessionError};
+
+use super::Hands;
+use crate::happening::Happening;
+
+impl Hands {
+    /// Asks each board after a Stop, and stops its application: those that answer, and those that may run and do not.
+    pub(super) fn see_to_stop(&mut self) {
+        let was_master = self.driver.master.is_master();
+        let mut wanted = self.may_run();
+        let mut not_stopped = Vec::new();
+        match self.driver.numbers_to_stop(&Boards::All) {
+            Ok(found) => wanted.extend(found),
+            // Without a number no board runs.
+            Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) => {}
+            Err(error) => not_stopped.push(error.to_string()),
+        }
+        let all = Boards::Some(wanted.iter().copied().collect());
+        let mut confirmed = BTreeSet::new();
+        match self.driver.stop_each(&all, StopLevel::Application) {
+            Ok(stopped) => {
+                confirmed.extend(stopped.boards.iter().map(|(board, _)| *board));
+                not_stopped
+                    .extend(stopped.failed.iter().map(|(board, error)| format!("board {board}: {error}")));
+                let failed: BTreeSet<u8> = stopped.failed.iter().map(|(board, _)| *board).collect();
+                let rest =
+                    wanted.iter().filter(|board| !confirmed.contains(board) && !failed.contains(board));
+                not_stopped.extend(rest.map(|board| format!("board {board}: it was not asked")));
+            }
+            Err(error) => not_stopped.push(error.to_string()),
+        }
+        // The others count as started until they are stopped.
+        confirmed.iter().for_each(|board| self.runs_no_more(Some(*board)));
+        if !was_master {
+            // A Stop makes nobody the master: who has not confirmed it becomes safe without heartbeats, unless the master sends its own.
+            self.driver.master.end_session();
+        }
+        let boards = confirmed.into_iter().collect();
+        self.local.borrow_mut().happened.push(Happening::Stopped { boards, not_stopped });
+        self.settle();
+    }
+
+    /// Boards that may run: this agent has started them, or they were last seen so. One that has begun anew does not.
+    fn may_run(&mut self) -> BTreeSet<u8> {
+        let (boards, now_us) = (self.driver.master.boards(), self.driver.now_us());
+        for (number, _) in boards.iter().filter(|(_, board)| board.rebooted) {
+            self.runs_no_more(Some(number));
+        }
+        let seen = boards.iter().filter(|(_, board)| {
+            let started = board.status().is_some_and(|status| status.has(Status::MSTART));
+            started || ["started", "running"].contains(&board.state_name(now_us))
+        });
+        seen.map(|(number, _)| number).chain(self.started()).collect()
+    }
+}

@@ -1,0 +1,74 @@
+//! The log of commands: what was done, whoever has gone meanwhile, and what came of it.
+mod common;
+
+use std::io::Write as _;
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use common::{Served, WAIT};
+use serde_json::{Value, json};
+
+/// The first line that `is` so.
+fn line(served: &Served, what: &str, is: impl Fn(&Value) -> bool) -> Value {
+    let begun = Instant::now();
+    loop {
+        let log = std::fs::read_to_string(&served.log).expect("the log");
+        let lines = log.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        if let Some(line) = lines.into_iter().find(|line| is(line)) {
+            return line;
+        }
+        assert!(begun.elapsed() < WAIT, "no {what} in {log}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn what_a_client_has_done_is_in_the_log_when_it_hangs_up() {
+    let (served, key) = Served::numbered(1);
+    assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
+    let first = served.board(1)["offers"]["parameters"][0].as_str().expect("a name").to_owned();
+    let (name, token) = (first.split(' ').next().unwrap_or_default(), served.tokens.operator.clone());
+    // It goes before it is answered, until one was done all the same.
+    let done = (100..140).find(|word| {
+        let body = json!({ "value": word }).to_string();
+        let request = format!(
+            "PUT /api/boards/1/parameters/{name} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {token}\r\n\
+             Lease-Key: {key}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+            served.address,
+            body.len()
+        );
+        let mut stream = TcpStream::connect(served.address).expect("it listens");
+        stream.write_all(request.as_bytes()).expect("it reads");
+        std::thread::sleep(Duration::from_millis(4));
+        drop(stream);
+        std::thread::sleep(Duration::from_millis(200));
+        let (_, values) = served.api("GET /api/boards/1/values", None, None);
+        values["parameters"][0]["value"] == f64::from(*word)
+    });
+    let word = done.expect("one was done");
+    let found = line(&served, "line of it", |line| line["asked"]["value"] == json!(f64::from(word)));
+    assert_eq!(
+        (&found["command"], &found["asked"]["name"], &found["why_not"]),
+        (&json!("parameter"), &json!(name), &Value::Null)
+    );
+}
+
+#[test]
+fn a_lapse_its_stop_and_what_became_of_jobs_are_in_the_log() {
+    let (served, key) = Served::numbered(1);
+    let ended = |line: &Value| line["what"] == "ended" && line["event"]["outcome"] == "finished";
+    assert_eq!(line(&served, "end of the job", ended)["event"]["job"], 1);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    let anna = served.lease("anna", 6.0, "stop");
+    served.run(&anna, &[1]);
+    let lapsed = |line: &Value| {
+        line["what"] == "stop" && line["event"]["by"].as_str().is_some_and(|by| by.contains("anna"))
+    };
+    line(&served, "Stop by the policy", lapsed);
+    let stopped = line(&served, "confirmation", |line| line["what"] == "stopped");
+    assert_eq!(stopped["event"]["boards"], json!([1]));
+    let lease =
+        |holder: Value| move |line: &Value| line["what"] == "lease" && line["event"]["holder"] == holder;
+    line(&served, "who commanded", lease(json!("anna")));
+    line(&served, "lapse", lease(Value::Null));
+}

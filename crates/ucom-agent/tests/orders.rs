@@ -1,0 +1,337 @@
+//! What becomes of what a client has asked for when a Stop comes, its lease lapses, it goes, or others ask too.
+mod common;
+
+use std::io::Write as _;
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use common::{Served, frame};
+use serde_json::{Value, json};
+use test_kit::http::Http;
+
+fn is(kind: &'static str) -> impl Fn(&Value) -> bool {
+    move |event| event["kind"] == kind
+}
+
+/// Commands to a board that does not answer: what comes behind them waits for some seconds.
+fn commands_to_nobody(served: &Served, key: &str, count: usize) -> Vec<JoinHandle<()>> {
+    let ask = || {
+        let (http, key) = (Http::clone(served), key.to_owned());
+        let off = Some(json!({ "active": false }));
+        std::thread::spawn(move || drop(http.api("PUT /api/boards/31/outputs", Some(&key), off)))
+    };
+    let all = (0..count).map(|_| ask()).collect();
+    std::thread::sleep(Duration::from_millis(100));
+    all
+}
+
+/// The control loop of board 1 runs for a client with this policy, and its outputs are off.
+fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
+    let job = served.job("POST /api/run", key, Some(json!({ "boards": [1] })));
+    assert_eq!(job["stage"], "finished", "{job}");
+    assert_eq!(served.api("DELETE /api/lease", Some(key), None).0, 204);
+    served.lease("bob", lasts_s, policy)
+}
+
+/// Somebody who looks at the leases while the job goes on changes nothing: the lapse ends it, and all boards are stopped.
+#[test]
+fn a_run_whose_client_dies_meanwhile_is_stopped() {
+    let (served, key) = Served::numbered(6);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    let key = served.lease("anna", 1.0, "stop");
+    let last = served.last_event();
+    let job = served.begin("POST /api/run", &key, Some(json!({ "active": true })));
+    std::thread::sleep(Duration::from_millis(1100));
+    assert_eq!(served.api("PUT /api/lease", Some("none"), None).0, 403);
+    let (halted, halt) = served.event(last, "halt", is("halt"));
+    assert!(halt["by"].as_str().is_some_and(|by| by.contains("anna")), "{halt}");
+    let (ended, end) = served.event(last, "ended", is("ended"));
+    assert!(halted < ended && end["outcome"] == "cancelled", "{halted} {ended} {end}");
+    assert_eq!(served.over(job)["error"]["code"], "stopped");
+    let (_, stopped) = served.event(last, "stopped", is("stopped"));
+    assert_eq!(stopped, json!({ "kind": "stopped", "boards": [1, 2, 3, 4, 5, 6], "not_stopped": [] }));
+    for number in 1..=6 {
+        assert_eq!(served.board(number)["state"], "exloader");
+    }
+}
+
+/// A board that could not be asked to stop after a run that did not come about is stopped at the lapse.
+#[test]
+fn a_run_that_cannot_be_taken_back_counts_as_started() {
+    let (served, key) = Served::numbered(3);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    let key = served.lease("anna", 20.0, "stop");
+    let job = served.begin("POST /api/run", &key, Some(json!({ "boards": [1, 2, 3] })));
+    served.board_when(1, "started", |board| board["state"] == "started");
+    served.chain.fault("silent board=1 for_s=8");
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(served.api(&format!("DELETE /api/jobs/{job}"), Some(&key), None).0, 204);
+    let over = served.over(job);
+    assert_eq!(over["stage"], "cancelled", "{over}");
+    let mut peer = served.chain.peer();
+    let mut served = served;
+    // It is as good as started: the agent does not end without a Stop for it.
+    let ending = std::thread::spawn(move || {
+        served.end();
+        served
+    });
+    frame(&mut *peer, 0x601, &[0, 0, 0, 0]);
+    drop(ending.join());
+}
+
+/// A long update does not keep a lease from lapsing, and goes on itself.
+#[test]
+fn a_lease_lapses_in_the_middle_of_an_update() {
+    use base64::Engine as _;
+    let (served, key) = Served::numbered(2);
+    served.run(&key, &[1]);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    let key = served.lease("anna", 1.0, "stop");
+    let last = served.last_event();
+    let image = base64::engine::general_purpose::STANDARD.encode(vec![0x5A; 60_000]);
+    let body = json!({ "boards": [{ "board": 2 }], "image": image, "format": "bin", "force": true });
+    let job = served.begin("POST /api/updates", &key, Some(body));
+    let (halted, _) = served.event(last, "halt", is("halt"));
+    let (ended, end) = served.event(last, "ended", is("ended"));
+    assert!(halted < ended && end["outcome"] == "finished", "{halted} {ended} {end}");
+    assert_eq!(served.over(job)["update"]["boards"][0]["verified"], true);
+    let (_, stopped) = served.event(ended, "stopped", is("stopped"));
+    assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
+}
+
+/// What a client asked for that commands no more is not done under the lease of another.
+#[test]
+fn what_waits_when_the_lease_lapses_does_not_move_anything() {
+    let (served, key) = Served::numbered(1);
+    let key = idle(&served, 1.0, "continue", &key);
+    let others = commands_to_nobody(&served, &key, 4);
+    let reset = std::thread::spawn({
+        let (http, key) = (Http::clone(&served), key.clone());
+        move || http.api("POST /api/boards/1/reset", Some(&key), None)
+    });
+    let on = json!({ "active": true });
+    let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), Some(on));
+    assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
+    // Nor does a board of the other one lose its number.
+    let (status, error) = reset.join().expect("it is answered");
+    assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
+    let board = served.board(1);
+    assert_eq!((&board["state"], &board["active"]), (&json!("running"), &json!(false)), "{board}");
+    others.into_iter().for_each(|other| other.join().expect("it is answered"));
+}
+
+/// A program that has hung up does not move anything any more; what it asked to end is ended.
+#[test]
+fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
+    let (served, key) = Served::numbered(2);
+    served.run(&key, &[2]);
+    let key = idle(&served, 60.0, "continue", &key);
+    let others = commands_to_nobody(&served, &key, 4);
+    let hang_up = |board: u8, active: bool| {
+        let body = json!({ "active": active }).to_string();
+        let (address, token, length) = (served.address, &served.tokens.operator, body.len());
+        let mut socket = TcpStream::connect(address).expect("it listens");
+        write!(
+            socket,
+            "PUT /api/boards/{board}/outputs HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {token}\r\n\
+             Lease-Key: {key}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}"
+        )
+        .expect("it reads");
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    hang_up(1, true);
+    hang_up(2, false);
+    others.into_iter().for_each(|other| other.join().expect("it is answered"));
+    served.board_when(2, "off", |board| board["active"] == false);
+    // Asked for later, and done now: whatever waited before it has had its turn.
+    assert_eq!(served.api("PUT /api/boards/2/outputs", Some(&key), Some(json!({ "active": false }))).0, 204);
+    assert_eq!(served.board(1)["active"], false);
+}
+
+/// One's own Stop takes nothing away from somebody else's.
+#[test]
+fn the_calm_of_a_stop_lasts_behind_another_one() {
+    let (served, key) = Served::numbered(1);
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    for _ in 0..2 {
+        assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
+    }
+    let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
+    assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
+    // Nor is an update begun behind it.
+    let body = json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true });
+    let (status, error) = served.api("POST /api/updates", Some(&key), Some(body));
+    assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
+}
+
+/// A job that waits for its turn is cancelled like one that goes on.
+#[test]
+fn a_job_that_waits_is_cancelled_and_one_that_is_refused_never_was() {
+    let (served, key) = Served::numbered(1);
+    let last = served.last_event();
+    let others = commands_to_nobody(&served, &key, 4);
+    let job = served.begin("POST /api/scan", &key, None);
+    for _ in 0..3 {
+        assert_eq!(served.api("POST /api/scan", Some(&key), None).1["code"], "busy");
+    }
+    assert_eq!(served.api(&format!("DELETE /api/jobs/{job}"), Some(&key), None).0, 204);
+    assert_eq!(served.over(job)["stage"], "cancelled");
+    others.into_iter().for_each(|other| other.join().expect("it is answered"));
+    assert_eq!(served.begin("POST /api/scan", &key, None), job + 1);
+    served.over(job + 1);
+    let (_, all) = served.api(&format!("GET /api/events?after={last}"), None, None);
+    let all = all["events"].as_array().expect("events");
+    let of = |kind| all.iter().map(|entry| &entry["event"]).filter(move |event| event["kind"] == kind);
+    let ended: Vec<(Option<u64>, Option<&str>)> =
+        of("ended").map(|event| (event["job"].as_u64(), event["outcome"].as_str())).collect();
+    assert_eq!(ended, [(Some(job), Some("cancelled")), (Some(job + 1), Some("finished"))]);
+}
+
+/// A board that says nothing when it is stopped is not taken for stopped.
+#[test]
+fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
+    let (served, key) = Served::numbered(2);
+    served.run(&key, &[1, 2]);
+    let last = served.last_event();
+    served.chain.fault("silent board=2 for_s=2.5");
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let (number, stopped) = served.event(last, "stopped", is("stopped"));
+    let silent = &stopped["not_stopped"];
+    assert_eq!((&stopped["boards"], silent.as_array().map(Vec::len)), (&json!([1]), Some(1)), "{stopped}");
+    assert!(silent[0].as_str().is_some_and(|text| text.starts_with("board 2: ")), "{stopped}");
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let (_, stopped) = served.event(number, "stopped", is("stopped"));
+    assert_eq!((&stopped["boards"], &stopped["not_stopped"]), (&json!([1, 2]), &json!([])), "{stopped}");
+}
+
+/// Those who only look keep no command waiting, not even one of them that asks a silent board again and again.
+#[test]
+fn questions_keep_no_command_waiting() {
+    let (served, key) = Served::numbered(2);
+    served.run(&key, &[1]);
+    served.chain.fault("silent board=2 for_s=20");
+    let look = || {
+        let http = Http::clone(&served);
+        std::thread::spawn(move || drop(http.api_as(None, "GET /api/boards/2/values", None, None)))
+    };
+    let viewers: Vec<JoinHandle<()>> = (0..40).map(|_| look()).collect();
+    std::thread::sleep(Duration::from_millis(200));
+    let begun = Instant::now();
+    for active in [false, true, false] {
+        let body = Some(json!({ "active": active }));
+        let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), body);
+        assert_eq!(status, 204, "{error}");
+    }
+    // One question that goes on may be waited for.
+    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
+}
+
+/// At the agent's end boards are stopped before a job takes back what it has begun on others.
+#[test]
+fn the_end_stops_what_runs_before_a_job_is_undone() {
+    let (mut served, key) = Served::numbered(5);
+    served.run(&key, &[1]);
+    served.begin("POST /api/run", &key, Some(json!({ "boards": [2, 3, 4, 5] })));
+    served.board_when(4, "started", |board| board["state"] == "started");
+    (2..=5).for_each(|board| served.chain.fault(&format!("silent board={board} for_s=4")));
+    std::thread::sleep(Duration::from_millis(100));
+    let mut peer = served.chain.peer();
+    let ending = std::thread::spawn(move || {
+        served.end();
+        served
+    });
+    let stopped = frame(&mut *peer, 0x601, &[0, 0, 0, 0]);
+    assert!(stopped < Duration::from_millis(1500), "{stopped:?}");
+    drop(ending.join());
+}
+
+/// A command whose turn comes when its request is about to be given up is not done instead of being done unseen.
+#[test]
+fn what_waits_too_long_does_not_move_anything() {
+    let (served, key) = Served::numbered(1);
+    let key = idle(&served, 60.0, "continue", &key);
+    let others = commands_to_nobody(&served, &key, 12);
+    let on = json!({ "active": true });
+    let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), Some(on));
+    assert_eq!((status, error["code"].as_str()), (409, Some("busy")), "{error}");
+    assert_eq!(served.board(1)["active"], false);
+    others.into_iter().for_each(|other| other.join().expect("it is answered"));
+}
+
+/// A board that does not receive the reset of an init runs on: it is stopped, and the init is none that has succeeded.
+#[test]
+fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
+    let (served, key) = Served::numbered(2);
+    served.run(&key, &[1, 2]);
+    // It receives again while the reports are awaited, for 1 s behind the reset.
+    served.chain.fault("deaf board=2 for_s=0.9");
+    let job = served.job("POST /api/init", &key, Some(json!({})));
+    assert_eq!((&job["stage"], &job["error"]["code"]), (&json!("failed"), &json!("init")), "{job}");
+    let message = job["error"]["message"].as_str().unwrap_or_default();
+    assert!(message.contains("board 2") && message.contains("PC_RESET"), "{job}");
+    let board = served.board(2);
+    assert_eq!((&board["state"], &board["active"]), (&json!("exloader"), &json!(false)), "{board}");
+    let again = served.job("POST /api/init", &key, Some(json!({})));
+    assert_eq!(again["stage"], "finished", "{again}");
+}
+
+/// Who commands does not go while something begins for it: its outputs would be enabled later, with nobody there.
+#[test]
+fn the_lease_is_not_let_go_while_a_run_begins() {
+    let (served, key) = Served::numbered(1);
+    let job = served.begin("POST /api/run", &key, Some(json!({ "active": true })));
+    let (status, error) = served.api("DELETE /api/lease", Some(&key), None);
+    assert_eq!((status, error["code"].as_str()), (409, Some("busy")), "{error}");
+    assert_eq!(served.over(job)["stage"], "finished");
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    assert_eq!(served.board(1)["active"], true);
+}
+
+/// The agent is the master no more as soon as nobody commands and nothing runs.
+fn is_no_master_soon(served: &Served) {
+    let begun = Instant::now();
+    while served.api("GET /api/status", None, None).1["is_master"] == true {
+        assert!(begun.elapsed() < Duration::from_secs(3), "it still sends heartbeats");
+        std::thread::sleep(Duration::from_millis(30));
+    }
+}
+
+/// Those who only look do not keep the heartbeats going, however much they ask: boards of nobody become safe (D-50).
+#[test]
+fn d50_questions_do_not_keep_the_heartbeats_going() {
+    let (served, key) = Served::numbered(1);
+    let asked_enough = Arc::new(AtomicBool::new(false));
+    let look = || {
+        let (http, enough) = (Http::clone(&served), asked_enough.clone());
+        std::thread::spawn(move || {
+            while !enough.load(Ordering::Relaxed) {
+                // Its application is not started: it has no names.
+                assert_eq!(http.api_as(None, "GET /api/boards/1/values", None, None).0, 409);
+            }
+        })
+    };
+    let viewers: Vec<JoinHandle<()>> = (0..8).map(|_| look()).collect();
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    is_no_master_soon(&served);
+    asked_enough.store(true, Ordering::Relaxed);
+    viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
+}
+
+/// What was begun and has been taken back does not count as started.
+#[test]
+fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
+    let (served, key) = Served::numbered(2);
+    let job = served.begin("POST /api/run", &key, Some(json!({ "active": true })));
+    served.board_when(1, "started", |board| board["state"] == "started");
+    assert_eq!(served.api(&format!("DELETE /api/jobs/{job}"), Some(&key), None).0, 204);
+    assert_eq!(served.over(job)["stage"], "cancelled");
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    is_no_master_soon(&served);
+}

@@ -1,0 +1,121 @@
+//! What is remembered from session to session: small files in a directory.
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Longest file that is read beforehand, bytes.
+const FILE_MAX: u64 = 1 << 20;
+/// Files that wait for a disk: what comes beyond is not kept.
+const WAITING_MAX: usize = 64;
+
+/// Where names are remembered from session to session, and whether they are taken from there.
+#[derive(Clone, Debug, Default)]
+pub struct Cache {
+    place: Place,
+    /// Boards are asked although their names are known.
+    pub fresh: bool,
+}
+
+#[derive(Clone, Debug, Default)]
+enum Place {
+    /// Nothing is remembered.
+    #[default]
+    Nowhere,
+    Directory(PathBuf),
+    Memory(Memory),
+}
+
+/// What a directory has, and where to write what comes.
+#[derive(Clone, Debug)]
+struct Memory {
+    texts: Arc<Mutex<BTreeMap<String, String>>>,
+    writer: SyncSender<(String, String)>,
+}
+
+impl Cache {
+    /// One that remembers in this directory; `None`: nothing is remembered.
+    pub fn new(directory: Option<PathBuf>, fresh: bool) -> Self {
+        Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
+    }
+
+    /// The same for who must never wait for a disk: all that is there is read now, and what comes is written by a thread of its own.
+    #[must_use]
+    pub fn in_memory(self) -> Self {
+        let Self { place: Place::Directory(directory), fresh } = self else { return self };
+        let texts = Arc::new(Mutex::new(all(&directory)));
+        let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
+        // It ends with the last clone of this cache, and is not waited for: what cannot be kept is asked for anew.
+        std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
+        Self { place: Place::Memory(Memory { texts, writer }), fresh }
+    }
+
+    /// The same; boards are asked although their names are known.
+    pub(super) fn refreshed(&self) -> Self {
+        Self { fresh: true, ..self.clone() }
+    }
+
+    /// A file; `None`: there is none, or it cannot be read.
+    pub(super) fn read(&self, name: &str) -> Option<String> {
+        match &self.place {
+            Place::Nowhere => None,
+            Place::Directory(directory) => fs::read_to_string(directory.join(name)).ok(),
+            Place::Memory(memory) => {
+                memory.texts.lock().unwrap_or_else(PoisonError::into_inner).get(name).cloned()
+            }
+        }
+    }
+
+    /// Keeps a file. What cannot be kept is forgotten: that is no error.
+    pub(super) fn write(&self, name: String, text: String) {
+        match &self.place {
+            Place::Nowhere => {}
+            Place::Directory(directory) => write(directory, &name, text),
+            Place::Memory(Memory { texts, writer }) => {
+                texts.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), text.clone());
+                // A disk that does not answer is not waited for.
+                let _ = writer.try_send((name, text));
+            }
+        }
+    }
+}
+
+fn write(directory: &Path, name: &str, text: String) {
+    let _ = fs::create_dir_all(directory).and_then(|()| fs::write(directory.join(name), text));
+}
+
+fn all(directory: &Path) -> BTreeMap<String, String> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let text = |entry: fs::DirEntry| {
+        let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
+        // Nothing else than a file, which could be waited for without end.
+        let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
+        about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
+    };
+    entries.filter_map(text).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_in_memory_comes_from_the_directory_and_gets_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let on_disk = Cache::new(Some(dir.path().join("new")), false);
+        on_disk.write("a.json".into(), "1".into());
+        let cache = on_disk.clone().in_memory();
+        // Nothing of the disk is looked at from now on.
+        on_disk.write("a.json".into(), "2".into());
+        assert_eq!(cache.read("a.json").as_deref(), Some("1"));
+        cache.write("b.json".into(), "3".into());
+        assert_eq!(cache.read("b.json").as_deref(), Some("3"));
+        let begun = std::time::Instant::now();
+        while on_disk.read("b.json").as_deref() != Some("3") {
+            assert!(begun.elapsed().as_secs() < 60, "never written");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        assert!(Cache::default().in_memory().read("a.json").is_none());
+    }
+}

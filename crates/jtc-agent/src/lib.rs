@@ -8,6 +8,8 @@ pub mod log;
 pub mod modbus;
 pub mod owner;
 pub mod record;
+mod upload;
+pub mod will;
 
 pub use agent_kit::{access, serve, tls};
 pub use line::{ClientId, Denied, Introduction, Lease, LineEvent, Policy, Role, SharedLine};

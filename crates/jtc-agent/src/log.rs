@@ -11,14 +11,14 @@ use crate::owner::Observer;
 /// Writes what happens on a line to a log of commands.
 pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     Box::new(move |_, event| {
-        let (what, facts) = logged(event);
+        let Some((what, facts)) = logged(event) else { return };
         log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     })
 }
 
-/// An event of the line as a line of the log: what happened, and what is to be known of it.
-fn logged(event: &LineEvent) -> (&'static str, Value) {
-    match event {
+/// An event of the line as a line of the log: what happened, and what is to be known of it. `None`: others show it.
+fn logged(event: &LineEvent) -> Option<(&'static str, Value)> {
+    Some(match event {
         LineEvent::Sent { client, frame_type, .. } => {
             ("sent", json!({ "client": client.0, "frame": frame_type.name() }))
         }
@@ -36,5 +36,6 @@ fn logged(event: &LineEvent) -> (&'static str, Value) {
         LineEvent::PutOut { client, reason } => {
             ("put-out", json!({ "client": client.0, "why": reason.to_string() }))
         }
-    }
+        LineEvent::Will(_) => return None,
+    })
 }

@@ -4,10 +4,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use jtc_host::sample::Sample;
 use jtc_host::{Port, PortError};
+use jtc_wire::Status;
 use tokio::sync::watch;
 
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine};
+use crate::upload::Upload;
 
 /// Longest that the owner waits for the device before it looks at what clients want: a Stop waits no longer for its turn.
 const TURN: Duration = Duration::from_millis(2);
@@ -29,6 +32,8 @@ struct Shared {
     /// Something was delivered: for those who block, and for those who do not.
     delivered: Condvar,
     changed: watch::Sender<()>,
+    /// What the controller was given to follow.
+    upload: Mutex<Upload>,
     ended: AtomicBool,
     start: Instant,
     baud: Option<u32>,
@@ -107,6 +112,21 @@ impl Line {
         self.0.lock().lost.clone()
     }
 
+    /// The values of a status, with the commanded ones where it executes a trajectory that was seen to be given to the controller: they
+    /// stand in no status. Measurements are so many ticks old (J-62).
+    pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
+        let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);
+        match given {
+            Some(trajectory) => Sample::following(0.0, status, &trajectory, delay_ticks),
+            None => Sample::from_status(0.0, status),
+        }
+    }
+
+    /// Name of the client that commands now.
+    pub fn commander(&self) -> Option<String> {
+        self.with(|line, _| line.introduction(line.lease()?.holder).map(|client| client.name.clone()))
+    }
+
     /// A client comes; it goes when what is returned is dropped.
     pub fn join(&self, introduction: Introduction) -> Joined {
         let client = self.with(|line, _| line.join(introduction));
@@ -151,6 +171,7 @@ impl Owner {
             state: Mutex::new(State { line: SharedLine::new(port.baud()), lost: None }),
             delivered: Condvar::new(),
             changed: watch::Sender::new(()),
+            upload: Mutex::default(),
             ended: AtomicBool::new(false),
             start: Instant::now(),
             baud: port.baud(),
@@ -215,6 +236,9 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
     };
     if !bytes.is_empty() {
         port.write_all(&bytes)?;
+        let mut state = shared.lock();
+        let now = shared.now();
+        state.line.handed_over(now);
     }
     let wait = due.map_or(TURN, |due| due.saturating_sub(now).min(TURN));
     let mut buffer = [0; 4096];
@@ -227,6 +251,9 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
     };
     if read > 0 || !events.is_empty() {
         shared.wake();
+    }
+    for event in events.iter().filter(|event| Upload::is_of(event)) {
+        shared.upload.lock().unwrap_or_else(PoisonError::into_inner).see(event);
     }
     events.iter().for_each(|event| observer(now, event));
     Ok(())
@@ -246,6 +273,11 @@ impl ClientPort {
         self.joined.client
     }
 
+    /// The line that it is of.
+    pub fn line(&self) -> &Line {
+        &self.joined.line
+    }
+
     fn shared(&self) -> &Shared {
         &self.joined.line.0
     }
@@ -259,9 +291,6 @@ impl ClientPort {
         let end = Instant::now() + timeout;
         let mut state = self.shared().lock();
         loop {
-            // What this client had sent before has come: it was sent in this process.
-            let last = state.line.last_halt();
-            state.line.confirm_halt(self.joined.client, last);
             let deliveries = state.line.take_deliveries(self.joined.client);
             let gone = || PortError::Gone { path: self.shared().name.clone() };
             match deliveries {

@@ -28,6 +28,11 @@ fn operator(board: &mut Board, name: &str) -> ClientId {
     board.join(name, Role::Operator, Policy::Continue)
 }
 
+fn ask(board: &mut Board, client: ClientId) -> Result<(), jtc_agent::Denied> {
+    let (now, last) = (board.now(), board.line.last_halt());
+    board.line.ask_to_move(client, last, now)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -60,6 +65,24 @@ proptest! {
         // The one who stopped has the record of it.
         let (records, _) = board.take(other);
         prop_assert!(records.len() == 1 && records[0].accepted());
+    }
+
+    /// However long the system takes to take bytes: no more than 256 wait, and the silence ahead of a Stop is long enough for it to be one.
+    #[test]
+    fn j04_j05_a_stop_in_an_upload_on_a_busy_computer_is_a_frame_of_its_own(
+        after_us in 0u64..400_000, points in 20usize..1666, held_up_us in prop::collection::vec(0u64..15_000, 0..20),
+    ) {
+        let mut board = Board::new(115_200);
+        let anna = operator(&mut board, "anna");
+        let bob = board.join("bob", Role::Viewer, Policy::Continue);
+        board.held_up_us = held_up_us.into();
+        (0..4).for_each(|_| board.send(anna, &segment(points)));
+        board.run_ms(after_us / 1000);
+        board.send(bob, &STOP);
+        board.run_ms(100);
+        prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
+        // And one that is just being over.
+        prop_assert!(board.queued_most <= 256 + 1, "{}", board.queued_most);
     }
 
     #[test]
@@ -144,7 +167,8 @@ fn one_client_commands_and_all_see_who() {
     }
     assert_eq!(board.arrived(FrameType::GripperControl), 0);
     // With consent it is another's.
-    board.line.want_lease(b).expect("somebody has it");
+    let now = board.now();
+    board.line.want_lease(b, now).expect("somebody has it");
     assert!(board.take(a).1.contains(&"bob wants it".to_owned()));
     let now = board.now();
     assert!(board.line.release_lease(b, now).is_err());
@@ -217,18 +241,22 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert_eq!(board.arrived(FrameType::GripperControl), 1, "it moves nothing");
-    // It is sent again by a program that does not look at the reason; and what it has sent before is known to have come.
-    for n in 0..20 {
+    // It is sent again by a program that does not look at the reason, and an upload leads nowhere.
+    for _ in 0..20 {
         board.run_ms(400);
         board.send(a, &EXECUTE);
-        if n == 10 {
-            let last = board.line.last_halt();
-            board.line.confirm_halt(a, last);
-        }
+        board.send(a, &segment(1));
     }
     board.run_ms(100);
-    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1, "it has gone on all the time");
-    board.run_ms(600);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1, "nobody has asked for it since");
+    assert_eq!(board.arrived(FrameType::Trajectory), 0);
+    // Who asks has to know of the Stop.
+    let (now, last) = (board.now(), board.line.last_halt());
+    assert!(board.line.ask_to_move(a, last - 1, now).is_err());
+    board.send(a, &EXECUTE);
+    board.run_ms(100);
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
+    board.line.ask_to_move(a, last, now).expect("it is long ago");
     board.send(a, &EXECUTE);
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 2);
@@ -273,15 +301,124 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
+/// Teaching waits for the arm to be held, and the controller refuses a Stop meanwhile: the arm would be loose behind it.
 #[test]
-fn a_client_that_does_not_answer_begins_no_motion_behind_a_stop_however_long_it_takes() {
+fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
+    for damaged in [0, 10] {
+        let mut board = Board::new(115_200);
+        board.status.state = ControllerState::HoldPos.into();
+        let (a, b) = (operator(&mut board, "anna"), operator(&mut board, "bob"));
+        board.send(b, &STOP);
+        board.run_ms(500);
+        assert_eq!(board.arrived(FrameType::TeachingModeDisable), 0, "nobody teaches");
+        board.run_ms(3_000);
+        ask(&mut board, a).expect("it is long ago");
+        board.send(a, &fixed::TEACHING_MODE_ENABLE);
+        board.run_ms(500);
+        board.damaged = damaged;
+        board.send(b, &STOP);
+        board.run_ms(1_000);
+        assert_eq!(board.arrived(FrameType::TeachingModeDisable), 1);
+        assert!(board.line.is_idle());
+        // While it is taught, too, and not again when it is not any more.
+        board.status.state = ControllerState::Teaching.into();
+        board.run_ms(100);
+        board.send(b, &STOP);
+        board.run_ms(500);
+        assert_eq!(board.arrived(FrameType::TeachingModeDisable), 2);
+        board.status.state = ControllerState::HoldPos.into();
+        board.run_ms(100);
+        board.send(b, &STOP);
+        board.run_ms(500);
+        assert_eq!(board.arrived(FrameType::TeachingModeDisable), 2);
+    }
+}
+
+/// A program that ends as it should leaves an arm at rest, and keeps nobody from moving it.
+#[test]
+fn a_policy_where_nothing_moves_stops_nobody_else() {
+    for (state, moves, sent) in [
+        (ControllerState::HoldPos, false, None),
+        (ControllerState::Operate, true, None),
+        (ControllerState::Teaching, true, None),
+        (ControllerState::HoldPos, true, Some(EXECUTE.to_vec())),
+        (ControllerState::HoldPos, true, Some(fixed::TEACHING_MODE_ENABLE.to_vec())),
+    ] {
+        let mut board = Board::new(115_200);
+        board.status.state = state.into();
+        let (a, b) = (board.join("anna", Role::Operator, Policy::Stop), operator(&mut board, "bob"));
+        board.send(a, &fixed::CLEAR_OCCURRED_ERRORS);
+        board.run_ms(500);
+        if let Some(frame) = &sent {
+            board.send(a, frame);
+            board.run_ms(100);
+        }
+        let before = board.arrived(FrameType::TrajSetExecStatus);
+        let now = board.now();
+        board.line.leave(a, now);
+        board.run_ms(100);
+        assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before + 1, "in doubt it is stopped");
+        assert_eq!(ask(&mut board, b).is_err(), moves, "{state:?} {sent:?}");
+        let applied = board.line.take_events().iter().any(|e| matches!(e, LineEvent::PolicyApplied { .. }));
+        assert_eq!(applied, moves);
+    }
+}
+
+/// What goes on without its client takes the lease again, also in the middle of an upload; what does not, does not.
+#[test]
+fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
+    for (policy, arrived) in [(Policy::Continue, 4), (Policy::Pause, 0)] {
+        let mut board = Board::new(115_200);
+        let a = board.join("anna", Role::Operator, policy);
+        let now = board.now();
+        board.line.take_lease(a, Some(Duration::from_secs(1)), now).expect("nobody has it");
+        ask(&mut board, a).expect("nobody has stopped anything");
+        for _ in 0..4 {
+            board.send(a, &segment(500));
+        }
+        board.run_ms(9_000);
+        assert_eq!(board.arrived(FrameType::Trajectory), arrived, "{policy:?}");
+        assert!(board.line.lease().is_none());
+        // Nor does it take the lease by anything else that it still sends.
+        board.send(a, &fixed::gripper_control(true));
+        assert_eq!(board.line.lease().is_some(), policy == Policy::Continue);
+        let now = board.now();
+        if policy == Policy::Pause {
+            assert!(board.line.is_halted(a) && board.line.halted_by(a).contains("policy"));
+            board.line.take_lease(a, None, now).expect("it asks for it");
+            assert!(board.line.is_halted(a), "what it was asked for before is over");
+            let (_, denied) = board.take(a);
+            assert!(!denied.is_empty() && denied.iter().all(|why| !why.starts_with(' ')), "{denied:?}");
+        }
+    }
+}
+
+#[test]
+fn a_client_that_sends_too_much_can_stop_the_arm_all_the_same() {
+    let mut board = Board::new(115_200);
+    let a = operator(&mut board, "anna");
+    let mut bytes = fixed::GET_INFO.repeat(500);
+    bytes.extend(STOP);
+    board.send(a, &bytes);
+    board.run_ms(200);
+    assert_eq!(board.line.take_deliveries(a), None, "it is put out");
+    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
+}
+
+/// A key that is held down has to be let go before it moves the arm again.
+#[test]
+fn who_goes_on_asking_for_a_jog_behind_a_stop_does_not_get_it() {
     let mut board = Board::new(115_200);
     let (a, b) = (operator(&mut board, "anna"), operator(&mut board, "bob"));
     board.send(b, &STOP);
-    board.run_ms(60_000);
-    board.send(a, &EXECUTE);
-    board.run_ms(100);
-    assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
+    for _ in 0..80 {
+        board.run_ms(80);
+        let (now, last) = (board.now(), board.line.last_halt());
+        assert!(board.line.ask_to_jog(a, last, now).is_err());
+    }
+    board.run_ms(600);
+    let (now, last) = (board.now(), board.line.last_halt());
+    board.line.ask_to_jog(a, last, now).expect("it was let go");
 }
 
 #[test]
@@ -316,7 +453,8 @@ fn what_was_sent_under_a_lease_that_is_gone_is_not_written_under_another() {
     let (a, b) = (operator(&mut board, "anna"), operator(&mut board, "bob"));
     board.send(a, &[segment(1500), segment(1500), EXECUTE.to_vec()].concat());
     board.run_ms(100);
-    board.line.want_lease(b).expect("anna commands");
+    let now = board.now();
+    board.line.want_lease(b, now).expect("anna commands");
     let now = board.now();
     board.line.release_lease(a, now).expect("she has it");
     board.run_ms(15_000);
@@ -374,8 +512,7 @@ fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     let mut board = Board::new(115_200);
     let anna = operator(&mut board, "anna");
     let bob = board.join("bob", Role::Viewer, Policy::Continue);
-    let now = board.now();
-    board.line.ask_to_move(anna, now).expect("nobody has stopped anything");
+    ask(&mut board, anna).expect("nobody has stopped anything");
     assert!(!board.line.is_halted(anna));
     board.send(bob, &STOP);
     board.run_ms(10_000);
@@ -387,8 +524,7 @@ fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     let (_, denied) = board.take(anna);
     assert!(denied.iter().any(|why| why.contains("bob has stopped")), "{denied:?}");
     // Asked for anew it is sent, and what it pauses itself on its way it goes on from.
-    let now = board.now();
-    board.line.ask_to_move(anna, now).expect("it is long ago");
+    ask(&mut board, anna).expect("it is long ago");
     board.send(anna, &EXECUTE);
     board.run_ms(1_000);
     board.send(anna, &PAUSE);
@@ -405,27 +541,23 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     let now = board.now();
     board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
     board.run_ms(100);
-    let now = board.now();
-    board.line.ask_to_move(anna, now).expect("her own");
+    ask(&mut board, anna).expect("her own");
     board.line.halt_for(None, "bob", ExecCommand::Pause, now);
     board.run_ms(100);
     let now = board.now();
     board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
     board.run_ms(100);
-    let now = board.now();
-    assert!(board.line.ask_to_move(anna, now).is_err(), "bob's counts");
+    assert!(ask(&mut board, anna).is_err(), "bob's counts");
     // She comes again, and the three seconds are the same.
     board.line.leave(anna, now);
     let again = operator(&mut board, "anna");
-    let now = board.now();
-    assert!(board.line.ask_to_move(again, now).is_err(), "bob's counts");
+    assert!(ask(&mut board, again).is_err(), "bob's counts");
     let before = board.arrived(FrameType::TrajSetExecStatus);
     board.send(again, &EXECUTE);
     board.run_ms(200);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before);
     board.run_ms(3_500);
-    let now = board.now();
-    board.line.ask_to_move(again, now).expect("it is over");
+    ask(&mut board, again).expect("it is over");
 }
 
 /// A client whose policy has ended its motion begins no other one by itself, also where somebody else has gone on with the first.
@@ -435,14 +567,13 @@ fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
     let anna = board.join("anna", Role::Operator, Policy::Pause);
     let now = board.now();
     board.line.take_lease(anna, Some(Duration::from_secs(1)), now).expect("nobody has it");
-    board.line.ask_to_move(anna, now).expect("nobody has stopped anything");
+    ask(&mut board, anna).expect("nobody has stopped anything");
     board.send(anna, &EXECUTE);
     board.run_ms(1_500);
     assert!(board.line.lease().is_none());
     board.run_ms(4_000);
     let bob = operator(&mut board, "bob");
-    let now = board.now();
-    board.line.ask_to_move(bob, now).expect("it is long ago");
+    ask(&mut board, bob).expect("it is long ago");
     board.send(bob, &EXECUTE);
     board.run_ms(200);
     board.line.leave(bob, board.now());
@@ -459,7 +590,42 @@ fn a_lease_that_lapses_goes_to_the_one_who_has_asked_for_it() {
     let bob = operator(&mut board, "bob");
     let now = board.now();
     board.line.take_lease(anna, Some(Duration::from_secs(1)), now).expect("nobody has it");
-    board.line.want_lease(bob).expect("anna has it");
+    board.line.want_lease(bob, now).expect("anna has it");
     board.run_ms(1_200);
     assert_eq!(board.line.lease().map(|lease| lease.holder), Some(bob));
+}
+
+#[test]
+fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
+    let mut board = Board::new(115_200);
+    let [anna, bob, carl] = ["anna", "bob", "carl"].map(|name| operator(&mut board, name));
+    let now = board.now();
+    board.line.take_lease(anna, None, now).expect("nobody has it");
+    board.line.want_lease(bob, now).expect("anna has it");
+    board.line.want_lease(bob, now).expect("he may ask again");
+    let denied = board.line.want_lease(carl, now).expect_err("bob was first").to_string();
+    assert!(denied.contains("bob") && denied.contains("anna"), "{denied}");
+    assert_eq!(board.line.lease().and_then(|lease| lease.wanted_by), Some(bob));
+    // He gives up.
+    board.line.leave(bob, now);
+    board.line.want_lease(carl, now).expect("nobody waits any more");
+    // One without a connection of its own shows that it waits.
+    let dora = operator(&mut board, "dora");
+    let lasts = Some(Duration::from_secs(1));
+    board.line.leave(carl, now);
+    assert!(board.line.take_lease(dora, lasts, now).is_err());
+    board.line.want_lease(dora, now).expect("nobody waits any more");
+    board.run_ms(800);
+    let now = board.now();
+    assert!(board.line.take_lease(dora, lasts, now).is_err(), "anna has it");
+    board.run_ms(800);
+    let (now, emil) = (board.now(), operator(&mut board, "emil"));
+    assert!(board.line.want_lease(emil, now).is_err());
+    board.run_ms(300);
+    let now = board.now();
+    board.line.want_lease(emil, now).expect("she has lapsed");
+    board.line.release_lease(anna, now).expect("it is hers");
+    // Who has got it waits no more.
+    assert_eq!(board.line.lease().map(|lease| (lease.holder, lease.wanted_by)), Some((emil, None)));
+    board.line.want_lease(anna, now).expect("nobody waits");
 }

@@ -257,12 +257,7 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others {
         other.input(0);
     }
-    let refused = |mut ninth: Client| {
-        // It may be closed before or behind what is sent.
-        let _ = ninth.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
-        ninth.response().is_none()
-    };
-    assert!(refused(cell.connect()));
+    assert!(is_refused(cell.connect()));
     std::thread::sleep(Duration::from_millis(2100));
     for other in &mut others[1..] {
         other.input(0);
@@ -271,6 +266,37 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
+}
+
+/// It may be closed before or behind what is sent.
+fn is_refused(mut client: Client) -> bool {
+    let _ = client.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
+    client.response().is_none()
+}
+
+#[test]
+fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
+    let cell = Cell::start(&[]);
+    let mut clients: Vec<Client> = (0..8).map(|_| cell.connect()).collect();
+    let silence = || std::thread::sleep(Duration::from_millis(2100));
+    // The last of them would be the next to give way but for the others' coils.
+    for (n, client) in clients.iter_mut().enumerate() {
+        client.input(0);
+        assert_eq!(if n < 7 { client.ask(&PRESS) } else { PRESS.to_vec() }, PRESS);
+    }
+    silence();
+    let mut ninth = cell.connect();
+    assert_eq!(ninth.input(0), 1);
+    assert!(clients.pop().expect("the last").response().is_none());
+    // Where all hold the arm nobody comes, until one lets it go.
+    assert_eq!(ninth.ask(&PRESS), PRESS);
+    silence();
+    assert!(is_refused(cell.connect()));
+    assert_eq!(clients[3].ask(&LET_GO), LET_GO);
+    silence();
+    assert_eq!(cell.connect().input(0), 1);
+    assert!(clients.remove(3).response().is_none());
+    assert!(clients.iter_mut().all(|client| client.ask(&[1, 0, 0, 0, 1]) == [1, 1, 1]));
 }
 
 #[test]

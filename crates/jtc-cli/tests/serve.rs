@@ -3,64 +3,12 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
-use cli_kit::trial::{CommandOutput, run};
-use common::{Sim, command, slow_motion};
+use cli_kit::trial::run;
+use common::Sim;
+use common::agent::{self, Agent, command_in};
 use serde_json::Value;
-
-/// An agent with places of its own for tokens and for what it leaves behind; it ends with the test.
-struct Agent {
-    child: Child,
-    url: String,
-    dir: tempfile::TempDir,
-}
-
-impl Agent {
-    fn start(words: &[&str]) -> Self {
-        let dir = tempfile::tempdir().expect("a directory");
-        let mut child = here(command(), &dir)
-            .args(["--json", "serve", "--listen", "127.0.0.1:0"])
-            .args(words)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("jtc serve starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
-        let ready: Value = serde_json::from_str(&line).expect("an object");
-        assert!(ready["token_file"].is_string() && ready["simulated"].is_boolean(), "{line}");
-        Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
-    }
-
-    fn command(&self, words: &[&str], port: &str) -> Command {
-        let mut command = here(command(), &self.dir);
-        command.args(words).args(["--port", port]);
-        command
-    }
-
-    fn jtc(&self, words: &[&str]) -> CommandOutput {
-        run(self.command(words, &self.url), &[], "")
-    }
-
-    fn end(mut self, signal: &str) -> Option<i32> {
-        Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
-        self.child.wait().expect("it ends").code()
-    }
-}
-
-impl Drop for Agent {
-    fn drop(&mut self) {
-        self.child.kill().ok();
-        self.child.wait().ok();
-    }
-}
-
-fn here(mut command: Command, dir: &tempfile::TempDir) -> Command {
-    command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
-    command
-}
 
 #[test]
 fn every_command_works_through_an_agent() {
@@ -69,24 +17,20 @@ fn every_command_works_through_an_agent() {
     let info = agent.jtc(&["--json", "info"]).ends(0).json();
     assert_eq!(info["arm"], "avena");
     agent.jtc(&["doctor"]).ends(0);
-    let motion = agent.dir.path().join("motion.csv");
-    std::fs::write(&motion, slow_motion(20)).expect("a file");
-    let report = agent.jtc(&["--json", "traj", "run", motion.to_str().expect("a name")]).ends(0).json();
+    let report = agent.jtc(&["--json", "traj", "run", &agent.motion(20)]).ends(0).json();
     assert_eq!(report["outcome"], "finished", "{report}");
     agent.jtc(&["gripper", "on"]).ends(0);
     let status = agent.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!(status["state"], "HoldPos");
-    assert_eq!(agent.end("-TERM"), Some(0));
+    assert_eq!(agent.end("-TERM").0, Some(0));
 }
 
 #[test]
 fn another_terminal_looks_and_stops_while_one_runs() {
     let agent = Agent::start(&["--sim", "--baud", "921600"]);
     agent.jtc(&["recover", "--defaults"]).ends(0);
-    let motion = agent.dir.path().join("motion.csv");
-    std::fs::write(&motion, slow_motion(300)).expect("a file");
     let mut runs = agent
-        .command(&["--json", "traj", "run", motion.to_str().expect("a name")], &agent.url)
+        .command(&["--json", "traj", "run", &agent.motion(300)], &agent.url)
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
@@ -124,7 +68,7 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
 #[test]
 fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     let dir = tempfile::tempdir().expect("a directory");
-    let jtc = |words: &[&str]| run(here(command(), &dir), words, "");
+    let jtc = |words: &[&str]| run(command_in(&dir), words, "");
     let none = jtc(&["serve", "--port", "/dev/does-not-exist", "--listen", "127.0.0.1:0"]).ends(3);
     assert!(none.err.contains("no such port"), "{}", none.err);
     jtc(&["serve", "--sim", "--port", "/dev/null"]).ends(2);
@@ -165,7 +109,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
     assert_eq!(sim.json(&["info", "--baud", "921600"], 0)["arm"], "other");
     for simulator in [&["serve", "--sim", "--listen", "127.0.0.1:0"][..], &["sim"]] {
         let words = [simulator, &["--arm", &bad]].concat();
-        let refused = run(here(command(), &dir), &words, "").ends(2);
+        let refused = run(command_in(&dir), &words, "").ends(2);
         assert!(
             refused.err.contains("bad.toml") && refused.err.contains("no number that a frame carries"),
             "{words:?}: {}",
@@ -179,7 +123,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
 fn modbus_is_there_for_those_who_are_named() {
     let dir = tempfile::tempdir().expect("a directory");
     let serve = |words: &[&str]| {
-        let mut serve = here(command(), &dir);
+        let mut serve = command_in(&dir);
         serve.args(["serve", "--sim", "--listen", "127.0.0.1:0"]).args(words);
         run(serve, &[], "")
     };
@@ -189,17 +133,8 @@ fn modbus_is_there_for_those_who_are_named() {
     assert!(refused.err.contains("10.0.0.0/33"), "{}", refused.err);
     serve(&["--modbus-allow", "10.0.0.0/24"]).ends(2);
     let ready = |words: &[&str]| {
-        let mut child = here(command(), &dir)
-            .args(["--json", "serve", "--sim", "--listen", "127.0.0.1:0"])
-            .args(words)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("jtc serve starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
-        let modbus = serde_json::from_str::<Value>(&line).expect("an object")["modbus"].clone();
-        let connects = modbus.as_str().map(|at| std::net::TcpStream::connect(at).is_ok());
+        let (mut child, ready) = agent::serve(&dir, &[&["--sim"], words].concat());
+        let connects = ready["modbus"].as_str().map(|at| std::net::TcpStream::connect(at).is_ok());
         child.kill().ok();
         child.wait().ok();
         connects

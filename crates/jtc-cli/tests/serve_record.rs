@@ -3,13 +3,12 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use cli_kit::trial::{CommandOutput, run};
-use common::{command, slow_motion};
+use cli_kit::trial::run;
+use common::agent::{Agent, command_in};
 use jtc_host::recording::Recording;
 use serde_json::Value;
 
@@ -17,76 +16,30 @@ use serde_json::Value;
 const LONG: Duration = Duration::from_secs(60);
 
 /// An agent of a simulated controller that records.
-struct Agent {
-    child: Child,
-    url: String,
-    dir: tempfile::TempDir,
+fn recording() -> Agent {
+    recording_in(tempfile::tempdir().expect("a directory"))
 }
 
-impl Agent {
-    fn start() -> Self {
-        Self::start_in(tempfile::tempdir().expect("a directory"))
-    }
+fn recording_in(dir: tempfile::TempDir) -> Agent {
+    let place = |name: &str| dir.path().join(name).to_str().expect("a name").to_owned();
+    let (recordings, commands) = (place("recordings"), place("commands"));
+    let options = ["--sim", "--baud", "921600", "--record", &recordings, "--command-log", &commands];
+    let agent = Agent::start_in(dir, &options);
+    agent.jtc(&["recover", "--defaults"]).ends(0);
+    agent
+}
 
-    fn start_in(dir: tempfile::TempDir) -> Self {
-        let mut child = here(&dir)
-            .args(["--json", "serve", "--sim", "--baud", "921600", "--listen", "127.0.0.1:0", "--record"])
-            .arg(dir.path().join("recordings"))
-            .arg("--command-log")
-            .arg(dir.path().join("commands"))
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("jtc serve starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
-        let ready: Value = serde_json::from_str(&line).expect("an object");
-        let agent = Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir };
-        agent.jtc(&["recover", "--defaults"]).ends(0);
-        agent
-    }
-
-    fn jtc(&self, words: &[&str]) -> CommandOutput {
-        run(here(&self.dir), &[words, &["--port", &self.url]].concat(), "")
-    }
-
-    fn motion(&self, points: i32) -> String {
-        let file = self.dir.path().join("motion.csv");
-        std::fs::write(&file, slow_motion(points)).expect("a file");
-        file.to_str().expect("a name").to_owned()
-    }
-
-    /// Recordings with this ending, oldest first, when there are so many.
-    fn recordings(&self, ending: &str, count: usize) -> Vec<PathBuf> {
-        let end = Instant::now() + LONG;
-        loop {
-            let found = recordings(&self.dir, ending);
-            if found.len() >= count {
-                return found;
-            }
-            assert!(Instant::now() < end, "{found:?} instead of {count} {ending}");
-            std::thread::sleep(Duration::from_millis(50));
+/// Recordings with this ending, oldest first, when there are so many.
+fn recorded(agent: &Agent, ending: &str, count: usize) -> Vec<PathBuf> {
+    let end = Instant::now() + LONG;
+    loop {
+        let found = recordings(&agent.dir, ending);
+        if found.len() >= count {
+            return found;
         }
+        assert!(Instant::now() < end, "{found:?} instead of {count} {ending}");
+        std::thread::sleep(Duration::from_millis(50));
     }
-
-    fn end(mut self, signal: &str) -> tempfile::TempDir {
-        Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
-        self.child.wait().expect("it ends");
-        std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory"))
-    }
-}
-
-impl Drop for Agent {
-    fn drop(&mut self) {
-        self.child.kill().ok();
-        self.child.wait().ok();
-    }
-}
-
-fn here(dir: &tempfile::TempDir) -> Command {
-    let mut command = command();
-    command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
-    command
 }
 
 fn recordings(dir: &tempfile::TempDir, ending: &str) -> Vec<PathBuf> {
@@ -107,16 +60,16 @@ fn read(path: &Path) -> Recording {
 /// `jtc report` makes its page of it.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
     let words = ["--json", "report", path.to_str().expect("a name"), "--force"];
-    run(here(dir), &words, "").ends(0).json()
+    run(command_in(dir), &words, "").ends(0).json()
 }
 
 #[test]
 fn every_motion_has_a_recording_with_the_channels_of_a_run() {
-    let agent = Agent::start();
+    let agent = recording();
     let own = agent.dir.path().join("own.mcap");
     let (motion, own) = (agent.motion(20), own.to_str().expect("a name").to_owned());
     agent.jtc(&["traj", "run", &motion, "--record", &own]).ends(0);
-    let file = agent.recordings(".mcap", 1).remove(0);
+    let file = recorded(&agent, ".mcap", 1).remove(0);
     let (of_agent, of_run) = (read(&file), read(Path::new(&own)));
     assert_eq!((of_agent.ending.outcome.as_str(), of_agent.cut.as_deref()), ("finished", None));
     let (info, info_of_run) =
@@ -127,6 +80,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
         (&info_of_run.joints, &info_of_run.gains, &info_of_run.hash)
     );
     assert_eq!((&info.description, &info.device), (&info_of_run.description, &info_of_run.device));
+    assert!(!info.commanded_by.is_empty() && info_of_run.commanded_by.is_empty(), "{}", info.commanded_by);
     assert!(info.device.is_some() && info.hash.is_some() && info.start_unix_ns > 0);
     // What was commanded at a point is the same in both; the agent has all that the run saw, and what was before.
     let at = |recording: &Recording, point: u32| {
@@ -148,28 +102,28 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     agent.jtc(&["jog", "1", "0.1", "--duration", "1"]).ends(0);
     agent.jtc(&["teach", "on"]).ends(0);
     agent.jtc(&["teach", "off"]).ends(0);
-    let files = agent.recordings(".mcap", 3);
+    let files = recorded(&agent, ".mcap", 3);
     let names: Vec<String> = files.iter().map(|file| read(file).info.expect("its arm").trajectory).collect();
     assert_eq!(names, ["execution", "jog", "teaching"]);
     for file in &files {
         is_reported(&agent.dir, file);
     }
-    let dir = agent.end("-TERM");
+    let (_, dir) = agent.end("-TERM");
     let log = std::fs::read_to_string(dir.path().join("commands")).expect("the log");
     assert_eq!(log.matches("\"what\":\"recorded\"").count(), 3, "{log}");
 }
 
 #[test]
 fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
-    let agent = Agent::start();
+    let agent = recording();
     let motion = agent.motion(300);
-    let mut runs = here(&agent.dir)
-        .args(["traj", "run", &motion, "--port", &agent.url])
+    let mut runs = agent
+        .command(&["traj", "run", &motion], &agent.url)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .expect("it starts");
-    let part = agent.recordings(".part.mcap", 1).remove(0);
+    let part = recorded(&agent, ".part.mcap", 1).remove(0);
     let end = Instant::now() + LONG;
     let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
     // It is readable while it is written.
@@ -177,7 +131,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         assert!(Instant::now() < end, "nothing is recorded");
         std::thread::sleep(Duration::from_millis(50));
     }
-    let dir = agent.end("-KILL");
+    let (_, dir) = agent.end("-KILL");
     runs.wait().expect("it ends");
     let recording = read(&part);
     assert!(moving(&recording) >= 20 && recording.cut.is_some(), "{:?}", recording.cut);
@@ -188,12 +142,12 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         "{report}"
     );
 
-    let agent = Agent::start_in(dir);
+    let agent = recording_in(dir);
     agent.jtc(&["traj", "run", &agent.motion(20)]).ends(0);
-    let whole = agent.recordings(".mcap", 1).remove(0);
+    let whole = recorded(&agent, ".mcap", 1).remove(0);
     assert!(part.exists() && whole.to_str().is_some_and(|name| name.ends_with("-000002.mcap")), "{whole:?}");
     // Two agents do not share a directory.
-    let second = here(&agent.dir)
+    let second = command_in(&agent.dir)
         .args(["serve", "--sim", "--listen", "127.0.0.1:0", "--record"])
         .arg(agent.dir.path().join("recordings"))
         .output()
@@ -205,11 +159,11 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
 /// The arm in a recording is the one that the controller has, also after it was given another.
 #[test]
 fn the_arm_in_a_recording_is_that_of_the_controller() {
-    let agent = Agent::start();
+    let agent = recording();
     let mut arm = jtc_host::Arm::avena();
     let file = agent.dir.path().join("mine.toml");
     let of_recording = |n: usize| {
-        let info = read(&agent.recordings(".mcap", n)[n - 1]).info.expect("its arm");
+        let info = read(&recorded(&agent, ".mcap", n)[n - 1]).info.expect("its arm");
         (info.arm, info.gains.expect("gains")[2].kp, info.hash)
     };
     let of_arm = |arm: &jtc_host::Arm| {

@@ -55,6 +55,9 @@ enum Notice {
     Denied {
         why: String,
     },
+    Halted {
+        number: u64,
+    },
     #[serde(other)]
     Other,
 }
@@ -68,6 +71,8 @@ pub struct AgentPort {
     /// Bytes that were received and not read yet.
     received: Vec<u8>,
     denied: Option<String>,
+    /// The last Stop or Pause that this end knows of, by number, where there was one.
+    halted: Option<u64>,
 }
 
 impl AgentPort {
@@ -137,6 +142,7 @@ impl AgentPort {
             start: Instant::now(),
             received: Vec::new(),
             denied: None,
+            halted: None,
         };
         while port.hello.port.is_empty() {
             if Instant::now() >= end {
@@ -167,6 +173,7 @@ impl AgentPort {
             Ok(Message::Text(text)) => match serde_json::from_str(&text) {
                 Ok(Notice::Hello(hello)) => self.hello = hello,
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
+                Ok(Notice::Halted { number }) => self.halted = Some(number),
                 Ok(Notice::Other) | Err(_) => {}
             },
             Ok(Message::Close(frame)) => {
@@ -179,6 +186,13 @@ impl AgentPort {
             Err(error) => return Err(self.gone(&error)),
         }
         Ok(true)
+    }
+
+    fn send(&mut self, message: Message) -> Result<(), PortError> {
+        tls::socket(self.socket.get_mut())
+            .and_then(|stream| stream.set_nonblocking(false))
+            .map_err(|error| self.gone(&error.into()))?;
+        self.socket.send(message).map_err(|error| self.gone(&error))
     }
 
     fn gone(&self, error: &tungstenite::Error) -> PortError {
@@ -230,10 +244,14 @@ impl Port for AgentPort {
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        tls::socket(self.socket.get_mut())
-            .and_then(|stream| stream.set_nonblocking(false))
-            .map_err(|error| self.gone(&error.into()))?;
-        self.socket.send(Message::Binary(bytes.to_vec().into())).map_err(|error| self.gone(&error))
+        self.send(Message::Binary(bytes.to_vec().into()))
+    }
+
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        match self.halted {
+            Some(number) => self.send(Message::Text(format!("{{\"asked_after\":{number}}}").into())),
+            None => Ok(()),
+        }
     }
 
     fn now(&self) -> Duration {

@@ -1,7 +1,7 @@
 //! Sessions through an agent: all that works over a serial port, several at a time.
 mod common;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::Served;
 use jtc_client::AgentPort;
@@ -84,6 +84,32 @@ fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
         matches!(&error, Error::Link(LinkError::Denied { reason, .. }) if reason.contains("127.0.0.1")),
         "{error}"
     );
+}
+
+/// Who was stopped, and does not know it, moves nothing by what was asked for before, however late that comes.
+#[test]
+fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_anew() {
+    let served = Served::start(921_600);
+    let mut anna = served.operator("anna");
+    hold(&mut anna);
+    // The controller may refuse it, the agent does not.
+    let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
+        Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
+        _ => Ok(()),
+    };
+    sent(&mut anna).expect("nobody has stopped anything");
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let end = Instant::now() + Duration::from_millis(3_500);
+    while Instant::now() < end {
+        anna.fresh_status().expect("it reports");
+    }
+    let denied = sent(&mut anna).expect_err("it was asked for before the Stop");
+    assert!(denied.contains("has stopped"), "{denied}");
+    let denied = anna.upload(&motion(10.0), |_| Flow::Continue).expect_err("it leads to no motion");
+    assert!(matches!(&denied, Error::Link(LinkError::Denied { .. })), "{denied}");
+    anna.gripper(false).expect("it moves nothing");
+    anna.ask_to_move().expect("it is there");
+    sent(&mut anna).expect("somebody asks for it now");
 }
 
 #[test]

@@ -4,10 +4,9 @@ mod common;
 use std::time::{Duration, Instant};
 
 use common::Served;
+use common::program::{Program, WAIT, event, over};
 use jtc_host::{Arm, plan};
 use serde_json::{Value, json};
-
-const WAIT: Duration = Duration::from_secs(60);
 
 /// A motion from the zero pose and back, at this speed, as a file.
 fn there_and_back(percent: f64) -> String {
@@ -18,74 +17,6 @@ fn there_and_back(percent: f64) -> String {
     let (mut there, back) = (way(&[0.0; 6], &to), way(&to, &[0.0; 6]));
     there.points.extend(back.points.into_iter().skip(1));
     there.to_exact_csv()
-}
-
-/// A program that has the lease.
-struct Program<'a> {
-    served: &'a Served,
-    key: String,
-}
-
-impl<'a> Program<'a> {
-    fn new(served: &'a Served, name: &str, lasts_s: f64, policy: &str) -> Self {
-        let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
-        let (status, grant) = served.api("POST /api/lease", None, Some(body));
-        assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
-        Self { served, key: grant["key"].as_str().expect("a key").to_owned() }
-    }
-
-    fn ask(&self, request: &str, body: Option<Value>) -> (u16, Value) {
-        self.served.api(request, Some(&self.key), body)
-    }
-
-    /// Begins a job.
-    fn begin(&self, request: &str, body: Value) -> u64 {
-        let (status, job) = self.ask(request, Some(body));
-        assert_eq!(status, 202, "{job}");
-        job["number"].as_u64().expect("a number")
-    }
-
-    fn recover(&self) {
-        let job = self.begin("POST /api/recover", json!({ "defaults": true }));
-        let done = self.over(job);
-        assert_eq!(done["stage"], "finished", "{done}");
-    }
-
-    /// The job when it is over; the lease is renewed meanwhile.
-    fn over(&self, job: u64) -> Value {
-        over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
-    }
-}
-
-fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
-    let end = Instant::now() + WAIT;
-    while Instant::now() < end {
-        let (status, job) = served.api(&format!("GET /api/jobs/{job}"), None, None);
-        assert_eq!(status, 200);
-        if job["stage"] != "running" {
-            return job;
-        }
-        meanwhile();
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    panic!("job {job} is not over");
-}
-
-/// Waits until an event of this kind came behind a number, and returns it with its number.
-fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
-    let (end, mut last) = (Instant::now() + WAIT, after);
-    while Instant::now() < end {
-        let (_, found) = served.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
-        for event in found["events"].as_array().expect("events") {
-            let number = event["number"].as_u64().expect("a number");
-            assert_eq!(number, last + 1, "none is left out");
-            last = number;
-            if event["event"]["kind"] == kind {
-                return (number, event["event"].clone());
-            }
-        }
-    }
-    panic!("no {kind} behind {after}");
 }
 
 fn trajectory(served: &Served, number: u16, percent: f64) {
@@ -200,11 +131,11 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
-        // Behind the halt of the one before.
+        // Behind the halt of the one before; a jog that is asked for on and on stays refused.
         let halted =
             || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
-            std::thread::sleep(Duration::from_millis(100));
+            std::thread::sleep(Duration::from_millis(700));
         }
         anna.recover();
         let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
@@ -281,19 +212,25 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
         200
     );
     anna.recover();
-    let job = anna.begin("POST /api/runs", json!({ "trajectory": 2 }));
-    let done = anna.over(job);
-    let error = &done["error"];
-    assert_eq!(
-        (done["stage"].as_str(), error["code"].as_str(), error["joint"].as_u64()),
-        (Some("failed"), Some("check"), Some(2)),
-        "{done}"
-    );
-    assert!(
-        error["value"].as_f64().zip(error["limit"].as_f64()).is_some_and(|(value, limit)| value > limit),
-        "{error}"
-    );
-    assert!(error["cause"].as_str().is_some_and(|cause| !cause.is_empty()), "{error}");
+    // A check and planning find the same.
+    for (request, body, code) in [
+        ("POST /api/runs", json!({ "trajectory": 2 }), "check"),
+        ("POST /api/moves", json!({ "to_rad": [0.0, 9.0, 0.0, 0.0, 0.0, 0.0] }), "plan"),
+    ] {
+        let job = anna.begin(request, body);
+        let done = anna.over(job);
+        let error = &done["error"];
+        assert_eq!(
+            (done["stage"].as_str(), error["code"].as_str(), error["joint"].as_u64()),
+            (Some("failed"), Some(code), Some(2)),
+            "{done}"
+        );
+        assert!(
+            error["value"].as_f64().zip(error["limit"].as_f64()).is_some_and(|(value, limit)| value > limit),
+            "{error}"
+        );
+        assert!(error["cause"].as_str().is_some_and(|cause| !cause.is_empty()), "{error}");
+    }
 }
 
 #[test]
@@ -318,7 +255,14 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
-    while anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": zeros }))).0 == 409 {
+    // What is asked for as long as a key is held down is put off by that.
+    while asked.elapsed() < Duration::from_secs(5) {
+        assert_eq!(anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": zeros }))).0, 409);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let asked = Instant::now();
+    while anna.ask("POST /api/recover", Some(json!({}))).0 == 409 {
         assert!(asked.elapsed() < Duration::from_secs(20), "it is put off");
         std::thread::sleep(Duration::from_millis(100));
     }
@@ -379,10 +323,20 @@ fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() 
 fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
     let served = Served::start(921_600);
     let anna = Program::new(&served, "anna", 60.0, "continue");
-    for _ in 0..40 {
+    for n in 0..40 {
         let (status, grant) =
             served.api("POST /api/lease", None, Some(json!({ "name": "again", "ask": true })));
-        assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
+        if n == 0 {
+            assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
+        } else {
+            // The first one waits still.
+            assert_eq!((status, grant["code"].as_str()), (409, Some("denied")), "{grant}");
+            assert!(
+                grant["message"]
+                    .as_str()
+                    .is_some_and(|m| m.contains("again has asked for the lease of anna"))
+            );
+        }
     }
     assert_eq!(anna.ask("PUT /api/lease", None).1["held"], true);
     assert_eq!(served.api("POST /api/lease", None, Some(json!({ "name": "x", "lasts_s": 61 }))).0, 422);

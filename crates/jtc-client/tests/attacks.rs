@@ -4,6 +4,7 @@ mod common;
 use common::Served;
 use jtc_client::{AgentPort, Options};
 use jtc_host::PortError;
+use serde_json::json;
 use test_kit::http;
 
 #[test]
@@ -111,4 +112,15 @@ fn what_is_long_or_wrong_changes_nothing() {
 #[test]
 fn connections_that_ask_for_nothing_are_closed_and_keep_nobody_out() {
     http::idle_connections_are_closed(&Served::start(921_600));
+}
+
+#[test]
+fn requests_that_wait_for_events_are_so_many_and_no_more() {
+    let served = Served::start(921_600);
+    let (_, grant) = served.api("POST /api/lease", None, Some(json!({ "name": "anna" })));
+    http::waiting_requests_are_bounded(&served, || {
+        let body = Some(json!({ "defaults": true }));
+        let (status, job) = served.api("POST /api/recover", grant["key"].as_str(), body);
+        assert_eq!((status, job["number"].as_u64()), (202, Some(1)), "{job}");
+    });
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use common::Served;
+use common::{Served, socket};
 use jtc_host::check::CheckOptions;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckedTrajectory, plan};
-use tungstenite::{Message, connect};
+use tungstenite::Message;
 
 const VIEWERS: usize = 50;
 
@@ -32,7 +32,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
         .map(|_| {
             let (ended, seen) = (ended.clone(), seen.clone());
             std::thread::spawn(move || {
-                let (mut socket, _) = connect(format!("ws://{address}/api/stream")).expect("it is let in");
+                let mut socket = socket(address, "stream");
                 let mut statuses = 0;
                 while !ended.load(Ordering::Relaxed) {
                     if let Ok(Message::Text(text)) = socket.read()
@@ -50,7 +50,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
     let deaf: Vec<_> = ["stream", "line", "foxglove"]
         .iter()
         .flat_map(|path| (0..4).map(move |_| *path))
-        .filter_map(|path| connect(format!("ws://{address}/api/{path}")).ok())
+        .map(|path| socket(address, path))
         .collect();
     std::thread::sleep(Duration::from_secs(1));
     let before = memory();

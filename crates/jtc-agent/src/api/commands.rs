@@ -1,20 +1,28 @@
 //! Commands that are soon over, for who has the lease.
+use std::borrow::Cow;
+use std::time::Duration;
+
 use agent_kit::api::{Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
-use axum::{Extension, Json};
-use jtc_host::session::{Flow, ParameterSource, Payload};
-use jtc_host::{Error, ErrorKind, Session};
+use axum::http::StatusCode;
+use jtc_host::session::{Flow, Payload};
+use jtc_host::{Error, ErrorKind, MotionError, Session};
+use jtc_wire::{Status, TrajectoryState};
 use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
 use super::objects::PayloadObject;
 use super::runs::JobObject;
-use super::{Agent, Caller, ErrorObject};
-use crate::jobs::{Commander, Done, Turn};
+use super::{Agent, ErrorObject};
+use crate::jobs::{Commander, Task, Turn, recover, stopped};
 use crate::owner::ClientPort;
 
+/// The lease of a client that waits for an answer is renewed so often.
+const RENEWED: Duration = Duration::from_millis(300);
 /// Slowest speed, % (J-57).
 const SPEED_MIN: u8 = 5;
 
@@ -55,18 +63,17 @@ pub struct RecoverRequest {
 
 impl Agent {
     /// Has the end of the line of the client that commands do something that moves nothing.
-    async fn command<T, E>(
+    pub(super) async fn command<T, E>(
         &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-        what: &'static str,
+        asker: &Asker,
+        what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
     ) -> Result<T, ErrorObject>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let commander = self.commander(caller, headers)?;
+        let commander = self.commander(asker)?;
         let turn = commander.turn()?;
         self.act(&commander, turn, what, act).await
     }
@@ -74,16 +81,15 @@ impl Agent {
     /// The same for what may move the arm.
     async fn motion<T, E>(
         &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-        what: &'static str,
+        asker: &Asker,
+        what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
     ) -> Result<T, ErrorObject>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let (commander, turn) = self.mover(caller, headers)?;
+        let (commander, turn) = self.mover(asker)?;
         self.act(&commander, turn, what, act).await
     }
 
@@ -92,34 +98,32 @@ impl Agent {
         &self,
         commander: &Commander,
         turn: Turn,
-        what: &'static str,
+        what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
     ) -> Result<T, ErrorObject>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let (agent, client) = (self.clone(), commander.client.0);
+        let (agent, client, what) = (self.clone(), commander.client, what.into());
         let logged = move |session: &mut Session<ClientPort>| {
-            let done = act(session).map_err(|error| ErrorObject::of(&error.into()));
+            let done = act(session).map_err(|error| match error.into() {
+                Error::Cancelled => stopped(&agent.line, client),
+                error => ErrorObject::of(&error),
+            });
             let why = done.as_ref().err().map(|error| error.message.clone());
-            agent.note("command", json!({ "client": client, "command": what, "why_not": why }));
+            agent.note("command", json!({ "client": client.0, "command": what, "why_not": why }));
             done
         };
-        commander.act(turn, logged).await?
-    }
-
-    /// Wishes something of the motion that is going on. `None`: no motion of this client is going on.
-    async fn wish(&self, commander: &Commander, flow: Flow) -> Option<Result<(), ErrorObject>> {
-        let done = commander.wish(flow)?;
-        let ended = || {
-            ErrorObject::new(
-                "motion-ended",
-                "the motion had ended before this was done",
-                "GET /api/jobs shows how",
-            )
-        };
-        Some(done.await.unwrap_or_else(|_| Err(ended())))
+        let acting = commander.act(turn, logged);
+        tokio::pin!(acting);
+        loop {
+            tokio::select! {
+                done = &mut acting => return done?,
+                // Whoever waits for an answer is there.
+                () = tokio::time::sleep(RENEWED) => self.line.with(|line, now| line.renew(client, now)),
+            }
+        }
     }
 }
 
@@ -127,24 +131,31 @@ impl Agent {
 #[utoipa::path(
     post,
     path = "/api/resume",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 204, description = "The motion goes on, or will in a moment"), Refusals, Denials)
 )]
-pub(super) async fn resume(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<StatusCode, ErrorObject> {
-    let commander = agent.commander(&caller, &headers)?;
+pub(super) async fn resume(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+    let commander = agent.commander(&asker)?;
     if commander.is_moving() {
-        // The job that is going on is what goes on, and nothing else of this client can be waiting.
-        agent.line.with(|line, now| line.ask_to_move(commander.client, now))?;
-        if let Some(done) = agent.wish(&commander, Flow::Resume).await {
+        // A motion that somebody stopped before it began is not what is gone on with.
+        agent.line.with(|line, now| {
+            line.could_ask(commander.client, now)?;
+            match line.status() {
+                Some((_, status)) if status.trajectory != TrajectoryState::Pause => Err(not_paused(status)),
+                _ => Ok(line.ask_to_move(commander.client, line.last_halt(), now)?),
+            }
+        })?;
+        if let Some(done) = commander.wish(Flow::Resume).await {
             return done.map(|()| StatusCode::NO_CONTENT);
         }
     }
-    agent.motion(&caller, &headers, "resume", Session::resume).await?;
+    agent.motion(&asker, "resume", Session::resume).await?;
     Ok(StatusCode::NO_CONTENT)
+}
+
+fn not_paused(status: &Status) -> ErrorObject {
+    let (state, trajectory) = (status.state, status.trajectory);
+    ErrorObject::of(&MotionError::NotPaused { state, trajectory }.into())
 }
 
 /// Another speed on the path, now.
@@ -152,14 +163,13 @@ pub(super) async fn resume(
     put,
     path = "/api/speed",
     operation_id = "set_speed",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = SpeedObject,
     responses((status = 204, description = "The controller changes to that speed"), Refusals, Denials)
 )]
 pub(super) async fn speed(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(SpeedObject { percent }): Body<SpeedObject>,
 ) -> Result<StatusCode, ErrorObject> {
     if !(SPEED_MIN..=100).contains(&percent) {
@@ -168,12 +178,12 @@ pub(super) async fn speed(
             ErrorObject::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
         );
     }
-    let commander = agent.commander(&caller, &headers)?;
-    if let Some(done) = agent.wish(&commander, Flow::Speed(percent)).await {
+    let commander = agent.commander(&asker)?;
+    if let Some(done) = commander.wish(Flow::Speed(percent)).await {
         return done.map(|()| StatusCode::NO_CONTENT);
     }
     let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(percent) / 100.0);
-    agent.command(&caller, &headers, "speed", set).await?;
+    agent.command(&asker, "speed", set).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -181,17 +191,19 @@ pub(super) async fn speed(
 #[utoipa::path(
     post,
     path = "/api/jog",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = JogRequest,
     responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
 )]
 pub(super) async fn jog(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
 ) -> Result<StatusCode, ErrorObject> {
-    agent.motion(&caller, &headers, "jog", move |session| session.jog(&rates_rad_s)).await?;
+    let commander = agent.commander(&asker)?;
+    let turn = commander.turn()?;
+    agent.line.with(|line, now| line.ask_to_jog(commander.client, line.last_halt(), now))?;
+    agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -199,21 +211,22 @@ pub(super) async fn jog(
 #[utoipa::path(
     post,
     path = "/api/teach",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = Switch,
     responses((status = 204, description = "Teaching has begun, or ended"), Refusals, Denials)
 )]
 pub(super) async fn teach(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
-    let act = move |session: &mut Session<ClientPort>| session.teach(on);
     if on {
-        agent.motion(&caller, &headers, "teach", act).await?;
+        let commander = agent.commander(&asker)?;
+        let (line, client) = (agent.line.clone(), commander.client);
+        let halted = move || line.with(|line, _| line.is_halted(client));
+        agent.motion(&asker, "teach", move |session| session.teach_until(halted)).await?;
     } else {
-        agent.command(&caller, &headers, "teach", act).await?;
+        agent.command(&asker, "teach", |session| session.teach(false)).await?;
     }
     Ok(StatusCode::NO_CONTENT)
 }
@@ -222,17 +235,16 @@ pub(super) async fn teach(
 #[utoipa::path(
     post,
     path = "/api/gripper",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = Switch,
     responses((status = 204, description = "It is switched"), Refusals, Denials)
 )]
 pub(super) async fn gripper(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
-    agent.command(&caller, &headers, "gripper", move |session| session.gripper(on)).await?;
+    agent.command(&asker, "gripper", move |session| session.gripper(on)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -240,36 +252,23 @@ pub(super) async fn gripper(
 #[utoipa::path(
     post,
     path = "/api/clear",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 204, description = "They are cleared; those that last come again"), Refusals, Denials)
 )]
-pub(super) async fn clear(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<StatusCode, ErrorObject> {
-    let act =
-        |session: &mut Session<ClientPort>| session.clear(true, ALL).and_then(|()| session.clear_occurred());
-    agent.command(&caller, &headers, "clear", act).await?;
+pub(super) async fn clear(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+    agent.command(&asker, "clear", Session::clear_all).await?;
     Ok(StatusCode::NO_CONTENT)
 }
-
-/// All nodes of the joint bus, as bits.
-const ALL: u8 = 0x7F;
 
 /// Takes the torque off all joints, at rest. An arm without brakes falls.
 #[utoipa::path(
     post,
     path = "/api/disable",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 204, description = "The drives are being disabled"), Refusals, Denials)
 )]
-pub(super) async fn disable(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<StatusCode, ErrorObject> {
-    agent.command(&caller, &headers, "disable", Session::disable).await?;
+pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+    agent.command(&asker, "disable", Session::disable).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -277,49 +276,45 @@ pub(super) async fn disable(
 #[utoipa::path(
     put,
     path = "/api/payload",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = PayloadObject,
     responses((status = 204, description = "It comes into the torque over 0.5 s"), Refusals, Denials)
 )]
 pub(super) async fn set_payload(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(payload): Body<PayloadObject>,
 ) -> Result<StatusCode, ErrorObject> {
+    let payload = body(payload)?;
+    agent.command(&asker, "payload", move |session| session.set_payload(&payload)).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// A payload that is one of a body.
+pub(super) fn body(payload: PayloadObject) -> Result<Payload, ErrorObject> {
     let payload = Payload::from(payload);
     payload.check().map_err(|e| {
         ErrorObject::new("payload", e.to_string(), "no body has such numbers").kind(ErrorKind::Usage)
     })?;
-    agent.command(&caller, &headers, "payload", move |session| session.set_payload(&payload)).await?;
-    Ok(StatusCode::NO_CONTENT)
+    Ok(payload)
 }
 
 /// Leads the controller back to a held arm, whatever its state is: a job.
 #[utoipa::path(
     post,
     path = "/api/recover",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    operation_id = "recover",
+    params(LeaseKey),
     request_body = RecoverRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
-pub(super) async fn recover(
+pub(super) async fn begin_recover(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(RecoverRequest { defaults }): Body<RecoverRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let (commander, turn) = agent.mover(&caller, &headers)?;
-    let job = agent.jobs.begin(&commander, turn, "recover".into(), move |task, session| {
-        let source = if defaults { ParameterSource::ControllerDefaults } else { ParameterSource::None };
-        let recovered =
-            session.recover_until(source, || task.is_halted(), |step| task.note(step.to_string()));
-        let error = match recovered {
-            Ok(_) => None,
-            Err(Error::Cancelled) => Some(task.stopped()),
-            Err(error) => Some(ErrorObject::of(&error)),
-        };
-        (Done { finished: error.is_none(), ..Done::default() }, error)
-    })?;
+    let (commander, turn) = agent.mover(&asker)?;
+    let recover = move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, defaults);
+    let job = agent.jobs.begin(&commander, turn, "recover".into(), recover)?;
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }

@@ -4,22 +4,18 @@ use std::time::Duration;
 
 use agent_kit::access::random;
 use agent_kit::api::{Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::{self, LeaseKey, LeaseState, default_lasts_s, lasts};
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::StatusCode;
 use axum::{Extension, Json};
-use jtc_host::ErrorKind;
 use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::{Commander, Turn, Unable};
-use crate::line::{Denied, Introduction, Policy, Role};
-
-/// The header with the key of a lease.
-pub(super) const KEY: &str = "lease-key";
-/// How long a lease may last without a request, s.
-const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
+use crate::line::{Denied, Introduction, Policy};
 
 /// Who wants to command.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -28,19 +24,15 @@ pub struct LeaseRequest {
     /// What people are to call it: the first 64 characters.
     pub name: String,
     /// How long the lease lasts without a request of this client, s.
-    #[serde(default = "ten")]
+    #[serde(default = "default_lasts_s")]
     #[schema(minimum = 1, maximum = 60)]
     pub lasts_s: f64,
     /// What becomes of a motion when it has lapsed.
     #[serde(default)]
     pub policy: Policy,
-    /// Where another client commands: ask it for the lease, and wait for it.
+    /// Where another client commands: ask it for the lease, and wait for it. One waits at a time, which shows by PUT that it is there.
     #[serde(default)]
     pub ask: bool,
-}
-
-fn ten() -> f64 {
-    10.0
 }
 
 /// A client that may command, or waits for it.
@@ -56,24 +48,10 @@ pub struct LeaseGrant {
     pub policy: Policy,
 }
 
-/// How a lease is.
-#[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LeaseState {
-    /// This client commands.
-    pub held: bool,
-    /// Who asks for the lease.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wanted_by: Option<String>,
-}
-
 impl Agent {
     /// The client that asks with a key, with its lease renewed: it commands, or it is an error.
-    pub(super) fn commander(
-        &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-    ) -> Result<Arc<Commander>, ErrorObject> {
-        let (commander, lasts) = self.client(caller, headers)?;
+    pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, ErrorObject> {
+        let (commander, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
         held.map_err(ErrorObject::from)?;
         Ok(commander)
@@ -81,35 +59,18 @@ impl Agent {
 
     /// The same, for what may move the arm: nothing that was asked for before this moves it any more where somebody has stopped it, and
     /// nothing at all for three seconds then. The turn is taken first: what still waits for its own is not let through by this.
-    pub(super) fn mover(
-        &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-    ) -> Result<(Arc<Commander>, Turn), ErrorObject> {
-        let commander = self.commander(caller, headers)?;
+    pub(super) fn mover(&self, asker: &Asker) -> Result<(Arc<Commander>, Turn), ErrorObject> {
+        let commander = self.commander(asker)?;
         let turn = commander.turn()?;
-        self.line.with(|line, now| line.ask_to_move(commander.client, now))?;
+        self.line.with(|line, now| line.ask_to_move(commander.client, line.last_halt(), now))?;
         Ok((commander, turn))
     }
 
     /// The client that asks with a key, and how often it does at least.
-    pub(super) fn client(
-        &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-    ) -> Result<(Arc<Commander>, Duration), ErrorObject> {
-        if caller.role != Role::Operator {
-            return Err(Denied::Viewer.into());
-        }
-        let key = headers.get(KEY).and_then(|key| key.to_str().ok());
-        let next = "take the lease with POST /api/lease, and send its key in the header Lease-Key";
-        let Some(key) = key else {
-            return Err(ErrorObject::new("no-lease", "commands need a lease", next).forbidden());
-        };
-        self.jobs.commander(key).ok_or_else(|| {
-            ErrorObject::new("no-lease", "this key is of no lease, or of one that lapsed long ago", next)
-                .forbidden()
-        })
+    pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), ErrorObject> {
+        asker.caller.operator()?;
+        let key = asker.key().ok_or(lease::Denied::NoKey)?;
+        Ok(self.jobs.commander(key).ok_or(lease::Denied::Unknown)?)
     }
 }
 
@@ -129,26 +90,16 @@ pub(super) async fn take(
     Extension(caller): Extension<Caller>,
     Body(request): Body<LeaseRequest>,
 ) -> Result<Json<LeaseGrant>, ErrorObject> {
-    if caller.role != Role::Operator {
-        return Err(Denied::Viewer.into());
-    }
+    caller.operator()?;
     let LeaseRequest { name, lasts_s, policy, ask } = request;
-    if !LASTS_S.contains(&lasts_s) {
-        let message = format!("lasts_s is {lasts_s}: 1 to 60 s are possible");
-        return Err(ErrorObject::new("lease", message, "choose how long it may last without a request")
-            .kind(ErrorKind::Usage));
-    }
+    let lasts = lasts(lasts_s)?;
     let name = caller.named(&name);
-    let lasts = Duration::from_secs_f64(lasts_s);
     let key = random().map_err(|e| ErrorObject::diagnosed(&e))?;
     let introduction = Introduction { name: name.clone(), role: caller.role, policy };
-    let Some(commander) = agent.jobs.admit(&key, introduction, lasts) else {
-        let next = "let leases go that are not needed any more with DELETE /api/lease; they are forgotten after a minute";
-        return Err(ErrorObject::new("full", "too many clients have come for the lease", next));
-    };
+    let commander = agent.jobs.admit(&key, introduction, lasts).ok_or(lease::Denied::Full)?;
     let client = commander.client;
     let taken = agent.line.with(|line, now| match line.take_lease(client, Some(lasts), now) {
-        Err(Denied::Held { .. }) if ask => line.want_lease(client).map(|()| false),
+        Err(Denied::Held { .. }) if ask => line.want_lease(client, now).map(|()| false),
         taken => taken.map(|()| true),
     });
     agent.line.wake();
@@ -168,18 +119,14 @@ pub(super) async fn take(
     put,
     path = "/api/lease",
     operation_id = "renew_lease",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses(
         (status = 200, description = "Whether this client commands", body = LeaseState),
         Refusals, Denials
     )
 )]
-pub(super) async fn renew(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<Json<LeaseState>, ErrorObject> {
-    let (commander, lasts) = agent.client(&caller, &headers)?;
+pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Json<LeaseState>, ErrorObject> {
+    let (commander, lasts) = agent.client(&asker)?;
     let state = agent.line.with(|line, now| {
         let held = line.take_lease(commander.client, Some(lasts), now).is_ok();
         let wanted = line.lease().filter(|_| held).and_then(|lease| lease.wanted_by);
@@ -196,15 +143,11 @@ pub(super) async fn renew(
     delete,
     path = "/api/lease",
     operation_id = "release_lease",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     responses((status = 204, description = "It is let go"), Refusals, Denials)
 )]
-pub(super) async fn release(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<StatusCode, ErrorObject> {
-    let (commander, _) = agent.client(&caller, &headers)?;
+pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+    let (commander, _) = agent.client(&asker)?;
     let turn = match commander.turn() {
         Ok(turn) => Some(turn),
         // Its thread is gone: it has nothing going on.
@@ -215,7 +158,7 @@ pub(super) async fn release(
     let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
     agent.line.wake();
     agent.note("left", json!({ "client": commander.client.0, "name": commander.name }));
-    if let Some(key) = headers.get(KEY).and_then(|key| key.to_str().ok()) {
+    if let Some(key) = asker.key() {
         agent.jobs.dismiss(key);
     }
     drop(turn);

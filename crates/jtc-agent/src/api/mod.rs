@@ -1,14 +1,20 @@
 //! The agent's API: what is asked by HTTP, and one socket for a client's end of the line.
+mod absent;
+mod arm;
+mod body;
 mod commands;
 mod error;
 mod events;
 mod foxglove;
 mod identity;
 mod lease;
+mod log;
 mod metrics;
 mod objects;
+mod plans;
 mod questions;
 mod runs;
+mod settings;
 mod socket;
 mod trajectories;
 
@@ -17,12 +23,15 @@ use std::time::Duration;
 
 use agent_kit::access::{Access, TokenError, random};
 use agent_kit::api::Refusals;
-use agent_kit::gate::{Caller, Gate, let_in};
+use agent_kit::events::Events;
+use agent_kit::gate::{Asker, Caller, Gate, let_in};
 use agent_kit::log::CommandLog;
+use agent_kit::openapi::{Bearer, served, text};
+use agent_kit::socket::Sockets;
 use axum::body::Body;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::handler::Handler as _;
-use axum::http::{HeaderMap, Method, StatusCode, header};
+use axum::http::{Method, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::Response;
 use axum::{Extension, Json, Router};
@@ -31,33 +40,35 @@ use jtc_wire::ExecCommand;
 use serde_json::json;
 use tokio::sync::Semaphore;
 use tower_http::timeout::TimeoutLayer;
-use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
-use utoipa::{Modify, OpenApi};
+use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::jobs::Jobs;
+use crate::jobs::{Happening, Jobs};
 use crate::owner::Line;
 
 pub use error::ErrorObject;
 pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
 pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
 
+use events::EventObject;
 use identity::Identity;
 
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
 /// Longest of a trajectory: 12,000 points as text, with room to spare. So many of them are read at once.
 const TRAJECTORY_MAX: usize = 16 << 20;
+/// Longest of an arm: a robot description, with room to spare.
+const ARM_MAX: usize = 1 << 20;
+/// Longest of waypoints.
+const PLAN_MAX: usize = 1 << 18;
 const TRAJECTORIES_AT_ONCE: usize = 4;
 const CHECKS_AT_ONCE: usize = 2;
-/// Requests that wait for an event, at once: more are answered at once. They leave room for the connections of others.
-const WAITING_MAX: usize = 64;
 /// Longest that a request may take.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
-/// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
-const VIEWERS_MAX: usize = 128;
-const OPERATORS_MAX: usize = 32;
+
+/// Longest that reading the log of a flight recorder may take, at 115,200 Bd some 40 s, and a plan.
+const LONG_TIME: Duration = Duration::from_secs(120);
 
 /// What every handler has.
 #[derive(Clone)]
@@ -69,12 +80,15 @@ pub struct Agent {
     id: Arc<str>,
     port: Arc<str>,
     simulated: bool,
-    viewers: Arc<Semaphore>,
-    operators: Arc<Semaphore>,
+    sockets: Sockets,
     bodies: Arc<Semaphore>,
-    /// Checks of trajectories at once, and requests that wait for an event.
+    /// Checks of trajectories at once.
     checks: Arc<Semaphore>,
-    waiting: Arc<Semaphore>,
+    /// Plans at once.
+    plans: Arc<Semaphore>,
+    /// Logs of the flight recorder that are read at once.
+    logs: Arc<Semaphore>,
+    events: Arc<Events>,
     identity: Arc<tokio::sync::Mutex<Identity>>,
 }
 
@@ -93,35 +107,38 @@ impl Agent {
         simulated: bool,
     ) -> Result<Self, TokenError> {
         let room = |most| Arc::new(Semaphore::new(most));
+        let id: Arc<str> = random()?.get(..8).unwrap_or_default().into();
         let identity = Arc::new(tokio::sync::Mutex::new(Identity::of(jobs.arm())));
         Ok(Self {
             line,
             jobs,
             gate: Gate::new(access, log),
-            id: random()?.get(..8).unwrap_or_default().into(),
+            events: Arc::new(Events::new(id.clone())),
+            id,
             port: port.into(),
             simulated,
-            viewers: room(VIEWERS_MAX),
-            operators: room(OPERATORS_MAX),
+            sockets: Sockets::default(),
             bodies: room(TRAJECTORIES_AT_ONCE),
             checks: room(CHECKS_AT_ONCE),
-            waiting: room(WAITING_MAX),
+            plans: room(1),
+            logs: room(1),
             identity,
         })
     }
 
     /// Everything that is served.
     pub fn router(self) -> Router {
-        let (router, description) = described().split_for_parts();
-        let description: Arc<str> = text(&description).into();
-        let openapi =
-            move || async move { ([(header::CONTENT_TYPE, "application/json")], description.to_string()) };
+        let (router, mut description) = described().split_for_parts();
+        let (slow, of_slow) = slow().split_for_parts();
+        description.merge(of_slow);
+        let in_time = |time| TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, time);
         router
             .route("/api/line", axum::routing::get(socket::line))
             .route("/api/stream", axum::routing::get(events::stream))
             .route("/api/foxglove", axum::routing::get(foxglove::foxglove))
-            .route("/openapi.json", axum::routing::get(openapi))
-            .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+            .route("/openapi.json", served(&description))
+            .layer(in_time(REQUEST_TIME))
+            .merge(slow.layer(in_time(LONG_TIME)))
             .layer(from_fn_with_state(self.clone(), at_root))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
             .with_state(self)
@@ -138,14 +155,10 @@ impl Agent {
 
     /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
     /// way from there may have been sent before.
-    fn halt(
-        &self,
-        caller: &Caller,
-        headers: &HeaderMap,
-        command: ExecCommand,
-    ) -> Result<Json<SentObject>, ErrorObject> {
+    fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, ErrorObject> {
+        let caller = &asker.caller;
         // Who it is does not matter, but for going on later.
-        let client = self.client(caller, headers).ok().map(|(client, _)| client);
+        let client = self.client(asker).ok().map(|(client, _)| client);
         let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();
         let facts = json!({
@@ -193,12 +206,7 @@ impl Agent {
 
 /// The description of the API, OpenAPI 3.1, as JSON.
 pub fn description() -> String {
-    text(&described().into_openapi())
-}
-
-fn text(description: &utoipa::openapi::OpenApi) -> String {
-    // It is made of strings.
-    description.to_pretty_json().unwrap_or_default()
+    text(&described().merge(slow()).into_openapi())
 }
 
 #[derive(OpenApi)]
@@ -209,26 +217,18 @@ fn text(description: &utoipa::openapi::OpenApi) -> String {
                        operator's from elsewhere. A Stop or a Pause is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(ErrorObject)),
+    components(schemas(ErrorObject, EventObject, Happening)),
     modifiers(&Bearer),
     security((), ("token" = []))
 )]
 struct Description;
 
-/// A token, which those on the same computer need for commands alone.
-struct Bearer;
-
-impl Modify for Bearer {
-    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
-        let scheme = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
-        description.components.get_or_insert_default().add_security_scheme("token", scheme);
-    }
-}
-
 fn described() -> OpenApiRouter<Agent> {
     let trajectories = OpenApiRouter::new()
         .routes(routes!(trajectories::put, trajectories::delete))
         .layer(DefaultBodyLimit::max(TRAJECTORY_MAX));
+    let arms =
+        OpenApiRouter::new().routes(routes!(arm::arm, arm::put_arm)).layer(DefaultBodyLimit::max(ARM_MAX));
     let others = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(status))
         .routes(routes!(metrics::metrics))
@@ -250,10 +250,20 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(commands::gripper))
         .routes(routes!(commands::clear))
         .routes(routes!(commands::disable))
-        .routes(routes!(commands::recover))
+        .routes(routes!(commands::begin_recover))
         .routes(routes!(questions::payload, commands::set_payload))
+        .routes(routes!(settings::list, settings::change))
+        .routes(routes!(absent::absent, absent::set_absent))
+        .routes(routes!(log::status))
+        .routes(routes!(log::clear))
         .layer(DefaultBodyLimit::max(BODY_MAX));
-    others.merge(trajectories)
+    others.merge(trajectories).merge(arms)
+}
+
+/// What takes its time.
+fn slow() -> OpenApiRouter<Agent> {
+    let plans = OpenApiRouter::new().routes(routes!(plans::plan)).layer(DefaultBodyLimit::max(PLAN_MAX));
+    plans.merge(OpenApiRouter::new().routes(routes!(log::fetch)))
 }
 
 /// The controller, as its last status has it, and who commands.
@@ -278,12 +288,8 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
         Refusals
     )
 )]
-async fn stop(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<Json<SentObject>, ErrorObject> {
-    agent.halt(&caller, &headers, ExecCommand::Stop)
+async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, ErrorObject> {
+    agent.halt(&asker, ExecCommand::Stop)
 }
 
 /// Pauses the motion on its path, ahead of all else. No lease is needed.
@@ -297,12 +303,8 @@ async fn stop(
         Refusals
     )
 )]
-async fn pause(
-    State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Result<Json<SentObject>, ErrorObject> {
-    agent.halt(&caller, &headers, ExecCommand::Pause)
+async fn pause(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, ErrorObject> {
+    agent.halt(&asker, ExecCommand::Pause)
 }
 
 /// Programs that are given nothing but the agent's address ask there for what they show.

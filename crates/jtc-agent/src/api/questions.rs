@@ -38,7 +38,8 @@ pub struct InfoObject {
 }
 
 impl Agent {
-    async fn ask<T: Send + 'static>(
+    /// Asks the controller something for whoever looks.
+    pub(super) async fn ask<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, Error> + Send + 'static,
     ) -> Result<T, ErrorObject> {

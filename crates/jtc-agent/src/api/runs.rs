@@ -1,14 +1,17 @@
 //! Runs and moves: jobs, and what becomes of them.
 use agent_kit::api::{Body, Number, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
-use axum::{Extension, Json};
+use axum::http::StatusCode;
 use jtc_host::ErrorKind;
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::arm::GivenObject;
 use super::error::Denials;
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
 use crate::line::Policy;
 
@@ -81,6 +84,9 @@ pub struct JobObject {
     /// Figures of its last motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<ResultObject>,
+    /// What the controller was given of an arm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub given: Option<GivenObject>,
     /// Why it failed, or was not begun.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorObject>,
@@ -136,7 +142,8 @@ impl From<Job> for JobObject {
                 })
                 .collect(),
         });
-        Self { number, what, client, stage: stage.name().to_owned(), runs: done.runs, result, error }
+        let (stage, runs, given) = (stage.name().to_owned(), done.runs, done.given.map(GivenObject::from));
+        Self { number, what, client, stage, runs, result, given, error }
     }
 }
 
@@ -145,14 +152,13 @@ impl From<Job> for JobObject {
     post,
     path = "/api/runs",
     operation_id = "run",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_run(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let RunRequest { trajectory: number, approach, speed_percent, repeat, policy, accept_device_limits } =
@@ -173,8 +179,7 @@ pub(super) async fn begin_run(
     let course = Course::Along(stored.trajectory.clone());
     begin(
         &agent,
-        &caller,
-        &headers,
+        &asker,
         what,
         policy,
         Order { course, approach, speed_percent, repeat, accept_device_limits },
@@ -186,14 +191,13 @@ pub(super) async fn begin_run(
     post,
     path = "/api/moves",
     operation_id = "move_to",
-    params(("Lease-Key" = String, Header, description = "Key of the lease")),
+    params(LeaseKey),
     request_body = MoveRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_move(
     State(agent): State<Agent>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
+    asker: Asker,
     Body(request): Body<MoveRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let MoveRequest { to_rad, speed_percent, policy, accept_device_limits } = request;
@@ -201,7 +205,7 @@ pub(super) async fn begin_move(
     let what = format!("move to {}", to_rad.map(|q| q.to_string()).join(", "));
     let course = Course::To(to_rad);
     let order = Order { course, approach: false, speed_percent, repeat: 1, accept_device_limits };
-    begin(&agent, &caller, &headers, what, policy, order)
+    begin(&agent, &asker, what, policy, order)
 }
 
 /// From 1 on, and no more than that.
@@ -216,13 +220,12 @@ fn within(name: &str, value: f64, most: f64) -> Result<(), ErrorObject> {
 
 fn begin(
     agent: &Agent,
-    caller: &Caller,
-    headers: &HeaderMap,
+    asker: &Asker,
     what: String,
     policy: Option<Policy>,
     order: Order,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let (commander, turn) = agent.mover(caller, headers)?;
+    let (commander, turn) = agent.mover(asker)?;
     let (client, own) = (commander.client, commander.policy);
     agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
     let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {

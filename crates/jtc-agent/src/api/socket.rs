@@ -5,8 +5,7 @@ use std::time::Duration;
 use axum::Extension;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade};
 use axum::extract::{Query, State};
-use axum::http::StatusCode;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
 use serde_json::json;
@@ -67,6 +66,15 @@ pub enum Notice {
         /// Why.
         why: String,
     },
+    /// The arm was stopped or paused. What this client had asked for before moves it no more, until it asks anew: `{"asked_after": number}`.
+    Halted {
+        /// Number of this halt.
+        number: u64,
+        /// Who has asked for it.
+        by: String,
+        /// What for.
+        command: String,
+    },
     /// Another client asks for the lease.
     LeaseWanted {
         /// Its name.
@@ -83,9 +91,11 @@ impl Notice {
 
 /// What a client asks of the agent itself.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Wish {
-    lease: LeaseWish,
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Wish {
+    Lease(LeaseWish),
+    /// What this client sends from now on was asked for when this halt was the last one that it knew of.
+    AskedAfter(u64),
 }
 
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
@@ -104,15 +114,9 @@ pub(super) async fn line(
     Query(joining): Query<Joining>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    let sockets = if caller.role == Role::Operator { &agent.operators } else { &agent.viewers };
-    let Ok(permit) = sockets.clone().try_acquire_owned() else {
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    };
+    let sockets = agent.sockets.clone();
     let upgrade = upgrade.max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
-    upgrade.on_upgrade(async move |socket| {
-        serve(&agent, &caller, joining, socket).await;
-        drop(permit);
-    })
+    sockets.serve(caller.role, upgrade, async move |socket| serve(&agent, &caller, joining, socket).await)
 }
 
 async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: WebSocket) {
@@ -154,11 +158,7 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
         match message {
             Message::Binary(bytes) => line.with(|line, now| line.from_client(client, &bytes, now)),
             Message::Text(text) => wish(line, client, &text),
-            Message::Pong(number) => {
-                let number = number.as_ref().try_into().map_or(0, u64::from_be_bytes);
-                line.with(|line, _| line.confirm_halt(client, number));
-            }
-            Message::Ping(_) => {}
+            Message::Pong(_) | Message::Ping(_) => {}
             Message::Close(_) => return,
         }
     }
@@ -170,9 +170,19 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
     let mut pings = tokio::time::interval(PING_TIME);
     // What this computer has missed is no silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let (mut pinged, mut silent) = (0, 0);
+    let mut silent = 0;
+    // It knows of all before it came.
+    let mut known = line.with(|line, _| line.asked_after(client)).unwrap_or_default();
     loop {
-        let (deliveries, halt) = line.with(|line, _| (line.take_deliveries(client), line.last_halt()));
+        let (deliveries, halt) = line.with(|line, _| {
+            let number = line.last_halt();
+            let halt = (number != known).then(|| {
+                let (by, command) = line.last_halt_by();
+                Notice::Halted { number, by: by.to_owned(), command: command.name().to_owned() }
+            });
+            known = number;
+            (line.take_deliveries(client), halt)
+        });
         let Some(deliveries) = deliveries else {
             let reason = Utf8Bytes::from_static("put out: no frames, too many of them, or nothing read");
             send(&mut to, Message::Close(Some(CloseFrame { code: CLOSE_PUT_OUT, reason }))).await;
@@ -192,37 +202,40 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
         if line.lost().is_some() {
             return;
         }
-        let mut ping = halt != pinged;
-        if !ping {
-            tokio::select! {
-                changed = changes.changed() => if changed.is_err() { return },
-                _ = pings.tick() => {
-                    ping = true;
-                    silent = if alive.swap(false, Ordering::Relaxed) { 0 } else { silent + 1 };
-                    if silent >= SILENT_MAX {
-                        line.with(|line, now| line.lapse(client, now));
-                    }
-                }
-            }
-        }
-        // The answer comes behind everything that the client had sent before it knew of the last halt.
-        if ping && !send(&mut to, Message::Ping(halt.to_be_bytes().to_vec().into())).await {
+        if let Some(halt) = halt
+            && !send(&mut to, halt.message()).await
+        {
             return;
         }
-        if ping {
-            pinged = halt;
+        tokio::select! {
+            changed = changes.changed() => if changed.is_err() { return },
+            _ = pings.tick() => {
+                silent = if alive.swap(false, Ordering::Relaxed) { 0 } else { silent + 1 };
+                if silent >= SILENT_MAX {
+                    line.with(|line, now| line.lapse(client, now));
+                }
+                if !send(&mut to, Message::Ping(Vec::new().into())).await {
+                    return;
+                }
+            }
         }
     }
 }
 
 /// What a client asks of the agent; what is none is passed over.
 fn wish(line: &Line, client: ClientId, text: &str) {
-    let Ok(Wish { lease: wish }) = serde_json::from_str(text) else { return };
+    let Ok(wish) = serde_json::from_str(text) else { return };
     line.with(|line, now| {
         let done = match wish {
-            LeaseWish::Take => line.take_lease(client, None, now),
-            LeaseWish::Release => line.release_lease(client, now),
-            LeaseWish::Ask => line.want_lease(client),
+            Wish::Lease(LeaseWish::Take) => line.take_lease(client, None, now),
+            Wish::Lease(LeaseWish::Release) => line.release_lease(client, now),
+            Wish::Lease(LeaseWish::Ask) => line.want_lease(client, now),
+            Wish::AskedAfter(number) => {
+                if let Err(denied) = line.ask_to_move(client, number, now) {
+                    line.deliver(client, Delivery::Denied(denied));
+                }
+                return;
+            }
         };
         if let Err(denied) = done {
             line.deliver(client, Delivery::LeaseDenied(denied));

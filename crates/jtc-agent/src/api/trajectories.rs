@@ -1,20 +1,19 @@
 //! Trajectories by number: kept, checked, listed.
 use agent_kit::api::{Number, Refusals};
 use agent_kit::gate::plain;
-use axum::body::Bytes;
-use axum::extract::{FromRequest as _, Request, State};
+use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use axum::{Extension, Json};
 use jtc_host::check::Verdict;
-use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session};
+use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, Session};
 use jtc_wire::Joint;
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::body::{blocking, read};
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::Stored;
-use crate::line::{Denied, Role};
 use crate::owner::ClientPort;
 
 /// A trajectory to keep.
@@ -110,11 +109,6 @@ impl From<&Verdict> for CheckObject {
     }
 }
 
-/// Only operators change what others may run.
-fn operator(caller: &Caller) -> Result<(), ErrorObject> {
-    if caller.role == Role::Operator { Ok(()) } else { Err(Denied::Viewer.into()) }
-}
-
 /// The trajectories that are kept.
 #[utoipa::path(
     get,
@@ -141,25 +135,19 @@ pub(super) async fn put(
     Number(number): Number<u16>,
     request: Request,
 ) -> Result<Json<TrajectoryObject>, ErrorObject> {
-    operator(&caller)?;
-    let room = agent.bodies.clone().acquire_owned().await;
-    let body = Bytes::from_request(request, &())
-        .await
-        .map_err(|e| ErrorObject::rejected(e.status(), e.body_text()))?;
-    // Until it is done, whether or not somebody waits for it: what is long is read beside the threads that serve.
-    blocking(move || {
-        let kept = keep(&agent, number, &body);
+    // Only operators change what others may run.
+    caller.operator()?;
+    let own = agent.clone();
+    let kept = read(&agent, request, move |request| {
+        let kept = keep(&own, number, request);
         let (from, why) = (caller.peer.to_string(), kept.as_ref().err().map(|error| error.message.clone()));
-        agent.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
-        drop(room);
-        kept.map(Json)
-    })
-    .await?
+        own.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
+        kept
+    });
+    Ok(Json(kept.await?))
 }
 
-fn keep(agent: &Agent, number: u16, body: &[u8]) -> Result<TrajectoryObject, ErrorObject> {
-    let request = serde_json::from_slice(body)
-        .map_err(|e| ErrorObject::rejected(StatusCode::BAD_REQUEST, e.to_string()))?;
+fn keep(agent: &Agent, number: u16, request: TrajectoryRequest) -> Result<TrajectoryObject, ErrorObject> {
     let TrajectoryRequest { name, text, degrees } = request;
     let stored = agent.jobs.store.put(number, &plain(&name), &text, degrees);
     stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
@@ -182,7 +170,8 @@ pub(super) async fn delete(
     Extension(caller): Extension<Caller>,
     Number(number): Number<u16>,
 ) -> Result<StatusCode, ErrorObject> {
-    operator(&caller)?;
+    // Only operators change what others may run.
+    caller.operator()?;
     let jobs = agent.jobs.clone();
     let gone = blocking(move || jobs.store.delete(number)).await?;
     if !gone.map_err(|e| ErrorObject::diagnosed(&e))? {
@@ -220,7 +209,7 @@ pub(super) async fn check(
         Ok((arm, CheckOptions { accept_device_limits: true, device, ..CheckOptions::default() }))
     };
     let asked = agent.jobs.asker().call_in_turn(asked).await?;
-    let (arm, options) = asked?;
+    let (arm, options) = asked.map_err(|error| ErrorObject::of(&error))?;
     let start = stored.trajectory.points.first().map_or([0.0; 6], |point| point.position);
     let checked = blocking(move || {
         let checked = CheckedTrajectory::check(&stored.trajectory, &arm, &start, &options);
@@ -233,11 +222,4 @@ pub(super) async fn check(
         Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::from(&*verdict))),
         Err(error) => Err(ErrorObject::of(&error.into())),
     }
-}
-
-/// What takes a while, where it keeps nobody else from being served.
-async fn blocking<T: Send + 'static>(act: impl FnOnce() -> T + Send + 'static) -> Result<T, ErrorObject> {
-    tokio::task::spawn_blocking(act).await.map_err(|_| {
-        ErrorObject::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
-    })
 }

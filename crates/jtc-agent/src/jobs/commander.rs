@@ -16,6 +16,9 @@ use crate::owner::{ClientPort, Line};
 /// How often a client without work takes in what the controller reports.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// The code of what was wished of a motion that had ended before.
+const MOTION_ENDED: &str = "motion-ended";
+
 /// What a client has its end of the line do.
 type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 
@@ -81,9 +84,16 @@ impl Commander {
         self.moves.load(Ordering::Acquire)
     }
 
-    /// A motion begins, or has ended: what is wished of it is done from then on, or no more.
-    pub fn set_moving(&self, moves: bool) {
-        self.moves.store(moves, Ordering::Release);
+    /// A motion begins: what is wished of it is done from then on.
+    pub fn motion_begins(&self) {
+        self.moves.store(true, Ordering::Release);
+    }
+
+    /// A motion has ended. What was wished of it too late is known to have been: its senders are dropped.
+    pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
+        let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
+        self.moves.store(false, Ordering::Release);
+        while wishes.try_recv().is_ok() {}
     }
 
     /// For how long it has not asked for anything, nor has it anything going on.
@@ -173,14 +183,20 @@ impl Commander {
         })
     }
 
-    /// Wishes something of the motion that is going on; what is returned receives what came of it. `None`: no motion is going on.
-    pub fn wish(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), ErrorObject>>> {
-        if !self.moves.load(Ordering::Acquire) {
-            return None;
-        }
+    /// Wishes something of the motion that is going on, and waits for what comes of it. `None`: no motion is going on.
+    pub async fn wish(&self, flow: Flow) -> Option<Result<(), ErrorObject>> {
+        let done = self.wished(flow)?;
+        Some(done.await.unwrap_or_else(|_| {
+            let next = "GET /api/jobs shows how";
+            Err(ErrorObject::new(MOTION_ENDED, "the motion had ended before this was done", next))
+        }))
+    }
+
+    fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), ErrorObject>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        let (_, wishes) = job.as_ref()?;
+        // Under the lock that the end of a motion takes: it is not done in the next one.
+        let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
 

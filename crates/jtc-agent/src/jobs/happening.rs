@@ -1,5 +1,4 @@
 //! What can happen to an arm and its jobs.
-use agent_kit::journal::Entry;
 use utoipa::ToSchema;
 
 use crate::api::ErrorObject;
@@ -88,6 +87,17 @@ pub enum Happening {
         /// Segments that were sent again.
         retries: u32,
     },
+    /// The controller was given a part of an arm, and has confirmed it.
+    Given {
+        /// The job.
+        job: u64,
+        /// Which part.
+        parameter: String,
+        /// Bytes of its frame.
+        bytes: usize,
+        /// How long that took, s.
+        time_s: f64,
+    },
     /// The arm begins to move.
     Executing {
         /// The job.
@@ -134,28 +144,12 @@ impl agent_kit::journal::Happening for Happening {
             | Self::Checked { job, .. }
             | Self::Uploading { job, .. }
             | Self::Uploaded { job, .. }
+            | Self::Given { job, .. }
             | Self::Executing { job, .. }
             | Self::Moving { job, .. }
             | Self::Finished { job, .. }
             | Self::Ended { job, .. } => Some(*job),
         }
-    }
-}
-
-/// An event.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
-pub struct EventObject {
-    /// Counts up from 1 as long as this agent runs.
-    pub number: u64,
-    /// When, s since 1970 by the agent's clock.
-    pub unix_s: f64,
-    /// What has happened.
-    pub event: Happening,
-}
-
-impl From<Entry<Happening>> for EventObject {
-    fn from(Entry { number, unix_s, event }: Entry<Happening>) -> Self {
-        Self { number, unix_s, event }
     }
 }
 

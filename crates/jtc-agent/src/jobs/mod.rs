@@ -1,8 +1,9 @@
 //! What an agent does for clients that have no connection of their own: it keeps their end of the line, runs what they ask for, and
 //! writes down what happens, so that they can come back and read it.
 mod commander;
-mod followed;
+mod give;
 mod happening;
+mod recover;
 mod run;
 mod store;
 mod task;
@@ -15,16 +16,16 @@ use std::time::{Duration, Instant};
 use jtc_host::{Arm, Session};
 
 pub use commander::{Commander, Turn, Unable, Wish};
-pub use followed::Followed;
-pub use happening::{EventObject, Happening, Journal};
+pub use give::{Given, give};
+pub use happening::{Happening, Journal};
+pub use recover::recover;
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
 
 use crate::api::ErrorObject;
 use crate::line::{Introduction, Policy, Role};
 use crate::owner::{ClientPort, Line};
-use task::STOPPED;
-pub use task::Task;
+pub use task::{STOPPED, Task, stopped};
 
 /// Jobs that are remembered.
 const KEPT: usize = 256;
@@ -94,8 +95,6 @@ pub struct Jobs {
     /// Trajectories by number.
     pub store: Store,
     arm: Arm,
-    /// What the arm follows.
-    pub followed: Followed,
     /// Asks questions for all who may look.
     asker: Arc<Commander>,
     kept: Mutex<Kept>,
@@ -107,15 +106,8 @@ impl Jobs {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
         let asker = Commander::new(&line, introduction);
-        let jobs = Arc::new(Self {
-            line,
-            journal: Journal::default(),
-            store,
-            arm,
-            followed: Followed::default(),
-            asker,
-            kept: Mutex::default(),
-        });
+        let jobs =
+            Arc::new(Self { line, journal: Journal::default(), store, arm, asker, kept: Mutex::default() });
         let watched = Arc::downgrade(&jobs);
         std::thread::spawn(move || watch(&watched));
         jobs
@@ -186,9 +178,9 @@ impl Jobs {
         let work = move |session: &mut Session<ClientPort>, wishes: &Receiver<Wish>| {
             let Some(commander) = whose.upgrade() else { return (Done::default(), None) };
             let Job { number, what, client, .. } = begun;
-            let Self { line, journal, arm, followed, .. } = &*own;
+            let Self { line, journal, arm, .. } = &*own;
             journal.write(Happening::Begun { job: number, what, client });
-            act(&Task { wishes, job: number, journal, line, commander: &commander, arm, followed }, session)
+            act(&Task { wishes, job: number, journal, line, commander: &commander, arm }, session)
         };
         let accepted =
             commander.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));

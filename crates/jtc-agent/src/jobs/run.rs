@@ -12,7 +12,7 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Session, Trajectory};
 use jtc_wire::Status;
 
-use super::{Happening, Task, Wish};
+use super::{Given, Happening, Task, Wish};
 use crate::api::ErrorObject;
 use crate::owner::ClientPort;
 
@@ -52,6 +52,8 @@ pub struct Done {
     pub runs: u32,
     /// Figures of the last motion.
     pub summary: Option<Summary>,
+    /// What the controller was given of an arm.
+    pub given: Option<Given>,
 }
 
 /// A run on its way.
@@ -138,7 +140,7 @@ impl Run<'_> {
         match &order.course {
             Course::Along(trajectory) if order.speed_percent == 100.0 => Ok(trajectory.clone()),
             Course::Along(trajectory) => {
-                plan::at_speed(trajectory, order.speed_percent).map_err(|e| ErrorObject::diagnosed(&e))
+                plan::at_speed(trajectory, order.speed_percent).map_err(|e| plan_error(&e))
             }
             Course::To(place) => {
                 let (config, friction) =
@@ -150,7 +152,7 @@ impl Run<'_> {
                     ..Planner::new(&config)
                 };
                 let planned = planner.to(&status.positions(), place);
-                let planned = planned.map_err(|e| ErrorObject::diagnosed(&e).message(e.of_move()))?;
+                let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
                 planned.notes.into_iter().for_each(|text| self.task.note(text));
                 Ok(planned.trajectory)
             }
@@ -167,6 +169,9 @@ impl Run<'_> {
     ) -> Result<bool, ErrorObject> {
         let task = self.task;
         let Task { job, journal, wishes, .. } = *task;
+        if task.is_halted() {
+            return Err(task.stopped());
+        }
         let phase = || phase.to_owned();
         journal.write(Happening::Checked {
             job,
@@ -193,11 +198,10 @@ impl Run<'_> {
             return Err(task.stopped());
         }
         let duration_s = checked.trajectory().duration_s();
-        let following = task.followed.begin(checked.trajectory(), site.options.device.delay_ticks);
         journal.write(Happening::Executing { job, phase: phase(), duration_s });
         let digest = Rc::new(RefCell::new(Digest::new()));
         let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
-        task.commander.set_moving(true);
+        task.commander.motion_begins();
         let outcome = self.session.run_unkept(
             checked,
             move |sample| taken.borrow_mut().push(sample),
@@ -220,10 +224,7 @@ impl Run<'_> {
                 }
             },
         );
-        task.commander.set_moving(false);
-        drop(following);
-        // Those that came too late are known to have: their senders are dropped.
-        while wishes.try_recv().is_ok() {}
+        task.commander.motion_ended(wishes);
         done.summary = Some(digest.borrow().summary(&RecordingInfo::of(&site.arm)));
         match outcome {
             Ok(Outcome::Finished(_)) => Ok(true),
@@ -283,14 +284,15 @@ fn is_elsewhere(error: &CheckError) -> bool {
     matches!(error, CheckError::Refused(verdict) if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose))
 }
 
+/// There is no such motion.
+fn plan_error(error: &plan::PlanError) -> ErrorObject {
+    ErrorObject::diagnosed(error).with(&Facts::of_plan(error))
+}
+
 /// The trajectory itself may be sound: what is refused is the way to it.
 fn approach_error(error: &plan::ApproachError) -> ErrorObject {
-    let facts = match error {
-        plan::ApproachError::Check(CheckError::Refused(verdict)) => Facts::of_verdict(verdict),
-        _ => Facts::default(),
-    };
     let message =
         format!("the straight way from where the arm stands to the first point is refused: {error}");
     let next = "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way";
-    ErrorObject::new("approach", message, next).with(&facts)
+    ErrorObject::new("approach", message, next).with(&Facts::of_approach(error))
 }

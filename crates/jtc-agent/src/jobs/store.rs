@@ -200,8 +200,10 @@ fn file_name(name: &str) -> String {
 /// Whole, or not at all. What had the number before goes first: without power in between there is none, and never two.
 fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
-    fs::write(&part, trajectory.to_exact_csv())?;
-    fs::File::open(&part)?.sync_all()?;
+    let written = fs::write(&part, trajectory.to_exact_csv());
+    let written = written.and_then(|()| fs::File::open(&part)?.sync_all());
+    // What a full disk has taken of it takes room for nothing.
+    written.inspect_err(|_| drop(fs::remove_file(&part)))?;
     remove(directory, number, Some(path))?;
     fs::rename(&part, path)?;
     fs::File::open(directory)?.sync_all()
@@ -246,6 +248,33 @@ mod tests {
         );
         assert!(again.delete(7).expect("it can be written") && !again.delete(7).expect("it can be written"));
         assert_eq!(names(&Store::open(directory.path()).expect("its own files")).len(), 1);
+    }
+
+    /// A disk that is full keeps what was there, also for the next agent; with room it takes the next one.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_leaves_what_had_the_number() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let store = Store::open(directory.path()).expect("it is empty");
+        store.put(7, "pick", TEXT, false).expect("a trajectory");
+        std::os::unix::fs::symlink("/dev/full", directory.path().join("7-pick.part")).expect("a link");
+        let longer = format!("{TEXT}2,0,0,0,0,0,0\n");
+        let error = store.put(7, "pick", &longer, false).expect_err("there is no room");
+        assert!(error.to_string().contains("7-pick.csv: No space left"), "{error}");
+        for store in [&store, &Store::open(directory.path()).expect("its own files")] {
+            let kept = store.get(7).expect("it is there");
+            assert_eq!(kept.trajectory.points.len(), 2);
+        }
+        assert_eq!(
+            fs::read_dir(directory.path()).expect("the directory").count(),
+            1,
+            "no part of it is left"
+        );
+        store.put(7, "pick", &longer, false).expect("there is room");
+        assert_eq!(
+            Store::open(directory.path()).expect("its own files").list()[0].trajectory.points.len(),
+            3
+        );
     }
 
     #[test]

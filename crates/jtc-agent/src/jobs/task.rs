@@ -3,12 +3,13 @@ use std::sync::mpsc::Receiver;
 
 use jtc_host::Arm;
 
-use super::{Commander, Followed, Happening, Journal, Wish};
+use super::{Commander, Happening, Journal, Wish};
 use crate::api::ErrorObject;
+use crate::line::ClientId;
 use crate::owner::Line;
 
 /// The code of what somebody stopped before it moved the arm.
-pub(super) const STOPPED: &str = "stopped";
+pub const STOPPED: &str = "stopped";
 
 /// A job on its way.
 pub struct Task<'a> {
@@ -24,8 +25,6 @@ pub struct Task<'a> {
     pub commander: &'a Commander,
     /// The arm of controllers that cannot be asked for theirs.
     pub arm: &'a Arm,
-    /// What the arm follows.
-    pub followed: &'a Followed,
 }
 
 impl Task<'_> {
@@ -41,11 +40,16 @@ impl Task<'_> {
 
     /// Somebody stopped the arm before this moved it.
     pub fn stopped(&self) -> ErrorObject {
-        let by = self.line.with(|line, _| line.last_halt_by().0.to_owned());
-        ErrorObject::new(
-            STOPPED,
-            format!("{by} stopped or paused the arm before this moved it; nothing was started"),
-            "ask for it again when the arm may move",
-        )
+        stopped(self.line, self.commander.client)
     }
+}
+
+/// Somebody stopped the arm before what was asked for moved it.
+pub fn stopped(line: &Line, client: ClientId) -> ErrorObject {
+    let by = line.with(|line, _| line.halted_by(client).to_owned());
+    ErrorObject::new(
+        STOPPED,
+        format!("{by} stopped or paused the arm before this moved it: nothing is begun behind that"),
+        "ask for it again when the arm may move",
+    )
 }

@@ -3,7 +3,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use agent_kit::access::Role;
-use jtc_wire::{FRAME_MAX, FRAME_MIN, Response};
+use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 
 use super::Denied;
 use super::class::HostFrame;
@@ -36,6 +36,26 @@ pub enum Policy {
     Pause,
     /// It stops on the path.
     Stop,
+}
+
+impl Policy {
+    /// What is sent for it, if anything is.
+    pub(super) fn command(self) -> Option<ExecCommand> {
+        match self {
+            Self::Continue => None,
+            Self::Pause => Some(ExecCommand::Pause),
+            Self::Stop => Some(ExecCommand::Stop),
+        }
+    }
+
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Continue => "continue",
+            Self::Pause => "pause",
+            Self::Stop => "stop",
+        }
+    }
 }
 
 /// How a client presents itself.
@@ -104,13 +124,14 @@ pub(super) struct Client {
     unread: usize,
     /// No motion begins before: somebody else has stopped the arm.
     pub calm_until: Duration,
-    /// The last halt that what it does now was asked for after; `None`: it is asked itself whether it knows of the last one.
-    pub asked_after: Option<u64>,
+    /// The last halt, by number, that what it does now was asked for after.
+    pub asked_after: u64,
     /// For how long it commands without showing that it is there; `None`: as long as it is connected.
     pub lasts: Option<Duration>,
-    /// The last halt of somebody else, by number, and the last that is known to have been seen.
-    pub halted: u64,
-    pub seen: u64,
+    /// When it has shown last that it is there.
+    pub shown_at: Duration,
+    /// Its lease has lapsed, and it has not asked for another since.
+    pub lapsed: bool,
     /// Frames that it may send at once, and when that was.
     allowance: f64,
     allowed_at: Duration,
@@ -127,10 +148,10 @@ impl Client {
             deliveries: VecDeque::new(),
             unread: 0,
             calm_until: Duration::ZERO,
-            asked_after: None,
+            asked_after: 0,
             lasts: None,
-            halted: 0,
-            seen: 0,
+            lapsed: false,
+            shown_at: Duration::ZERO,
             allowance: FRAMES_AT_ONCE,
             allowed_at: Duration::ZERO,
         }

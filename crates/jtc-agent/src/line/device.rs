@@ -4,6 +4,7 @@ use std::time::Duration;
 use jtc_wire::{FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
 
 use super::class::{Class, HostFrame, returned_by};
+use super::client::Client;
 use super::outbox::{Outgoing, Passed};
 use super::{
     ClientId, Delivery, Denied, HALTS, LineEvent, OWNER, RECORD_TIME, RETURN_TIME, Return, Sent, SharedLine,
@@ -12,15 +13,16 @@ use super::{
 impl SharedLine {
     /// When [`to_device`](Self::to_device) is to be called again if nothing happens before.
     pub fn due(&self, now: Duration) -> Option<Duration> {
-        let waits = !self.own.is_empty() || self.clients.values().any(|client| !client.waiting.is_empty());
+        let waits = self.clients.values().any(|client| !client.waiting.is_empty());
         let line = match self.outbox.due(now) {
             None if waits => Some(self.returns.as_ref().map_or(now, |returns| returns.until)),
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
         // One that waits for the line is due when the line is.
-        let halt = self.halts.due(now).filter(|_| self.outbox.due(now).is_none());
-        [line, lease, halt].into_iter().flatten().min()
+        let own = [self.halts.due(now), self.moving.due()].into_iter().flatten().min();
+        let own = own.filter(|_| self.outbox.due(now).is_none());
+        [line, lease, own].into_iter().flatten().min()
     }
 
     /// What is to be written to the device now.
@@ -46,8 +48,8 @@ impl SharedLine {
                 match passed {
                     Passed::Written(outgoing) => self.note_written(outgoing, false),
                     Passed::Abandoned(outgoing) => {
-                        let by = self.halted.1.clone();
-                        self.refuse(outgoing.client, &outgoing.frame, Denied::Stopped { by });
+                        let stopped = self.stopped(outgoing.client);
+                        self.refuse(outgoing.client, &outgoing.frame, stopped);
                         self.note_written(outgoing, true);
                     }
                 }
@@ -58,12 +60,17 @@ impl SharedLine {
         }
     }
 
+    /// What was to be written was handed over to the system, which may have taken until now.
+    pub fn handed_over(&mut self, now: Duration) {
+        self.outbox.handed_over(now);
+    }
+
     /// The next frame, of each client in turn.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
-        if let Some(frame) = self.own.pop_front() {
+        if let Some(frame) = self.moving.frame(now) {
             return Some(Outgoing { client: OWNER, frame });
         }
-        self.refuse_without_lease();
+        self.refuse_without_lease(now);
         let after = |id: &ClientId| *id > self.last_turn;
         let ids: Vec<ClientId> = self.clients.keys().copied().collect();
         let (first, then): (Vec<ClientId>, Vec<ClientId>) = ids.into_iter().partition(after);
@@ -86,13 +93,19 @@ impl SharedLine {
         None
     }
 
-    /// Frames that were taken while their sender commanded, and wait still now that it does not any more.
-    fn refuse_without_lease(&mut self) {
+    /// Frames that were taken while their sender commanded, and wait still now that it does not any more. One whose motions go on without
+    /// it takes the lease again where nobody else has.
+    fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
-        let ids: Vec<ClientId> = self.clients.keys().copied().filter(|id| Some(*id) != holder).collect();
-        for id in ids {
+        let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());
+        let others = self.clients.iter().filter(|(id, client)| Some(**id) != holder && waits(client));
+        let others: Vec<(ClientId, bool)> = others.map(|(id, client)| (*id, client.lapsed)).collect();
+        for (id, lapsed) in others {
+            if lapsed && self.may_command(id, now).is_ok() {
+                continue;
+            }
             while let Some(client) = self.clients.get_mut(&id)
-                && client.waiting.front().is_some_and(|frame| frame.class.needs_lease())
+                && waits(client)
                 && let Some(frame) = client.take_waiting()
             {
                 self.refuse(id, &frame, Denied::NotHolder);
@@ -105,7 +118,12 @@ impl SharedLine {
         let at = self.outbox.free_at();
         match class {
             Class::Halt(_) => self.halts.written(at, self.outbox.baud()),
-            Class::Motion if !abandoned => self.halts.motion_written(),
+            Class::Motion if !abandoned => {
+                self.halts.motion_written();
+                self.moving.begun(frame_type, at);
+            }
+            _ if frame_type == FrameType::Trajectory && !abandoned => self.moving.uploaded(at),
+            _ if frame_type == FrameType::TeachingModeDisable && !abandoned => self.moving.taught(),
             _ => {}
         }
         if class != Class::Ask && !abandoned {
@@ -119,7 +137,7 @@ impl SharedLine {
     pub fn from_device(&mut self, mut bytes: &[u8], now: Duration) {
         loop {
             match self.receiver.next_frame(&mut bytes) {
-                None => return,
+                None => return self.look_what_moves(now),
                 Some(FromDevice::Status(status)) => {
                     let frame = self.receiver.frame_bytes().to_vec();
                     self.take_status(status, &frame, now);
@@ -141,6 +159,10 @@ impl SharedLine {
         self.status = Some((now, status));
         let answered = status.response().map_or_else(Vec::new, |response| self.whose(response, now));
         for (client, response) in &answered {
+            let taken = response.status == FrameStatus::NoError;
+            if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
+                self.moving.answered();
+            }
             if FrameType::from_byte(response.frame_type).is_some_and(|t| returned_by(t).is_none()) {
                 self.events.push_back(LineEvent::Answered { client: *client, response: *response });
             }

@@ -1,7 +1,7 @@
 //! What happens on the line.
 use jtc_wire::{FrameType, Response};
 
-use super::{Class, ClientId, Denied, Lease, Policy, PutOut};
+use super::{Class, ClientId, Denied, Lease, Policy, PutOut, Will};
 
 /// What has happened on a line since its owner began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl Counts {
             LineEvent::Denied { .. } => &mut self.denied,
             LineEvent::PutOut { .. } => &mut self.put_out,
             LineEvent::NotTaken => &mut self.not_taken,
-            LineEvent::Lease(_) | LineEvent::PolicyApplied { .. } => return,
+            LineEvent::Lease(_) | LineEvent::PolicyApplied { .. } | LineEvent::Will(_) => return,
         };
         *count += 1;
     }
@@ -77,6 +77,8 @@ pub enum LineEvent {
     },
     /// A Stop or Pause was sent many times, and the device did not take it.
     NotTaken,
+    /// Something else moves the arm, or the policy of somebody else acts on it; `None`: nothing moves any more.
+    Will(Option<Will>),
     /// A client was put out.
     PutOut {
         /// Who it was.

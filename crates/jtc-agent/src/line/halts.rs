@@ -124,6 +124,12 @@ impl Halts {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
 
+    /// What was asked for, and sent more than once because the device does not take it.
+    pub fn untaken(&self) -> Option<ExecCommand> {
+        let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
+        again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
+    }
+
     /// All have their records.
     pub fn are_done(&self) -> bool {
         self.waiting.is_none() && self.written.is_empty()

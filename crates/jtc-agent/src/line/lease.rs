@@ -1,9 +1,12 @@
 //! The lease: one client commands at a time, and all see who.
 use std::time::Duration;
 
-use jtc_wire::ExecCommand;
-
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
+
+/// Who stops the arm of a client that has gone.
+pub(super) const POLICY: &str = "the policy of a client that has gone";
+/// No halt: what a client does was asked for before its policy ended it.
+pub(super) const NOT_ASKED: u64 = u64::MAX;
 
 /// Who commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +32,14 @@ pub enum Denied {
         holder: String,
         /// For how long, ms.
         age_ms: u64,
+    },
+    /// Another client has asked for the lease before.
+    #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
+    Awaited {
+        /// Who commands.
+        holder: String,
+        /// Who waits.
+        by: String,
     },
     /// This client may look and stop, and not command.
     #[error("this client was let in to look and to stop, not to command")]
@@ -68,7 +79,7 @@ impl SharedLine {
         now: Duration,
     ) -> Result<(), Denied> {
         if let Some(client) = self.clients.get_mut(&client) {
-            client.lasts = lasts;
+            (client.lasts, client.lapsed, client.shown_at) = (lasts, false, now);
         }
         self.may_command(client, now)?;
         if let Some(lease) = &mut self.lease {
@@ -84,25 +95,48 @@ impl SharedLine {
     /// [`Denied::NotHolder`].
     pub fn release_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
+        // Whoever lets it go in a motion leaves that to itself.
+        self.bequeath(self.name(client), Policy::Continue);
         let next = lease.wanted_by.filter(|next| self.clients.contains_key(next));
         self.set_lease(next.map(|holder| self.lease_of(holder, now)));
         Ok(())
     }
 
-    /// Asks the one who commands to let it go.
+    /// Asks the one who commands to let it go. The first who asks keeps its place as long as it waits: until it gets the lease, goes, or has not
+    /// shown for as long as its own lease would last that it is there.
     ///
     /// # Errors
     ///
-    /// [`Denied::Viewer`]; [`Denied::NotHolder`] when nobody commands: it can be taken.
-    pub fn want_lease(&mut self, client: ClientId) -> Result<(), Denied> {
+    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] when nobody commands: it can be taken.
+    pub fn want_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(Introduction { name, role: Role::Operator, .. }) = self.introduction(client).cloned() else {
             return Err(Denied::Viewer);
         };
+        let lease = self.lease.as_ref().ok_or(Denied::NotHolder)?;
+        let first = lease.wanted_by.filter(|first| *first != client && self.waits(*first, now));
+        if let Some(first) = first {
+            return Err(Denied::Awaited { holder: self.name(lease.holder), by: self.name(first) });
+        }
+        self.show(client, now);
         let lease = self.lease.as_mut().ok_or(Denied::NotHolder)?;
         lease.wanted_by = Some(client);
         let holder = lease.holder;
         self.deliver(holder, Delivery::LeaseWanted(name));
         Ok(())
+    }
+
+    /// A client that has asked for the lease is there.
+    fn waits(&self, id: ClientId, now: Duration) -> bool {
+        self.clients.get(&id).is_some_and(|client| {
+            client.lasts.is_none_or(|lasts| now.saturating_sub(client.shown_at) < lasts)
+        })
+    }
+
+    /// The client shows that it is there.
+    fn show(&mut self, id: ClientId, now: Duration) {
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.shown_at = now;
+        }
     }
 
     /// Nothing comes from a client any more: the one that commands is put out, and its motion follows its policy. If it wakes it has to come
@@ -115,6 +149,15 @@ impl SharedLine {
 
     /// The client commands; it takes the lease where nobody has it.
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
+        self.could_command(id, now)?;
+        if self.lease.is_none() {
+            self.set_lease(Some(self.lease_of(id, now)));
+        }
+        Ok(())
+    }
+
+    /// The client commands, or could take the lease.
+    pub(super) fn could_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         if self.introduction(id).ok_or(Denied::Gone)?.role != Role::Operator {
             return Err(Denied::Viewer);
         }
@@ -125,11 +168,26 @@ impl SharedLine {
                 let age_ms = now.saturating_sub(lease.since).as_millis() as u64;
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
-            None => {
-                self.set_lease(Some(self.lease_of(id, now)));
-                Ok(())
-            }
+            // What it began goes on without it by its policy alone.
+            None if self.is_over(id) => Err(Denied::NotHolder),
+            None => Ok(()),
         }
+    }
+
+    /// The client shows that it is there: its lease, where it has it, lasts anew.
+    pub fn renew(&mut self, id: ClientId, now: Duration) {
+        self.end_lapsed(now);
+        self.show(id, now);
+        let lasts = self.clients.get(&id).and_then(|client| client.lasts);
+        if let Some(lease) = self.lease.as_mut().filter(|lease| lease.holder == id) {
+            lease.until = lasts.map(|lasts| now + lasts);
+        }
+    }
+
+    /// The lease of this client has lapsed, and its policy has ended what it did.
+    fn is_over(&self, id: ClientId) -> bool {
+        let client = self.clients.get(&id);
+        client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
     }
 
     /// One that this client has from now on.
@@ -142,6 +200,9 @@ impl SharedLine {
         if let Some(Lease { holder, .. }) =
             self.lease.clone().filter(|lease| lease.until.is_some_and(|until| now >= until))
         {
+            if let Some(client) = self.clients.get_mut(&holder) {
+                client.lapsed = true;
+            }
             let policy = self.introduction(holder).map_or(Policy::default(), |client| client.policy);
             self.end_lease(holder, policy, now);
         }
@@ -152,14 +213,13 @@ impl SharedLine {
         let next = self.lease.as_ref().and_then(|lease| lease.wanted_by);
         let next = next.filter(|next| self.clients.contains_key(next));
         self.set_lease(next.map(|holder| self.lease_of(holder, now)));
-        let Some(command) = (match policy {
-            Policy::Continue => None,
-            Policy::Pause => Some(ExecCommand::Pause),
-            Policy::Stop => Some(ExecCommand::Stop),
-        }) else {
-            return;
-        };
-        self.hold("the policy of a client that has gone", command, now);
-        self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
+        self.bequeath(self.name(holder), policy);
+        let Some(command) = policy.command() else { return };
+        if self.hold(POLICY, command, now) {
+            self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
+        } else if let Some(client) = self.clients.get_mut(&holder) {
+            // Nobody else is held up, and what it was about to move stays.
+            client.asked_after = NOT_ASKED;
+        }
     }
 }

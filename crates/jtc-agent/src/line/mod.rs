@@ -9,29 +9,34 @@ mod device;
 mod event;
 mod halts;
 mod lease;
+mod moving;
 mod outbox;
+mod will;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, FrameType, Status, StatusCounters, StatusReceiver, fixed};
+use jtc_wire::{ExecCommand, FrameType, Status, StatusCounters, StatusReceiver};
 
 pub use agent_kit::access::Role;
 pub use class::Class;
 pub use client::{ClientId, Delivery, Introduction, Policy, PutOut};
 pub use event::{Counts, LineEvent};
 pub use lease::{Denied, Lease};
+use lease::{NOT_ASKED, POLICY};
+pub use will::{Applied, Moves, Will};
 
 use class::HostFrame;
 use client::Client;
 use halts::Halts;
+use moving::Moving;
 use outbox::Outbox;
 
 /// Records that do not come within this time behind their frame do not come any more.
 const RECORD_TIME: Duration = Duration::from_secs(2);
 /// Nor do frames that a request returns.
 const RETURN_TIME: Duration = Duration::from_millis(500);
-/// For so long after somebody else's Stop no frame may begin a motion: it may have been sent before, or be sent again for want of a record.
+/// For so long after somebody else's Stop nobody can ask for a motion: what asks may have been on its way before.
 const CALM: Duration = Duration::from_secs(3);
 /// And for so long after one that was refused for that.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
@@ -68,8 +73,11 @@ pub struct SharedLine {
     halted: (u64, String, ExecCommand),
     /// No motion begins before that was not asked for by the one who asked for the last halt.
     calm_until: Duration,
-    /// Frames of the owner itself.
-    own: VecDeque<HostFrame>,
+    moving: Moving,
+    /// Whose policy acts on what moves while nobody commands: that of the last who did.
+    left: (String, Policy),
+    /// What was reported last.
+    will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
     events: VecDeque<LineEvent>,
@@ -95,7 +103,9 @@ impl SharedLine {
             halts: Halts::default(),
             halted: (0, String::new(), ExecCommand::Stop),
             calm_until: Duration::ZERO,
-            own: VecDeque::new(),
+            moving: Moving::default(),
+            left: ("nobody".to_owned(), Policy::Continue),
+            will: None,
             receiver: StatusReceiver::new(),
             status: None,
             events: VecDeque::new(),
@@ -109,7 +119,7 @@ impl SharedLine {
         self.next_id += 1;
         let mut client = Client::new(introduction);
         // It knows of what was stopped before; what it is to do may have been asked for before that.
-        (client.halted, client.seen, client.calm_until) = (self.halted.0, self.halted.0, self.calm_until);
+        (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
@@ -125,6 +135,7 @@ impl SharedLine {
         }
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.end_lease(client, gone.introduction.policy, now);
+            self.bequeath(gone.introduction.name, gone.introduction.policy);
         }
     }
 
@@ -167,9 +178,13 @@ impl SharedLine {
         self.halted = (self.halted.0 + 1, name.clone(), command);
         self.calm_until = now + CALM;
         for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != own) {
-            (other.halted, other.calm_until) = (self.halted.0, now + CALM);
+            other.calm_until = now + CALM;
         }
         self.halts.ask(asker, command);
+        // Whoever stops an arm wants it held: one that is taught, or will be as soon as it stands, is loose.
+        if self.moving.may_teach(self.status.as_ref()) {
+            self.moving.end_teaching(now);
+        }
         let denied = Denied::Stopped { by: name };
         if let Some((outgoing, written)) = self.outbox.writing()
             && written == 0
@@ -198,11 +213,18 @@ impl SharedLine {
     pub fn from_client(&mut self, id: ClientId, mut bytes: &[u8], now: Duration) {
         loop {
             let Some(client) = self.clients.get_mut(&id) else { return };
-            let frame = client.next_frame(&mut bytes);
-            match frame.and_then(|frame| frame.map(|frame| client.allow(now).map(|()| frame)).transpose()) {
-                Ok(Some(frame)) => self.take_frame(id, frame, now),
+            let frame = match client.next_frame(&mut bytes) {
+                Ok(Some(frame)) => frame,
                 Ok(None) => return,
                 Err(reason) => return self.put_out(id, reason, now),
+            };
+            let allowed = client.allow(now);
+            // A Stop counts also of one who is put out for what else it has sent.
+            if allowed.is_ok() || matches!(frame.class, Class::Halt(_)) {
+                self.take_frame(id, frame, now);
+            }
+            if let Err(reason) = allowed {
+                return self.put_out(id, reason, now);
             }
         }
     }
@@ -213,14 +235,14 @@ impl SharedLine {
             self.halt(id, &name, command, now);
             // What it stops itself on its way, it goes on from.
             if let Some(client) = self.clients.get_mut(&id)
-                && client.asked_after == Some(before)
+                && client.asked_after == before
             {
-                client.asked_after = Some(before + 1);
+                client.asked_after = before + 1;
             }
             return;
         }
         if frame.class.needs_lease()
-            && let Err(denied) = self.may_send(id, frame.class, now)
+            && let Err(denied) = self.may_send(id, &frame, now)
         {
             return self.refuse(id, &frame, denied);
         }
@@ -229,53 +251,93 @@ impl SharedLine {
         }
     }
 
-    /// A frame of this class may be sent by this client.
-    fn may_send(&mut self, id: ClientId, class: Class, now: Duration) -> Result<(), Denied> {
-        self.may_command(id, now)?;
-        if class != Class::Motion || self.may_begin(id, now) {
-            return Ok(());
+    /// This frame may be sent by this client.
+    fn may_send(&mut self, id: ClientId, frame: &HostFrame, now: Duration) -> Result<(), Denied> {
+        self.could_command(id, now)?;
+        let motion = frame.class == Class::Motion;
+        // An upload that leads to no motion any more ends at once.
+        if (motion || frame.frame_type == FrameType::Trajectory) && self.is_halted(id) {
+            return Err(self.stopped(id));
         }
-        if let Some(client) = self.clients.get_mut(&id) {
-            client.calm_until = client.calm_until.max(now + CALM_AGAIN);
+        if motion {
+            self.is_calm(id, now, CALM_AGAIN)?;
         }
-        Err(Denied::Stopped { by: self.halted.1.clone() })
+        self.may_command(id, now)
     }
 
-    /// Nobody has stopped what this client would begin now.
-    fn may_begin(&self, id: ClientId, now: Duration) -> bool {
-        self.clients.get(&id).is_some_and(|client| {
-            let known = client.asked_after.is_none_or(|number| number == self.halted.0);
-            known && now >= client.calm_until && client.seen >= client.halted
-        })
+    /// Nobody else has stopped the arm just now. `again`: where somebody has, what insists for so long waits for as long behind that.
+    fn is_calm(&mut self, id: ClientId, now: Duration, again: Duration) -> Result<(), Denied> {
+        match self.clients.get_mut(&id) {
+            Some(client) if now < client.calm_until => {
+                client.calm_until = client.calm_until.max(now + again);
+                Err(self.stopped(id))
+            }
+            _ => Ok(()),
+        }
     }
 
-    /// A client that has no end of the line at hand asks for what may move the arm. From then on only that moves it: a Stop or a Pause
-    /// behind this takes it back, however long it has waited since.
+    /// What this client was asked for is not done.
+    pub(super) fn stopped(&self, id: ClientId) -> Denied {
+        Denied::Stopped { by: self.halted_by(id).to_owned() }
+    }
+
+    /// Who has stopped or paused what this client was asked for.
+    pub fn halted_by(&self, id: ClientId) -> &str {
+        if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
+    }
+
+    /// A client asks for what may move the arm, knowing of the halt number `after`. From then on only that moves it: a Stop or a Pause behind
+    /// that halt takes it back, however long it has waited since.
     ///
     /// # Errors
     ///
     /// [`Denied`]: another one commands, or somebody else has just stopped the arm.
-    pub fn ask_to_move(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
-        self.may_command(id, now)?;
-        let last = self.halted.0;
-        if self.clients.get(&id).is_some_and(|client| now < client.calm_until) {
-            return Err(Denied::Stopped { by: self.halted.1.clone() });
+    pub fn ask_to_move(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
+        self.ask(id, after, Duration::ZERO, now)
+    }
+
+    /// The same for what is asked for again and again as long as somebody holds a key down: it has to be let go before it moves the arm anew.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ask_to_move`](Self::ask_to_move).
+    pub fn ask_to_jog(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
+        self.ask(id, after, CALM_AGAIN, now)
+    }
+
+    /// The client could ask for what may move the arm, as far as others are concerned.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ask_to_move`](Self::ask_to_move).
+    pub fn could_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
+        self.could_command(id, now)?;
+        self.is_calm(id, now, Duration::ZERO)
+    }
+
+    fn ask(&mut self, id: ClientId, after: u64, again: Duration, now: Duration) -> Result<(), Denied> {
+        self.could_command(id, now)?;
+        self.is_calm(id, now, again)?;
+        if after != self.halted.0 {
+            return Err(self.stopped(id));
         }
         if let Some(client) = self.clients.get_mut(&id) {
-            (client.asked_after, client.seen) = (Some(last), last);
+            client.asked_after = after;
         }
         Ok(())
     }
 
     /// What this client has asked for was stopped or paused since.
     pub fn is_halted(&self, id: ClientId) -> bool {
-        self.clients
-            .get(&id)
-            .and_then(|client| client.asked_after)
-            .is_some_and(|number| number != self.halted.0)
+        self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Number of the last halt: whoever carries a client's bytes asks it whether it has seen that, behind what it has sent before.
+    /// The last halt that this client has asked for its motion after; that before it came, where it has not.
+    pub fn asked_after(&self, id: ClientId) -> Option<u64> {
+        self.clients.get(&id).map(|client| client.asked_after)
+    }
+
+    /// Number of the last halt.
     pub fn last_halt(&self) -> u64 {
         self.halted.0
     }
@@ -285,28 +347,27 @@ impl SharedLine {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Everything that the client had sent when it did not know of this halt has come.
-    pub fn confirm_halt(&mut self, client: ClientId, number: u64) {
-        if let Some(client) = self.clients.get_mut(&client) {
-            client.seen = client.seen.max(number);
-        }
-    }
-
     /// Brings the arm to rest for the end of the owner.
     pub fn end(&mut self, now: Duration) {
         self.hold("the end of the agent", ExecCommand::Stop, now);
     }
 
-    /// Ends whatever moves the arm, for the owner. Whatever the last status says: it may be older than the last command, and where nothing
-    /// moves it is refused.
-    fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) {
-        self.halt(OWNER, name, command, now);
-        self.own.extend(HostFrame::parse(fixed::empty(FrameType::TeachingModeDisable).to_vec()));
+    /// Ends whatever moves the arm, for the owner. Where nothing seems to move it is sent as well, as a status is older than the last
+    /// command, and the device refuses it then; that holds nobody else up. Returns whether something may have moved.
+    fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
+        let moved = self.moving.may_move(self.status.as_ref(), now);
+        if moved {
+            self.halt(OWNER, name, command, now);
+        } else {
+            self.halts.ask(OWNER, command);
+        }
+        self.moving.end_teaching(now);
+        moved
     }
 
     /// Nothing waits for the line, nor for a record of a Stop.
     pub fn is_idle(&self) -> bool {
-        self.halts.are_done() && self.own.is_empty() && self.outbox.is_free()
+        self.halts.are_done() && self.moving.due().is_none() && self.outbox.is_free()
     }
 
     fn set_lease(&mut self, lease: Option<Lease>) {

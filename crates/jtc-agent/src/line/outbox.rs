@@ -49,6 +49,8 @@ pub struct Outbox {
     writing: Option<Writing>,
     /// When the line will have carried everything that was written.
     free_at: Duration,
+    /// When it begins to carry what is being handed over, where some is.
+    begins_at: Option<Duration>,
     /// The silence behind an abandoned frame lasts until then.
     silent_until: Duration,
 }
@@ -56,7 +58,14 @@ pub struct Outbox {
 impl Outbox {
     /// Of a line at this rate, Bd, if it has one.
     pub fn new(baud: Option<u32>) -> Self {
-        Self { baud, urgent: None, writing: None, free_at: Duration::ZERO, silent_until: Duration::ZERO }
+        Self {
+            baud,
+            urgent: None,
+            writing: None,
+            free_at: Duration::ZERO,
+            begins_at: None,
+            silent_until: Duration::ZERO,
+        }
     }
 
     /// When the line will have carried everything that was written.
@@ -137,8 +146,19 @@ impl Outbox {
                 passed.push(Passed::Written(writing.outgoing));
             }
         }
-        self.free_at = self.free_at.max(now) + line_time(bytes.len(), self.baud);
+        let begins_at = self.free_at.max(now);
+        if !bytes.is_empty() {
+            self.begins_at.get_or_insert(begins_at);
+        }
+        self.free_at = begins_at + line_time(bytes.len(), self.baud);
         (bytes, passed)
+    }
+
+    /// The system has taken the bytes only now: where the line had nothing else to carry it began later, and is free later.
+    pub fn handed_over(&mut self, now: Duration) {
+        if let Some(begins_at) = self.begins_at.take() {
+            self.free_at += now.saturating_sub(begins_at);
+        }
     }
 
     /// Gives up the frame that has been begun. True when the device has seen a part of it.

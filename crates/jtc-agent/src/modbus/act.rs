@@ -1,9 +1,8 @@
 //! Commands of a PLC, done with the one client of the line that all of its connections share.
 use std::sync::Arc;
 
-use jtc_host::session::{Flow, ParameterSource};
+use jtc_host::session::Flow;
 use jtc_host::{Error, Session};
-use jtc_wire::ALL_NODES;
 use serde_json::json;
 
 use super::codes::{Command, Outcome, error_number};
@@ -11,7 +10,9 @@ use super::handshake::Order;
 use super::map::View;
 use super::plc::Plc;
 use crate::api::ErrorObject;
-use crate::jobs::{Commander, Course, Done, Job, Order as RunOrder, Turn, Unable, run};
+use crate::jobs::{
+    Commander, Course, Job, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
+};
 use crate::line::Denied;
 use crate::owner::ClientPort;
 
@@ -34,7 +35,8 @@ impl From<ErrorObject> for Refusal {
     fn from(error: ErrorObject) -> Self {
         let outcome = match error.code {
             "busy" => Outcome::Busy,
-            "not-ready" | "not-paused" => Outcome::NotReady,
+            STOPPED => Outcome::Stopped,
+            "not-ready" | "not-paused" | "motion-ended" => Outcome::NotReady,
             "no-link" | "not-confirmed" | "link-lost" | "gone" => Outcome::NoController,
             _ => Outcome::Failed,
         };
@@ -52,7 +54,11 @@ impl From<Denied> for Refusal {
     fn from(denied: Denied) -> Self {
         let outcome = match denied {
             Denied::Stopped { .. } => Outcome::Stopped,
-            Denied::Held { .. } | Denied::NotHolder | Denied::Viewer | Denied::Gone => Outcome::Held,
+            Denied::Held { .. }
+            | Denied::Awaited { .. }
+            | Denied::NotHolder
+            | Denied::Viewer
+            | Denied::Gone => Outcome::Held,
         };
         Self { outcome, error: 0, why: denied.to_string() }
     }
@@ -81,17 +87,14 @@ impl Plc {
                 let turn = commander.turn()?;
                 self.take_lease(&commander)?;
                 self.ask_to_move(&commander, halt)?;
-                call(&commander, turn, |session| session.teach(true)).await
+                let (line, client) = (self.line.clone(), commander.client);
+                let halted = move || line.with(|line, _| line.is_halted(client));
+                self.call_in(&commander, turn, move |session| session.teach_until(halted)).await
             }
             Command::TeachOff => self.call(&commander, |session| session.teach(false)).await,
             Command::GripperOn => self.call(&commander, |session| session.gripper(true)).await,
             Command::GripperOff => self.call(&commander, |session| session.gripper(false)).await,
-            Command::Clear => {
-                let clear = |session: &mut Session<ClientPort>| {
-                    session.clear(true, ALL_NODES).and_then(|()| session.clear_occurred())
-                };
-                self.call(&commander, clear).await
-            }
+            Command::Clear => self.call(&commander, Session::clear_all).await,
             // Those are done where they come in.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
@@ -114,12 +117,7 @@ impl Plc {
 
     /// Nobody has stopped the arm since it was commanded, and nobody else just before.
     fn ask_to_move(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
-        self.line.with(|line, now| {
-            if line.last_halt() != halt {
-                return Err(Refusal::new(Outcome::Stopped));
-            }
-            Ok(line.ask_to_move(commander.client, now)?)
-        })
+        Ok(self.line.with(|line, now| line.ask_to_move(commander.client, halt, now))?)
     }
 
     /// What the controller reports now.
@@ -163,23 +161,14 @@ impl Plc {
         command: Command,
         halt: u64,
     ) -> Result<(), Refusal> {
-        let source = match command {
-            Command::RecoverWithDefaults => ParameterSource::ControllerDefaults,
-            _ => ParameterSource::None,
-        };
+        let defaults = command == Command::RecoverWithDefaults;
         self.free_to_move()?;
         let turn = commander.turn()?;
         self.take_lease(commander)?;
         self.ask_to_move(commander, halt)?;
-        let job = self.jobs.begin(commander, turn, "recover".into(), move |task, session| {
-            let ended = || task.is_halted();
-            let error = match session.recover_until(source, ended, |step| task.note(step.to_string())) {
-                Ok(_) => None,
-                Err(Error::Cancelled) => Some(task.stopped()),
-                Err(error) => Some(ErrorObject::of(&error)),
-            };
-            (Done { finished: error.is_none(), ..Done::default() }, error)
-        })?;
+        let recover =
+            move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, defaults);
+        let job = self.jobs.begin(commander, turn, "recover".into(), recover)?;
         self.begun(commander, &job);
         Ok(())
     }
@@ -201,24 +190,24 @@ impl Plc {
         }
         if commander.is_moving() {
             self.ask_to_move(commander, halt)?;
-            if let Some(done) = commander.wish(Flow::Resume) {
-                return finished(done.await);
+            if let Some(done) = commander.wish(Flow::Resume).await {
+                return Ok(done?);
             }
         }
         let turn = commander.turn()?;
         self.ask_to_move(commander, halt)?;
-        call(commander, turn, Session::resume).await
+        self.call_in(commander, turn, Session::resume).await
     }
 
     async fn change_speed(&self, commander: &Commander, percent: u16) -> Result<(), Refusal> {
         let part = u8::try_from(percent).ok().filter(|percent| (5..=100).contains(percent));
         let part = part.ok_or_else(|| Refusal::new(Outcome::Value))?;
         self.take_lease(commander)?;
-        match commander.wish(Flow::Speed(part)) {
-            Some(done) => finished(done.await)?,
+        match commander.wish(Flow::Speed(part)).await {
+            Some(done) => done?,
             None => {
                 let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(part) / 100.0);
-                call(commander, commander.turn()?, set).await?;
+                self.call_in(commander, commander.turn()?, set).await?;
             }
         }
         self.set_speed(Some(percent));
@@ -244,19 +233,18 @@ impl Plc {
     ) -> Result<(), Refusal> {
         let turn = commander.turn()?;
         self.take_lease(commander)?;
-        call(commander, turn, act).await
+        self.call_in(commander, turn, act).await
     }
-}
 
-/// What came of what was wished of a motion, which may have ended before.
-fn finished<E>(done: Result<Result<(), ErrorObject>, E>) -> Result<(), Refusal> {
-    done.map_err(|_| Refusal::new(Outcome::NotReady))?.map_err(Refusal::from)
-}
-
-async fn call<E: Into<Error> + Send + 'static>(
-    commander: &Commander,
-    turn: Turn,
-    act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
-) -> Result<(), Refusal> {
-    commander.act(turn, act).await?.map_err(|error| ErrorObject::of(&error.into()).into())
+    async fn call_in<E: Into<Error> + Send + 'static>(
+        &self,
+        commander: &Commander,
+        turn: Turn,
+        act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
+    ) -> Result<(), Refusal> {
+        commander.act(turn, act).await?.map_err(|error| match error.into() {
+            Error::Cancelled => stopped(&self.line, commander.client).into(),
+            error => ErrorObject::of(&error).into(),
+        })
+    }
 }

@@ -134,6 +134,7 @@ pub const ERRORS: &[(u16, &str, &str)] = &[
     (29, "busy", "something else goes on"),
     (30, "gone", "the line is gone"),
     (31, "fault", "the agent has a fault"),
+    (32, "motion-ended", "the motion had ended before this was done"),
 ];
 
 /// The number of an error.

@@ -6,6 +6,9 @@
 mod act;
 pub mod allow;
 pub mod codes;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod handshake;
 pub mod map;
 mod page;

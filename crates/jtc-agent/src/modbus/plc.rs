@@ -105,12 +105,14 @@ impl Plc {
         }
     }
 
-    /// This connection commands.
-    pub fn is_operator(&self, connection: u64) -> bool {
+    /// This connection commands, or one of its coils is 1: the arm stands because of it.
+    pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
-        state.operator.as_ref().is_some_and(|operator| {
-            operator.connection == Some(connection) && !operator.is_gone(&state.handshake)
-        })
+        let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
+        holds
+            || state.operator.as_ref().is_some_and(|operator| {
+                operator.connection == Some(connection) && !operator.is_gone(&state.handshake)
+            })
     }
 
     /// Somebody has asked for something in the last time.

@@ -19,7 +19,7 @@ use super::plc::{Connection, Plc};
 
 /// Connections at once.
 pub const CONNECTIONS_MAX: usize = 8;
-/// One that does not command gives way to a new one when it has not asked for anything for so long.
+/// One that neither commands nor holds the arm by a coil gives way to a new one when it has not asked for anything for so long.
 const GIVES_WAY: Duration = Duration::from_secs(2);
 /// One that has not asked for anything for so long is closed. Longer than the longest watchdog.
 const IDLE: Duration = Duration::from_secs(90);
@@ -134,7 +134,8 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
     }
 }
 
-/// There is a place for another connection, where need be that of one that asks for nothing.
+/// There is a place for another connection, where need be that of one that asks for nothing. Where all hold the arm there is none: it stands, and
+/// nothing can begin to move it.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -144,7 +145,9 @@ fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let idle = open
         .iter()
         .map(|(number, open)| (silent(&open.seen), *number))
-        .filter(|(silent, number)| u128::from(*silent) >= GIVES_WAY.as_millis() && !plc.is_operator(*number))
+        .filter(|(silent, number)| {
+            u128::from(*silent) >= GIVES_WAY.as_millis() && !plc.needs_its_place(*number)
+        })
         .max();
     let idle = idle.and_then(|(_, number)| open.remove(&number));
     idle.inspect(|open| open.abort.abort()).is_some()

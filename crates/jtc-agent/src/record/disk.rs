@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use jtc_host::Sample;
 use jtc_host::recording::{Ending, FLUSH, Recorder, RecordingInfo};
@@ -199,7 +199,7 @@ impl Writer {
     /// Begins the file of the recording that is wanted.
     fn begin(&mut self) {
         let Some(info) = &self.wanted else { return };
-        let made = self.shelf.begin(SystemTime::now()).map_err(|e| e.to_string());
+        let made = self.shelf.begin(host_kit::unix_time()).map_err(|e| e.to_string());
         let begun = made.and_then(|(file, begun)| {
             // What precedes all samples is written now: a disk that takes nothing is known before them.
             let recorder = Recorder::on(file, &begun.path, info)

@@ -6,7 +6,6 @@
 mod disk;
 mod motion;
 mod shelf;
-mod upload;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -17,19 +16,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use jtc_host::recording::{DeviceIdentity, RecordingInfo};
 use jtc_host::session::StatusClock;
 use jtc_host::{Arm, Sample, Session, Trajectory};
-use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status};
+use jtc_wire::{ControllerState, FrameType, Status};
 
 use crate::line::{Introduction, LineEvent, Policy, Role};
 use crate::owner::{ClientPort, Line};
+use crate::upload::Upload;
 use disk::Disk;
 use motion::{Follower, Motion, Step};
 use shelf::Shelf;
-use upload::Upload;
 
 pub use disk::{Notice, Notify};
 
@@ -92,12 +91,10 @@ impl Witness {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => Seen::Segment(bytes.clone()),
             LineEvent::Sent { frame_type: FrameType::Jog, .. } => Seen::Jog(now),
             LineEvent::Sent { frame_type, .. } if may_change_the_arm(*frame_type) => Seen::Change(now),
-            LineEvent::Answered { response, .. }
-                if response.frame_type == FrameType::Trajectory as u8
-                    && response.status == FrameStatus::NoError =>
-            {
-                Seen::Answered(response.data == DataStatus::NoError)
-            }
+            LineEvent::Answered { response, .. } => match Upload::answer(response) {
+                Some(accepted) => Seen::Answered(accepted),
+                None => return,
+            },
             _ => return,
         };
         if self.seen.try_send(seen).is_err() {
@@ -349,7 +346,7 @@ impl Following {
                     if self.doubt.as_ref().is_some_and(|doubt| doubt.asked.is_none()) {
                         self.ask(session);
                     }
-                    self.begin(motion, from, session.now());
+                    self.begin(motion, from, session);
                 }
                 Step::Status(at, status) => {
                     let Some(reel) = &mut self.reel else { continue };
@@ -372,15 +369,15 @@ impl Following {
     }
 
     /// Begins a recording whose first status came at `from`.
-    fn begin(&mut self, motion: Motion, from: Duration, now: Duration) {
+    fn begin(&mut self, motion: Motion, from: Duration, session: &Session<ClientPort>) {
         let trajectory = match motion {
             Motion::Execution => self.upload.trajectory(true),
             Motion::Jog | Motion::Teaching => None,
         };
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let start = since.saturating_sub(now.saturating_sub(from));
+        let start = host_kit::unix_time().saturating_sub(session.now().saturating_sub(from));
         let mut info = RecordingInfo {
             source: self.source.clone(),
+            commanded_by: session.port().line().commander().unwrap_or_default(),
             trajectory: motion.name().to_owned(),
             start_unix_ns: start.as_nanos() as u64,
             commanded: trajectory.clone(),

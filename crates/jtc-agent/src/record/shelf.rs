@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 /// Name of the list.
 pub const LIST: &str = ".jtc-recordings";
@@ -120,7 +120,7 @@ impl Shelf {
             |own: &Own| format!("{} {} {}\n", if own.part { "part" } else { "end" }, own.name, own.bytes);
         // The number goes on behind recordings that are gone.
         if self.number > 0 {
-            text += &format!("gone {}\n", name(SystemTime::UNIX_EPOCH, self.number));
+            text += &format!("gone {}\n", name(Duration::ZERO, self.number));
         }
         text.extend(self.own.iter().map(line));
         self.list.set_len(0)?;
@@ -140,12 +140,12 @@ impl Shelf {
         written
     }
 
-    /// Begins a file with the next number. It is in the list before it is there.
+    /// Begins a file with the next number, at this time since 1970. It is in the list before it is there.
     ///
     /// # Errors
     ///
     /// The disk takes nothing.
-    pub fn begin(&mut self, now: SystemTime) -> io::Result<(File, Begun)> {
+    pub fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
         loop {
             let name = name(now, self.number + 1);
             let (whole, path) =
@@ -237,9 +237,9 @@ fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Time (UTC) and number, as `20261123T154412Z-000017`: names are in the order of time.
-fn name(now: SystemTime, number: u64) -> String {
-    let since = now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs();
+/// Time (UTC) and number, as `20261123T154412Z-000017`: names are in the order of time, as long as nobody sets the clock; numbers always.
+fn name(now: Duration, number: u64) -> String {
+    let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);
     let (hour, minute, second) = (since / 3600 % 24, since / 60 % 60, since % 60);
     format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z-{number:06}")
@@ -269,9 +269,16 @@ fn date(days: i64) -> (i64, i64, i64) {
 mod tests {
     use super::*;
 
-    /// Makes a recording of so many bytes; `None`: its agent is killed.
+    /// 2026-11-23 15:44:12 UTC.
+    const NOW: Duration = Duration::from_secs(1_795_448_652);
+
+    /// Makes a recording of so many bytes; not `whole`: its agent is killed.
     fn make(shelf: &mut Shelf, bytes: usize, whole: bool) -> PathBuf {
-        let (mut file, begun) = shelf.begin(SystemTime::now()).unwrap();
+        make_at(shelf, NOW, bytes, whole)
+    }
+
+    fn make_at(shelf: &mut Shelf, now: Duration, bytes: usize, whole: bool) -> PathBuf {
+        let (mut file, begun) = shelf.begin(now).unwrap();
         file.write_all(&vec![1; bytes]).unwrap();
         let part = begun.path.clone();
         if whole { shelf.end(begun).unwrap() } else { part }
@@ -279,8 +286,8 @@ mod tests {
 
     #[test]
     fn names_have_time_and_number() {
-        let at = |unix_s| SystemTime::UNIX_EPOCH + Duration::from_secs(unix_s);
-        assert_eq!(name(at(1_795_448_652), 17), "20261123T154412Z-000017");
+        let at = Duration::from_secs;
+        assert_eq!(name(NOW, 17), "20261123T154412Z-000017");
         assert_eq!(name(at(951_782_400), 1_234_567), "20000229T000000Z-1234567");
         assert_eq!(number_of("20261123T154412Z-000017"), Some(17));
         for other in ["", "../../etc/passwd", "20261123T154412Z", "20261123T154412Z-../1", "aTbZ-1"] {
@@ -308,6 +315,25 @@ mod tests {
         // Without room for what is asked, all that are ours go.
         assert_eq!(shelf.make_room(5000), [files[3].clone()]);
         assert!(shelf.make_room(5000).is_empty() && others.exists());
+    }
+
+    /// However the computer's clock is set meanwhile, also between two agents: what was made first goes first, and no number is used twice.
+    #[test]
+    fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
+        let dir = tempfile::tempdir().unwrap();
+        let day = Duration::from_secs(86_400);
+        let clock = [NOW, NOW - 4000 * day, NOW + 4000 * day, Duration::ZERO, NOW - day, NOW];
+        let mut files = Vec::new();
+        for times in clock.chunks(2) {
+            let mut shelf = Shelf::open(dir.path(), 600).unwrap();
+            files.extend(times.iter().map(|now| make_at(&mut shelf, *now, 100, true)));
+        }
+        let numbers = files.iter().map(|file| number_of(file.file_stem()?.to_str()?));
+        assert!(numbers.eq((1..=6).map(Some)), "{files:?}");
+        let mut shelf = Shelf::open(dir.path(), 600).unwrap();
+        for (room, file) in (1..).map(|n| 100 * n).zip(files) {
+            assert_eq!(shelf.make_room(room), [file]);
+        }
     }
 
     #[test]

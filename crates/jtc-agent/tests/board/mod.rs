@@ -21,6 +21,11 @@ pub struct Board {
     /// Bytes that the operating system has taken, and when the next of them is over.
     queue: VecDeque<u8>,
     byte_over_us: f64,
+    /// Most of them at once.
+    pub queued_most: usize,
+    /// So long the operating system takes to take bytes, µs, each time; and those that it is being given, with when it has them.
+    pub held_up_us: VecDeque<u64>,
+    handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,
     records: VecDeque<Response>,
     /// What came at the board: when, which type (`None`: a bad one), its first bytes.
@@ -42,6 +47,9 @@ impl Board {
             now_us: 0,
             queue: VecDeque::new(),
             byte_over_us: 0.0,
+            queued_most: 0,
+            held_up_us: VecDeque::new(),
+            handed_over: None,
             receiver: Receiver::new(vec![0; FRAME_MAX], 5000),
             records: VecDeque::new(),
             frames: Vec::new(),
@@ -74,15 +82,20 @@ impl Board {
     fn step(&mut self) {
         self.now_us += STEP_US;
         let now = self.now();
-        if self.now_us.is_multiple_of(TURN_US) {
+        if self.now_us.is_multiple_of(TURN_US) && self.handed_over.is_none() {
             let bytes = self.line.to_device(now);
             if !bytes.is_empty() {
-                if self.queue.is_empty() {
-                    self.byte_over_us = self.now_us as f64 + 1e7 / self.baud;
-                }
-                self.queue.extend(&bytes);
-                self.written.push((now, bytes));
+                let held_up_us = self.held_up_us.pop_front().unwrap_or(0);
+                self.handed_over = Some((self.now_us + held_up_us, bytes));
             }
+        }
+        if let Some((_, bytes)) = self.handed_over.take_if(|(at, _)| *at <= self.now_us) {
+            if self.queue.is_empty() {
+                self.byte_over_us = self.now_us as f64 + 1e7 / self.baud;
+            }
+            self.queue.extend(&bytes);
+            self.written.push((now, bytes));
+            self.line.handed_over(now);
         }
         while !self.queue.is_empty() && self.byte_over_us <= self.now_us as f64 {
             let mut byte = self.queue.pop_front().expect("it is not empty");
@@ -93,6 +106,7 @@ impl Board {
             self.byte_over_us += 1e7 / self.baud;
             assert_eq!(self.receiver.push(self.now_us, &[byte]), 1);
         }
+        self.queued_most = self.queued_most.max(self.queue.len());
         while self.receiver.poll(self.now_us) {
             let (frame_type, response, bytes) = match self.receiver.event().expect("there is one") {
                 LinkEvent::Frame(frame) => {
@@ -121,6 +135,7 @@ impl Board {
     }
 
     /// Records that a client has got, and the reasons of what was denied.
+    #[allow(dead_code, reason = "not every test reads them")]
     pub fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
         let (mut records, mut denied) = (Vec::new(), Vec::new());
         for delivery in self.line.take_deliveries(client).expect("it is there") {

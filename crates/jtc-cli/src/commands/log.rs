@@ -4,14 +4,13 @@ use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use jtc_host::arm::Arm;
-use jtc_host::log::{FlightLog, Replayed, Story, Tick};
-use jtc_host::recording::{Ending, Format, RecordingInfo, write_with_log};
-use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html};
+use jtc_host::log::{Account, FlightLog, Tick};
+use jtc_host::recording::Format;
+use jtc_host::report::{Digest, Facts, ReportInput, html};
 use jtc_wire::{Hash, LogState};
 use serde_json::{Value, json};
 
 use super::info::hash;
-use super::run_report;
 use crate::args::{LinkArgs, LogCommand};
 use crate::failure::output_lost;
 
@@ -55,42 +54,32 @@ impl Files {
 }
 
 /// A log, and what it says.
-struct Read {
-    log: FlightLog,
-    replayed: Replayed,
-    story: Story,
-    info: RecordingInfo,
-    failure: Option<RunFailure>,
-}
+struct Read(Account);
 
 impl Read {
     fn new(log: FlightLog, arm: Option<&Path>, source: &str) -> Result<Self, Failure> {
-        let other = arm.map(Arm::load).transpose()?;
-        let image = match &other {
+        let other = match arm.map(Arm::load).transpose()? {
             None => None,
-            Some(arm) => Some(arm.image().map_err(Failure::usage)?.ok_or_else(|| {
-                Failure::usage(format!("{}: gains or friction are missing; name a whole arm file", arm.name))
-            })?),
+            Some(arm) => {
+                let image = arm.image().map_err(Failure::usage)?.ok_or_else(|| {
+                    Failure::usage(format!(
+                        "{}: gains or friction are missing; name a whole arm file",
+                        arm.name
+                    ))
+                })?;
+                Some((arm, image))
+            }
         };
-        let replayed = log.replay(image.as_deref());
-        let story = Story::of(&replayed);
-        let arm = other.or_else(|| Arm::from_image(&log.arm).ok()).unwrap_or_else(Arm::avena);
-        let mut info = run_report::info(&arm, source, "flight recorder", 0);
-        let failure = story.failure(&info, &replayed.samples());
-        if let Some(failure) = &failure {
-            info.ending =
-                Ending { outcome: "fault".into(), reason: failure.causes.join(", "), ..Ending::default() };
-        }
-        Ok(Self { log, replayed, story, info, failure })
+        Ok(Self(Account::of(log, other, source)))
     }
 
     fn as_json(&self) -> Value {
-        let Self { log, replayed, story, .. } = self;
+        let Account { log, replayed, story, info, .. } = &self.0;
         let time = |tick: Option<&Tick>| tick.map(|tick| tick.sample.time_s);
         json!({
             "state": log.state.name(),
             "device": log.device,
-            "arm": self.info.arm,
+            "arm": info.arm,
             "hash": hash(Hash::of_image(&log.arm)),
             "ticks": replayed.ticks.len(),
             "from_s": time(replayed.ticks.first()),
@@ -108,7 +97,7 @@ impl Read {
 
     /// How much of it was replayed: a line, and one for each reason why not all.
     fn extent(&self) -> Vec<String> {
-        let replayed = &self.replayed;
+        let replayed = &self.0.replayed;
         let verdict = match &replayed.difference {
             None => "no difference".to_owned(),
             Some(difference) => format!(
@@ -125,7 +114,7 @@ impl Read {
             lines.push(format!(
                 "a replay is exact with a program of the same version only: this is jtc {}, the log is of {}",
                 env!("CARGO_PKG_VERSION"),
-                self.log.device
+                self.0.log.device
             ));
         }
         if replayed.broken {
@@ -144,7 +133,7 @@ impl Read {
                  next: name the file of that arm with --arm FILE",
                 replayed.other_arm,
                 arms.join(", "),
-                hash(Hash::of_image(&self.log.arm)),
+                hash(Hash::of_image(&self.0.log.arm)),
             ));
         }
         if replayed.other_points > 0 {
@@ -157,7 +146,7 @@ impl Read {
     }
 
     fn text(&self) -> String {
-        let mut lines = self.story.lines();
+        let mut lines = self.0.story.lines();
         lines.push(String::new());
         lines.extend(self.extent());
         lines.join("\n")
@@ -166,10 +155,10 @@ impl Read {
     /// What happened, as a table of the page.
     fn facts(&self) -> Vec<Facts> {
         let rows =
-            self.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));
+            self.0.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));
         let about = [
-            ("device".to_owned(), self.log.device.clone()),
-            ("flight recorder".to_owned(), self.log.state.to_string()),
+            ("device".to_owned(), self.0.log.device.clone()),
+            ("flight recorder".to_owned(), self.0.log.state.to_string()),
             ("replay".to_owned(), self.extent().join("; ")),
         ];
         vec![
@@ -179,23 +168,21 @@ impl Read {
     }
 
     fn write(&self, files: Files) -> Result<Vec<String>, Failure> {
-        let samples = self.replayed.samples();
         let mut names = Vec::new();
         if let Some(mut file) = files.recording {
             let open = file.begin().map_err(output_lost)?;
-            write_with_log(open, file.path(), &self.info, &samples, &self.log.to_bytes())
-                .map_err(output_lost)?;
+            self.0.write(open, file.path()).map_err(output_lost)?;
             names.push(file.name());
             file.is_written();
         }
         if let Some(page) = files.report {
             names.push(page.name());
             let facts = self.facts();
-            let digest = Digest::of(&samples);
+            let digest = Digest::of(&self.0.replayed.samples());
             let input = ReportInput {
                 facts: &facts,
-                failure: self.failure.as_ref(),
-                ..ReportInput::new(&self.info, &digest)
+                failure: self.0.failure.as_ref(),
+                ..ReportInput::new(&self.0.info, &digest)
             };
             page.write(html(&input)).map_err(output_lost)?;
         }
@@ -215,7 +202,7 @@ fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Res
         bar.finish();
     }
     let read = Read::new(log, arm, &link.name()?)?;
-    if read.replayed.ticks.is_empty() {
+    if read.0.replayed.ticks.is_empty() {
         let message =
             "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
         let failure = Failure::new(ErrorKind::Device, "empty-log", message);
@@ -229,7 +216,7 @@ fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Res
         for name in &names {
             text += &format!("\n{name}");
         }
-        match read.log.state {
+        match read.0.log.state {
             LogState::Error | LogState::Reset => {
                 text + "\nthe recorder has stopped and keeps this log; next: jtc log clear, then jtc recover"
             }
@@ -252,11 +239,11 @@ fn clear(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 fn replay(file: &Path, arm: Option<&Path>, out: &Output) -> Result<(), Failure> {
     let log = FlightLog::load(file)?;
     let read = Read::new(log, arm, &file.display().to_string())?;
-    let fails = read.replayed.difference.is_some() || read.replayed.broken || read.replayed.same == 0;
+    let fails = read.0.replayed.difference.is_some() || read.0.replayed.broken || read.0.replayed.same == 0;
     out.result(&read.as_json(), || {
         let mut lines = read.extent();
         lines.push(String::new());
-        lines.extend(read.story.lines());
+        lines.extend(read.0.story.lines());
         lines.join("\n")
     });
     if fails { Err(Failure::printed(ErrorKind::Refused)) } else { Ok(()) }

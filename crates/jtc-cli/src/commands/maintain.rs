@@ -6,6 +6,7 @@ use cli_kit::{ErrorKind, Failure, Output, Stop};
 use jtc_host::arm::Arm;
 use jtc_host::session::ParameterSource;
 use jtc_host::{Error, ParametersError, words};
+use jtc_wire::ALL_NODES;
 use serde_json::json;
 
 use super::status;
@@ -14,8 +15,6 @@ use crate::limits;
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
 
-/// All joints and the gripper.
-const ALL_NODES: u8 = 0x7F;
 /// A clear takes effect within some statuses.
 const EFFECT: Duration = Duration::from_millis(300);
 

@@ -5,8 +5,7 @@ use std::path::Path;
 use cli_kit::{Failure, Output, OutputFile, figure, table};
 use jtc_core::Config;
 use jtc_host::arm::Arm;
-use jtc_host::plan::kinematics::Route;
-use jtc_host::plan::{Bound, PlanError, Planned, Planner, Waypoint, furthest_aside};
+use jtc_host::plan::{Aside, Bound, PlanError, Planned, Planner, Way, WayOptions};
 use jtc_host::report::{Digest, Facts, ReportInput, html};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_wire::Joint;
@@ -16,8 +15,6 @@ use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
-/// How far the flange may leave a straight line without a word, m.
-const ASIDE_M: f64 = 5e-4;
 /// A blend for corners that are not there.
 const NO_LINES: &str = "--blend-m rounds the corners between lines and arcs, and this motion has none: give --line, or a column `leg`";
 
@@ -32,7 +29,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
     // Before anything is opened: a line that cannot be leaves no file.
-    let way = Way::of(&file, &arm, args)?;
+    let options = WayOptions { line: args.line, blend: args.blend, blend_m: args.blend_m };
+    let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
     let mut inputs: Vec<&Path> = vec![&args.file];
     inputs.extend(args.arm.as_deref());
     let trajectory = OutputFile::open(&args.out, args.force.force, &inputs)?;
@@ -51,8 +49,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         ..Planner::new(&config)
     };
     let mut planned = way.planned(&planner).map_err(|e| located(&e, &file))?;
-    planned.notes.extend(off_the_line(&planned, &file, &arm, args));
-    if args.blend_m > 0.0 && matches!(way, Way::Joints(_)) {
+    planned.notes.extend(way.off_the_line(&planned, &arm).map(off_the_line));
+    if args.blend_m > 0.0 && !way.has_lines() {
         planned.notes.push(NO_LINES.to_owned());
     }
     for note in &planned.notes {
@@ -69,58 +67,14 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a plan leads through.
-enum Way {
-    Joints(Vec<Waypoint>),
-    /// Of these the one that is passed the fastest, with the times of the waypoints.
-    Lines(Vec<Route>, Vec<Option<f64>>),
-}
-
-impl Way {
-    fn of(file: &WaypointFile, arm: &Arm, args: &PlanArgs) -> Result<Self, Failure> {
-        if !file.has_lines(args.line) {
-            return Ok(Self::Joints(file.positions(arm)?));
-        }
-        let route = |blend_m: f64| match file.route(arm, args.line, (args.blend, blend_m)) {
-            Err(WaypointError::Route(e)) => Err(located(&e, file)),
-            other => Ok(other?),
-        };
-        let (rounded, times) = route(args.blend_m)?;
-        // A stop is within every blend, and beside a sharp corner it may be faster than a small one.
-        let sharp = if args.blend_m > 0.0 { Some(route(0.0)?.0) } else { None };
-        Ok(Self::Lines([rounded].into_iter().chain(sharp).collect(), times))
-    }
-
-    fn planned(&self, planner: &Planner) -> Result<Planned, PlanError> {
-        let (routes, times) = match self {
-            Self::Joints(waypoints) => return planner.through(waypoints),
-            Self::Lines(routes, times) => (routes, times),
-        };
-        let seconds = |planned: &Planned| planned.trajectory.duration_s();
-        let mut fastest = None::<Result<Planned, PlanError>>;
-        for route in routes {
-            let planned = planner.on_route(route, times);
-            fastest = match (fastest, planned) {
-                (Some(Ok(before)), Ok(planned)) if seconds(&planned) < seconds(&before) => Some(Ok(planned)),
-                (Some(Err(_)) | None, planned) => Some(planned),
-                (before, _) => before,
-            };
-        }
-        fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
-    }
-}
-
 /// That the flange leaves the straight line between two of its poses.
-fn off_the_line(planned: &Planned, file: &WaypointFile, arm: &Arm, args: &PlanArgs) -> Option<String> {
-    // With the option a leg in joint space is one that was asked for.
-    let legs = if args.line { Vec::new() } else { file.legs_between_flange_poses() };
-    let aside = furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)?;
+fn off_the_line(aside: Aside) -> String {
     let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
-    Some(format!(
+    format!(
         "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are straight in joint space; `--line`, \
          or `line` in a column `leg`, keeps it on the line",
         to - 1
-    ))
+    )
 }
 
 /// What is written is CSV: under the ending of another form hardly a command would read it.
@@ -143,12 +97,15 @@ fn readable(out: &Path) -> Result<(), Failure> {
 
 /// With the lines of the file that waypoints stand in.
 fn located(error: &PlanError, file: &WaypointFile) -> Failure {
-    let failure = Failure::of(error);
-    let message = match error.waypoint().and_then(|waypoint| file.place_of(waypoint)) {
-        Some(place) => format!("{place}: {}", failure.message),
-        None => failure.message,
-    };
-    Failure { message, ..failure }
+    Failure { message: file.located(error), ..Failure::of(error) }
+}
+
+/// The same of what is no way.
+fn unplanned(error: &WaypointError, file: &WaypointFile) -> Failure {
+    match error {
+        WaypointError::Route(e) => located(e, file),
+        other => Failure::of(other),
+    }
 }
 
 fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {

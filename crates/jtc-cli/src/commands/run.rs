@@ -199,8 +199,7 @@ fn drive(
     drop(operator);
     let Stage { outputs, reel, .. } = stage;
     // Each motion begins it before it moves.
-    let reel =
-        reel.unwrap_or_else(|| Reel { info: RecordingInfo::of(&job.arm), tape: None, start: Duration::ZERO });
+    let reel = reel.unwrap_or_else(|| Reel::of(RecordingInfo::of(&job.arm), None, Duration::ZERO));
     conclude(job, legs, reel, &session, outputs, out)
 }
 
@@ -296,15 +295,19 @@ impl Stage<'_> {
                 }
                 info.then = job.later.as_ref().map(|(later, _)| Arc::new(later.clone()));
                 let tape = outputs.begin(&info, out)?;
-                *reel = Some(Reel { info, tape, start: now });
+                *reel = Some(Reel::of(info, tape, now));
             }
             let begun = reel.as_ref().map(|reel| {
                 let sink = reel.tape.as_ref().map(crate::tape::Tape::sink);
-                (sink, now.saturating_sub(reel.start).as_secs_f64())
+                (sink, now.saturating_sub(reel.start).as_secs_f64().max(reel.until_s))
             });
             Ok(begun.unwrap_or_default())
         };
-        Leg::run(session, checked, phase, operator, &mut record)
+        let leg = Leg::run(session, checked, phase, operator, &mut record)?;
+        if let (Some(reel), Some(last)) = (reel, leg.samples.last()) {
+            reel.until_s = last.time_s;
+        }
+        Ok(leg)
     }
 
     /// An approach is over. The recording is that of the motion: before the first one it is begun again.

@@ -12,6 +12,7 @@ use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
 use jtc_agent::modbus::{self, Allowed, Plc};
 use jtc_agent::record::{Notice, Prepared};
+use jtc_agent::will::{self, Found, Keeper};
 use jtc_agent::{Line, Owner, serve as service, tls};
 use jtc_client::agents::{Registered, register};
 use jtc_host::Arm;
@@ -54,20 +55,26 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let (port, arm) = port(args, out)?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
+    let log = Arc::new(Mutex::new(log));
+    let left = if args.sim { None } else { keep_policies(&name, &log, out)? };
     // A relative name would be another port in another directory.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
-    let log = Arc::new(Mutex::new(log));
     let witness = recordings.as_mut().and_then(Prepared::witness);
+    let will = left.as_ref().map(|(keeper, _)| keeper.witness());
     let mut logged = observer(log.clone());
     let observer = move |now, event: &_| {
+        if let Some(will) = &will {
+            will.see(event);
+        }
         if let Some(witness) = &witness {
             witness.see(now, event);
         }
         logged(now, event);
     };
     let owner = Owner::new(port, Box::new(observer));
-    let notify = recording_notice(&log, out);
+    let keeper = left.map(|(keeper, found)| act_on(&owner.line(), keeper, &found, &log, out));
+    let notify = notices(&log, out, "warning");
     let recorder = recordings.map(|begin| begin.begin(owner.line(), &name, notify)).transpose()?;
     let registered = Registered {
         url: url.clone(),
@@ -106,11 +113,12 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     service::serve(agent.router(), listener, tls, move || ended.asked() || lost.lost().is_some())?;
     drop((registration, plcs));
     let gone = line.lost();
-    if gone.is_none() {
-        come_to_rest(&line, out);
-    }
+    let rests = gone.is_none() && come_to_rest(&line, out);
     drop(recorder);
     owner.end();
+    if let Some(keeper) = keeper.filter(|_| rests) {
+        keeper.forget();
+    }
     match gone {
         Some(why) => {
             Err(Failure::new(ErrorKind::NoLink, "port", why).hint("plug it in again, then `jtc ports`"))
@@ -135,8 +143,8 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     Ok(Some(listener))
 }
 
-/// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held.
-fn come_to_rest(line: &Line, out: &Output) {
+/// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held. Whether the controller reports that.
+fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
     let moves = |status: &Status| status.is_executing() || status.state == ControllerState::Teaching;
@@ -150,9 +158,11 @@ fn come_to_rest(line: &Line, out: &Output) {
     while !rests() && Instant::now() < end {
         std::thread::sleep(Duration::from_millis(20));
     }
-    if !rests() {
+    let rests = rests();
+    if !rests {
         out.note("the arm may be moving: the controller has not reported the end of its motion");
     }
+    rests
 }
 
 /// The directory for recordings, before anything else is done.
@@ -162,13 +172,36 @@ fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     })
 }
 
-/// What becomes of recordings stands in the log of commands; what is wrong with them is noted, too.
-fn recording_notice(log: &Arc<Mutex<CommandLog>>, out: &Output) -> Box<dyn FnMut(Notice) + Send> {
+/// Keeps whose policy is to act on what moves, for an agent that comes when this one was killed; and what the one before has left.
+fn keep_policies(
+    port: &str,
+    log: &Arc<Mutex<CommandLog>>,
+    out: &Output,
+) -> Result<Option<(Keeper, Found)>, Failure> {
+    let Some(state) = host_kit::user_folder("XDG_STATE_HOME", ".local/state") else {
+        out.note("warning: neither XDG_STATE_HOME nor HOME is set: if this agent is killed, nobody's policy acts on what moves");
+        return Ok(None);
+    };
+    // Under the name that it was given: a device has another number when it comes again.
+    let port = std::path::absolute(port).map_or(port.to_owned(), |path| path.display().to_string());
+    Ok(Some(Keeper::begin(&state.join("openjtc"), &port, notices(log, out, "warning"))?))
+}
+
+/// Acts on what the agent before was killed in, before anyone is served.
+fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog>>, out: &Output) -> Keeper {
+    if let Some(notice) = will::apply(line, &keeper, found) {
+        notices(log, out, "note")(notice);
+    }
+    keeper
+}
+
+/// What becomes of recordings and policies stands in the log of commands; what people are to know is noted, too.
+fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Box<dyn FnMut(Notice) + Send> {
     let (log, out) = (log.clone(), *out);
     Box::new(move |notice| {
         log.lock().unwrap_or_else(PoisonError::into_inner).write(notice.what, notice.facts);
         if let Some(warning) = notice.warning {
-            out.note(format!("warning: {warning}"));
+            out.note(format!("{kind}: {warning}"));
         }
     })
 }

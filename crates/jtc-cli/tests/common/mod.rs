@@ -1,6 +1,8 @@
 //! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
 #![allow(dead_code)]
 
+pub mod agent;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

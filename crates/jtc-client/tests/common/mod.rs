@@ -1,7 +1,9 @@
 //! An agent of a simulated controller in this process, and requests to it as anybody could send them.
 #![allow(dead_code)]
 
-use std::net::{SocketAddr, TcpListener};
+pub mod program;
+
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -14,9 +16,36 @@ use jtc_agent::log::{CommandLog, observer};
 use jtc_agent::{Line, Owner, serve};
 use jtc_client::{AgentPort, Options};
 use jtc_host::port::sim::LivePort;
-use jtc_host::{Arm, Session};
+use jtc_host::{Arm, Port, Session};
 use jtc_sim::{SimConfig, World};
+use serde_json::json;
 use test_kit::http::Http;
+use tungstenite::client::IntoClientRequest as _;
+use tungstenite::http::HeaderValue;
+use tungstenite::stream::MaybeTlsStream;
+use tungstenite::{Message, WebSocket, connect};
+
+/// A simulated arm on a line at this rate.
+pub fn simulated(baud: u32) -> LivePort {
+    let arm = Arm::avena();
+    let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
+    LivePort::new(World::new(config))
+}
+
+/// A socket of somebody who looks: `stream`, `line`, or `foxglove` with all its channels.
+pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
+    let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
+    if path != "foxglove" {
+        return connect(request).expect("it is let in").0;
+    }
+    let spoken = HeaderValue::from_static("foxglove.websocket.v1");
+    request.headers_mut().insert("Sec-WebSocket-Protocol", spoken);
+    let (mut socket, _) = connect(request).expect("it is let in");
+    let channels = [1, 2, 3, 4, 5, 6, 7].map(|n| json!({ "id": n, "channelId": n }));
+    let subscribed = json!({ "op": "subscribe", "subscriptions": channels });
+    socket.send(Message::text(subscribed.to_string())).expect("it reads");
+    socket
+}
 
 /// An agent that ends with the test.
 pub struct Served {
@@ -46,12 +75,20 @@ impl Served {
 
     /// The same, with TLS where it is given, and pages of these origins may look.
     pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
+        Self::start_on(simulated(baud), tls, origins)
+    }
+
+    /// The same of whatever is at this port.
+    pub fn start_on(
+        port: impl Port + Send + 'static,
+        tls: Option<Arc<rustls::ServerConfig>>,
+        origins: &[String],
+    ) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let arm = Arm::avena();
-        let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
         let log_path = dir.path().join("commands.jsonl");
         let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
-        let owner = Owner::new(LivePort::new(World::new(config)), observer(log.clone()));
+        let owner = Owner::new(port, observer(log.clone()));
         let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
         let address = listener.local_addr().expect("it listens");

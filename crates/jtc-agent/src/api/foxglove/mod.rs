@@ -8,16 +8,17 @@ mod protocol;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use axum::Extension;
 use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
 use jtc_host::recording::{MessageWriter, Topic};
+use jtc_host::sample::Sample;
 use jtc_host::words;
 use jtc_wire::{ExecCommand, Status};
 use serde_json::json;
@@ -27,7 +28,6 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 use self::channels::{PAUSE, STATUS, STOP, Subscriptions};
 use self::protocol::{Call, FromClient, NAMES, ToClient};
 use super::{Agent, Caller, ErrorObject};
-use crate::line::Role;
 
 /// Longest message of a client.
 const MESSAGE_MAX: usize = 64 << 10;
@@ -71,15 +71,9 @@ pub(super) async fn foxglove(
         let next = "ask for one of them in Sec-WebSocket-Protocol; /api/stream needs none";
         return ErrorObject::new("request", message, next).unreadable().into_response();
     }
-    let sockets = if caller.role == Role::Operator { &agent.operators } else { &agent.viewers };
-    let Ok(permit) = sockets.clone().try_acquire_owned() else {
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    };
+    let sockets = agent.sockets.clone();
     let upgrade = upgrade.protocols(NAMES).max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
-    upgrade.on_upgrade(async move |socket| {
-        serve(&agent, &caller, socket).await;
-        drop(permit);
-    })
+    sockets.serve(caller.role, upgrade, async move |socket| serve(&agent, &caller, socket).await)
 }
 
 /// What both directions of a socket have.
@@ -182,7 +176,7 @@ fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
         if caller.looks_only {
             return Err("pages of this origin may only look".to_owned());
         }
-        agent.halt(caller, &HeaderMap::new(), command).map_err(|error| error.message.into())
+        agent.halt(&caller.clone().into(), command).map_err(|error| error.message.into())
     });
     shared.answer(match done {
         Ok(sent) => {
@@ -218,7 +212,8 @@ impl Sender<'_> {
 
     async fn deliver(&mut self) -> Result<(), Gone> {
         self.greet().await?;
-        let mut writer = MessageWriter::new(&self.agent.identity().await.arm);
+        let arm = self.agent.identity().await.arm;
+        let (mut writer, delay_ticks) = (MessageWriter::new(&arm), arm.config().delay_ticks);
         let mut statuses = self.agent.line.changes();
         let mut period = interval(PERIOD);
         period.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -246,7 +241,8 @@ impl Sender<'_> {
                 continue;
             }
             (last, quiet) = (Some(at), Instant::now() + QUIET);
-            self.values(&mut writer, at, &status, new).await?;
+            let sample = self.agent.line.sample(&status, delay_ticks);
+            self.values(&mut writer, at, (&status, &sample), new).await?;
             self.ping().await?;
         }
     }
@@ -281,7 +277,7 @@ impl Sender<'_> {
         }
         let stamp = unix_ns(Duration::ZERO);
         for id in latched {
-            let sample = jtc_host::sample::Sample::default();
+            let sample = Sample::default();
             if let Some(message) = writer.write(Topic::Description, stamp, &sample) {
                 let message = protocol::data(id, stamp, message);
                 self.send(Message::Binary(message.into())).await?;
@@ -295,17 +291,16 @@ impl Sender<'_> {
         &mut self,
         writer: &mut MessageWriter,
         at: Duration,
-        status: &Status,
+        (status, sample): (&Status, &Sample),
         new: bool,
     ) -> Result<(), Gone> {
         let age = self.agent.line.now().saturating_sub(at);
         let stamp = unix_ns(age);
-        let sample = self.agent.jobs.followed.sample(status);
         let live = self.shared.lock().subscriptions.live();
         for (id, channel) in live {
             let message = match channels::topic(channel) {
                 Some(topic) if new => {
-                    writer.write(topic, stamp, &sample).map(|m| protocol::data(id, stamp, m))
+                    writer.write(topic, stamp, sample).map(|m| protocol::data(id, stamp, m))
                 }
                 None if channel == STATUS => {
                     Some(protocol::data(id, unix_ns(Duration::ZERO), &self.in_words(age, status)))
@@ -320,9 +315,6 @@ impl Sender<'_> {
     }
 
     fn in_words(&self, age: Duration, status: &Status) -> Vec<u8> {
-        let by = self.agent.line.with(|line, _| {
-            line.lease().and_then(|lease| line.introduction(lease.holder)).map(|client| client.name.clone())
-        });
         let words = json!({
             "state": status.state.name(),
             "trajectory": status.trajectory.name(),
@@ -331,7 +323,7 @@ impl Sender<'_> {
             "errors_occurred": words::errors(status.occurred),
             "next": words::next_step(status).replace('`', ""),
             "age_ms": age.as_millis() as u64,
-            "commanded_by": by.unwrap_or_default(),
+            "commanded_by": self.agent.line.commander().unwrap_or_default(),
             "simulated": self.agent.simulated,
         });
         words.to_string().into_bytes()
@@ -372,6 +364,5 @@ impl Sender<'_> {
 
 /// So long ago, ns since 1970.
 fn unix_ns(ago: Duration) -> u64 {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    u64::try_from(now.saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
+    u64::try_from(host_kit::unix_time().saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,6 +1,6 @@
 //! One motion of a run: uploaded, executed and followed.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use cli_kit::Failure;
 use jtc_host::recording::{RecordingInfo, SampleSink};
@@ -31,6 +31,16 @@ pub struct Reel {
     pub tape: Option<Tape>,
     /// When its first motion began, on the clock of the session.
     pub start: Duration,
+    /// Time of its last sample, s. The next motion's come behind it also where the controller's time runs ahead of ours, as that of a
+    /// simulator does that is faster than time.
+    pub until_s: f64,
+}
+
+impl Reel {
+    /// One whose first motion begins at this time of the session.
+    pub fn of(info: RecordingInfo, tape: Option<Tape>, start: Duration) -> Self {
+        Self { info, tape, start, until_s: 0.0 }
+    }
 }
 
 impl Leg {
@@ -53,7 +63,7 @@ impl Leg {
         if operator.wants_the_end() {
             return Err(cancelled("upload"));
         }
-        let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
+        let start_unix_ns = host_kit::unix_time().as_nanos() as u64;
         let (sink, offset_s) = record(phase, start_unix_ns, session.now()).map_err(not_started)?;
         let Run { outcome, mut samples } = execute(session, checked, phase, (sink, offset_s), operator);
         samples.iter_mut().for_each(|sample| sample.time_s += offset_s);

@@ -2,7 +2,9 @@
 use std::sync::Arc;
 
 use jtc_host::{Point, Trajectory};
-use jtc_wire::{Command, FrameRef};
+use jtc_wire::{Command, DataStatus, FrameRef, FrameStatus, FrameType, Response};
+
+use crate::line::LineEvent;
 
 /// Points that a controller takes (J-30): more are no trajectory.
 const POINTS_MAX: usize = 12_000;
@@ -30,6 +32,35 @@ pub struct Upload {
 }
 
 impl Upload {
+    /// Whether an event belongs to an upload.
+    pub fn is_of(event: &LineEvent) -> bool {
+        match event {
+            LineEvent::Sent { frame_type, .. } => *frame_type == FrameType::Trajectory,
+            LineEvent::Answered { response, .. } => Self::answer(response).is_some(),
+            _ => false,
+        }
+    }
+
+    /// Something has happened on the line.
+    pub fn see(&mut self, event: &LineEvent) {
+        match event {
+            LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => self.sent(bytes),
+            LineEvent::Answered { response, .. } => {
+                if let Some(accepted) = Self::answer(response) {
+                    self.answered(accepted);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether a Trajectory frame was accepted, where this is the answer to one that arrived whole.
+    pub fn answer(response: &Response) -> Option<bool> {
+        let whole =
+            response.frame_type == FrameType::Trajectory as u8 && response.status == FrameStatus::NoError;
+        whole.then_some(response.data == DataStatus::NoError)
+    }
+
     /// A Trajectory frame has gone to the controller.
     pub fn sent(&mut self, frame: &[u8]) {
         let Some(Ok(Command::Trajectory(segment))) = FrameRef::new_checked(frame).map(Command::parse) else {

@@ -1,0 +1,121 @@
+//! Joints that are not there, for work on a bench.
+use agent_kit::api::{Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use jtc_core::{JOINTS, settings};
+use jtc_host::error::Facts;
+use jtc_host::{ErrorKind, Session};
+use jtc_wire::Joint;
+use utoipa::ToSchema;
+
+use super::error::Denials;
+use super::{Agent, ErrorObject};
+use crate::owner::ClientPort;
+
+/// The joints that are not there.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsentObject {
+    /// Each at most once; empty: all joints are there.
+    #[schema(max_items = 6)]
+    pub absent: Vec<AbsentJoint>,
+}
+
+/// A joint that is not there.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsentJoint {
+    /// Which, 1 to 6 from the base.
+    #[schema(minimum = 1, maximum = 6)]
+    pub joint: u8,
+    /// Where the model has it, rad.
+    #[schema(minimum = -6.2832, maximum = 6.2832)]
+    pub position_rad: f64,
+}
+
+impl From<[Option<f64>; JOINTS]> for AbsentObject {
+    fn from(absent: [Option<f64>; JOINTS]) -> Self {
+        let of = |(joint, at): (Joint, Option<f64>)| {
+            at.map(|position_rad| AbsentJoint { joint: joint.number(), position_rad })
+        };
+        Self { absent: Joint::ALL.into_iter().zip(absent).filter_map(of).collect() }
+    }
+}
+
+impl AbsentObject {
+    /// Where each joint is that is not there.
+    fn positions(&self) -> Result<[Option<f64>; JOINTS], ErrorObject> {
+        let (low, high) =
+            settings::setting(settings::ABSENT_POSITION).map_or((0.0, 0.0), |row| (row.low, row.high));
+        let mut absent = [None; JOINTS];
+        for AbsentJoint { joint: number, position_rad } in &self.absent {
+            let (number, value) = (usize::from(*number), *position_rad);
+            let refused = |what: String, next: &str, limit: Option<f64>| {
+                let facts = Facts {
+                    joint: Joint::from_number(number),
+                    value: Some(value),
+                    limit,
+                    ..Facts::default()
+                };
+                let object =
+                    ErrorObject::new("absent", format!("joint {number}: {what}; nothing was changed"), next);
+                Err(object.kind(ErrorKind::Usage).with(&facts))
+            };
+            let Some(place) = Joint::from_number(number).and_then(|joint| absent.get_mut(joint.index()))
+            else {
+                return refused("there is none".into(), "joints are 1 to 6 from the base", None);
+            };
+            if place.is_some() {
+                return refused("it is given twice".into(), "name each joint once", None);
+            }
+            if !(low..=high).contains(&value) {
+                let limit = Some(if value < low { low } else { high });
+                return refused(
+                    format!("{value} rad is outside {low} to {high}"),
+                    "angles are in rad",
+                    limit,
+                );
+            }
+            *place = Some(value);
+        }
+        Ok(absent)
+    }
+}
+
+/// The joints that are set absent, and where the model has them.
+#[utoipa::path(
+    get,
+    path = "/api/absent",
+    operation_id = "get_absent",
+    responses((status = 200, description = "Those that are not there", body = AbsentObject), Refusals, Denials)
+)]
+pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObject>, ErrorObject> {
+    Ok(Json(agent.ask(Session::absent).await?.into()))
+}
+
+/// Sets these joints absent, and no others. Without torque only; while one is absent no motion is executed.
+#[utoipa::path(
+    put,
+    path = "/api/absent",
+    operation_id = "set_absent",
+    params(LeaseKey),
+    request_body = AbsentObject,
+    responses((status = 204, description = "The controller expects the others"), Refusals, Denials)
+)]
+pub(super) async fn set_absent(
+    State(agent): State<Agent>,
+    asker: Asker,
+    Body(request): Body<AbsentObject>,
+) -> Result<StatusCode, ErrorObject> {
+    let positions = request.positions()?;
+    let words: Vec<String> =
+        request.absent.iter().map(|one| format!("joint {} at {} rad", one.joint, one.position_rad)).collect();
+    let what = format!("absent: {}", if words.is_empty() { "none".to_owned() } else { words.join(", ") });
+    agent
+        .command(&asker, what, move |session: &mut Session<ClientPort>| session.set_absent(&positions))
+        .await?;
+    Ok(StatusCode::NO_CONTENT)
+}

@@ -1,0 +1,38 @@
+//! Bodies that are long, or take a while to be understood: read some at once, beside the threads that serve.
+use axum::body::Bytes;
+use axum::extract::{FromRequest as _, Request};
+use axum::http::StatusCode;
+use jtc_host::ErrorKind;
+use serde::de::DeserializeOwned;
+
+use super::{Agent, ErrorObject};
+
+/// Reads a body of JSON and what `understand` makes of it; both whether or not somebody waits for it.
+pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
+    agent: &Agent,
+    request: Request,
+    understand: impl FnOnce(B) -> Result<T, ErrorObject> + Send + 'static,
+) -> Result<T, ErrorObject> {
+    let room = agent.bodies.clone().acquire_owned().await;
+    let body = Bytes::from_request(request, &())
+        .await
+        .map_err(|e| ErrorObject::rejected(e.status(), e.body_text()))?;
+    blocking(move || {
+        let read = serde_json::from_slice(&body)
+            .map_err(|e| ErrorObject::rejected(StatusCode::BAD_REQUEST, e.to_string()));
+        drop(body);
+        let understood = read.and_then(understand);
+        drop(room);
+        understood
+    })
+    .await?
+}
+
+/// What takes a while, where it keeps nobody else from being served.
+pub(super) async fn blocking<T: Send + 'static>(
+    act: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, ErrorObject> {
+    tokio::task::spawn_blocking(act).await.map_err(|_| {
+        ErrorObject::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
+    })
+}

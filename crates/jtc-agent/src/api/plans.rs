@@ -1,0 +1,323 @@
+//! Trajectories that are made here: through waypoints, as fast as the limits allow.
+use std::path::Path;
+
+use agent_kit::api::Refusals;
+use agent_kit::gate::plain;
+use axum::extract::{Request, State};
+use axum::{Extension, Json};
+use jtc_core::Config;
+use jtc_host::check::JointFigures;
+use jtc_host::error::Facts;
+use jtc_host::plan::{Bound, COLD, Planned, Planner, Way, WayOptions};
+use jtc_host::waypoints::{WaypointError, WaypointFile};
+use jtc_host::{Arm, ErrorKind, Session};
+use jtc_wire::Joint;
+use serde_json::json;
+use utoipa::ToSchema;
+
+use super::body::{blocking, read};
+use super::error::Denials;
+use super::objects::PayloadObject;
+use super::trajectories::TrajectoryObject;
+use super::{Agent, Caller, ErrorObject};
+use crate::jobs::{NUMBER_MAX, StoreError};
+use crate::owner::ClientPort;
+
+/// Most waypoints: a plan through more of them takes longer than a request may.
+const WAYPOINTS_MAX: usize = 500;
+/// Bearing temperatures that there are, °C.
+const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
+
+/// Waypoints, and how the arm is to go through them.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanRequest {
+    /// Waypoints in a form that `jtc plan` takes: CSV with the columns q1 to q6, or x, y, z with an orientation, or pose; or JSON. At most 500.
+    pub waypoints: String,
+    /// Their numbers are degrees.
+    #[serde(default)]
+    pub degrees: bool,
+    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub blend_rad: f64,
+    /// The flange keeps to a straight line on each leg of which the waypoints do not say how the arm moves.
+    #[serde(default)]
+    pub line: bool,
+    /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub blend_m: f64,
+    /// % of what the limits allow.
+    #[serde(default = "hundred")]
+    #[schema(minimum = 1, maximum = 100)]
+    pub speed_percent: f64,
+    /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load.
+    #[serde(default)]
+    pub no_jerk_limit: bool,
+    /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque.
+    #[serde(default = "cold")]
+    #[schema(minimum = -40, maximum = 120)]
+    pub temperature_c: f64,
+    /// What the arm will carry; missing: what the controller computes with now.
+    #[serde(default)]
+    pub payload: Option<PayloadObject>,
+    /// Keep it as a trajectory, for `POST /api/runs`.
+    #[serde(default)]
+    pub keep: Option<KeepRequest>,
+}
+
+/// Where a plan is kept.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KeepRequest {
+    /// Its number, in place of what has it.
+    #[schema(minimum = 1, maximum = 99)]
+    pub number: u16,
+    /// What people are to call it: the first 64 characters.
+    pub name: String,
+}
+
+fn hundred() -> f64 {
+    100.0
+}
+
+fn cold() -> f64 {
+    COLD
+}
+
+/// A motion that passed the check.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct PlanObject {
+    /// s.
+    pub duration_s: f64,
+    /// Points.
+    pub points: usize,
+    /// ms between two points.
+    pub step_ms: u16,
+    /// Waypoints.
+    pub waypoints: usize,
+    /// When the motion is nearest to each waypoint, s.
+    pub waypoint_times_s: Vec<f64>,
+    /// What binds when, in the order of time.
+    pub binding: Vec<BoundObject>,
+    /// Figures of each joint, from the base.
+    #[schema(min_items = 6, max_items = 6)]
+    pub joints: Vec<JointPlan>,
+    /// What was changed or is to be known, in words.
+    pub notes: Vec<String>,
+    /// What does not forbid to run it.
+    pub warnings: Vec<String>,
+    /// The trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`.
+    pub text: String,
+    /// As what it is kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<TrajectoryObject>,
+}
+
+/// Which limit a motion uses up, from when to when.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct BoundObject {
+    /// s from the start.
+    pub from_s: f64,
+    /// s from the start.
+    pub to_s: f64,
+    /// Which joint, 1 to 6 from the base.
+    pub joint: u8,
+    /// `velocity`, `acceleration`, `jerk`, `torque`, `stop` (room to stop in time), `friction` (its table) or `given time`.
+    pub limit: String,
+}
+
+impl From<&Bound> for BoundObject {
+    fn from(bound: &Bound) -> Self {
+        let Bound { from_s, to_s, joint, limit } = *bound;
+        Self { from_s, to_s, joint: joint.number(), limit: limit.to_owned() }
+    }
+}
+
+/// Figures of a joint.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct JointPlan {
+    /// Which, 1 to 6 from the base.
+    pub joint: u8,
+    /// Lowest position, rad.
+    pub position_min_rad: f64,
+    /// Highest position, rad.
+    pub position_max_rad: f64,
+    /// Largest absolute speed, rad/s.
+    pub velocity_peak_rad_s: f64,
+    /// Largest absolute acceleration, rad/s².
+    pub acceleration_peak_rad_s2: f64,
+    /// Largest absolute torque by the model, N·m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_peak_nm: Option<f64>,
+}
+
+impl JointPlan {
+    fn new((joint, figures): (Joint, &JointFigures)) -> Self {
+        Self {
+            joint: joint.number(),
+            position_min_rad: figures.position_min_rad,
+            position_max_rad: figures.position_max_rad,
+            velocity_peak_rad_s: figures.velocity_peak_rad_s,
+            acceleration_peak_rad_s2: figures.acceleration_peak_rad_s2,
+            torque_peak_nm: figures.torque_peak_nm,
+        }
+    }
+}
+
+/// Makes a trajectory through waypoints for the arm of the controller, as fast as its limits allow. Nothing moves. One at a time.
+#[utoipa::path(
+    post,
+    path = "/api/plans",
+    operation_id = "plan",
+    request_body = PlanRequest,
+    responses((status = 200, description = "The trajectory, and what binds it", body = PlanObject), Refusals, Denials)
+)]
+pub(super) async fn plan(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    request: Request,
+) -> Result<Json<PlanObject>, ErrorObject> {
+    // It takes the computer's time, and may change what others run.
+    caller.operator()?;
+    let (request, file) = read(&agent, request, understood).await?;
+    let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
+        let next = "ask again when it is ready: one plan is made at a time";
+        ErrorObject::new("busy", "another plan is being made", next)
+    })?;
+    let own = agent.jobs.arm().clone();
+    let asked = move |session: &mut Session<ClientPort>| {
+        let device = session.device_config()?;
+        let mut arm = if session.has_extensions() { session.device_arm()? } else { own.clone() };
+        // No controller has them.
+        arm.poses = own.poses;
+        Ok((arm, device))
+    };
+    let (arm, device) = agent.ask(asked).await?;
+    let plan = blocking(move || {
+        let planned = planned(&request, &file, &arm, &device);
+        let planned = planned.and_then(|planned| kept(&agent, &request, &file, &planned));
+        if let Some(KeepRequest { number, .. }) = request.keep {
+            let (from, why) = (caller.peer.to_string(), planned.as_ref().err().map(|e| e.message.clone()));
+            agent.note(
+                "trajectory",
+                json!({ "number": number, "planned": true, "from": from, "why_not": why }),
+            );
+        }
+        drop(room);
+        planned
+    });
+    Ok(Json(plan.await??))
+}
+
+/// The waypoints of a request that can be planned.
+fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), ErrorObject> {
+    let refused = |what: &str, message: String, value: f64, limit: f64| {
+        let facts = Facts { value: Some(value), limit: Some(limit), ..Facts::default() };
+        let object = ErrorObject::new("plan", message, format!("choose another {what}"));
+        Err(object.kind(ErrorKind::Usage).with(&facts))
+    };
+    let (low, high, value) = (*TEMPERATURES.start(), *TEMPERATURES.end(), request.temperature_c);
+    if !TEMPERATURES.contains(&value) {
+        let limit = if value < low { low } else { high };
+        let message = format!("temperature_c {value} °C is outside {low} to {high}");
+        return refused("temperature", message, value, limit);
+    }
+    if let Some(KeepRequest { number, .. }) = request.keep
+        && !(1..=NUMBER_MAX).contains(&number)
+    {
+        return Err(ErrorObject::diagnosed(&StoreError::Number(number)));
+    }
+    if let Some(payload) = request.payload {
+        super::commands::body(payload)?;
+    }
+    let unread =
+        |error: jtc_host::file::FileError| ErrorObject::diagnosed(&error.in_file(Path::new("waypoints")));
+    let file = WaypointFile::parse(&request.waypoints).map_err(unread)?.in_file(Path::new("waypoints"));
+    let file = if request.degrees { file.in_degrees().map_err(unread)? } else { file };
+    let count = file.waypoints.len();
+    if count > WAYPOINTS_MAX {
+        let message =
+            format!("{count} waypoints: an agent plans through {WAYPOINTS_MAX} at most; jtc plan takes more");
+        return refused("way, in parts", message, count as f64, WAYPOINTS_MAX as f64);
+    }
+    Ok((request, file))
+}
+
+/// The motion, with what is to be known of it.
+fn planned(
+    request: &PlanRequest,
+    file: &WaypointFile,
+    arm: &Arm,
+    device: &Config,
+) -> Result<Planned, ErrorObject> {
+    let options = WayOptions { line: request.line, blend: request.blend_rad, blend_m: request.blend_m };
+    let way = Way::of(file, arm, options).map_err(|error| {
+        let object = ErrorObject::diagnosed(&error).with(&Facts::of_waypoints(&error));
+        match &error {
+            WaypointError::Route(e) => object.message(file.located(e)),
+            _ => object,
+        }
+    })?;
+    let mut config = arm.config_on_device(device);
+    if let Some(payload) = request.payload {
+        config.payload = payload.into();
+    }
+    let friction = arm.friction();
+    let planner = Planner {
+        model: Some(&arm.model),
+        friction: friction.as_ref(),
+        temperature: request.temperature_c,
+        speed_pct: request.speed_percent,
+        blend: request.blend_rad,
+        jerk: !request.no_jerk_limit,
+        ..Planner::new(&config)
+    };
+    let mut planned = way.planned(&planner).map_err(|error| {
+        ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error)).message(file.located(&error))
+    })?;
+    if let Some(aside) = way.off_the_line(&planned, arm) {
+        let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
+        planned.notes.push(format!(
+            "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are straight in joint space; \
+             line keeps it on the line",
+            to - 1
+        ));
+    }
+    if request.blend_m > 0.0 && !way.has_lines() {
+        planned
+            .notes
+            .push("blend_m rounds corners between lines and arcs, and this motion has none".to_owned());
+    }
+    Ok(planned)
+}
+
+/// The answer, with the trajectory kept where that was asked for.
+fn kept(
+    agent: &Agent,
+    request: &PlanRequest,
+    file: &WaypointFile,
+    planned: &Planned,
+) -> Result<PlanObject, ErrorObject> {
+    let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
+    let text = trajectory.to_exact_csv();
+    let keep = |KeepRequest { number, name }: &KeepRequest| {
+        let stored = agent.jobs.store.put(*number, &plain(name), &text, false);
+        stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
+    };
+    let kept = request.keep.as_ref().map(keep).transpose()?;
+    Ok(PlanObject {
+        duration_s: trajectory.duration_s(),
+        points: trajectory.points.len(),
+        step_ms: trajectory.step_ms,
+        waypoints: file.waypoints.len(),
+        waypoint_times_s: waypoint_times.clone(),
+        binding: binding.iter().map(BoundObject::from).collect(),
+        joints: Joint::ALL.into_iter().zip(&verdict.joints).map(JointPlan::new).collect(),
+        notes: notes.clone(),
+        warnings: verdict.warnings().map(ToString::to_string).collect(),
+        text,
+        kept,
+    })
+}

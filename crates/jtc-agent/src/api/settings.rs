@@ -1,0 +1,231 @@
+//! Settings of the controller: read, and changed all together or not at all.
+use agent_kit::api::{Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use jtc_core::settings::{self, Live, PAYLOAD, Setting};
+use jtc_host::error::Facts;
+use jtc_host::{ErrorKind, Session};
+use jtc_wire::{Joint, SET_VALUES_MAX, SettingValue};
+use utoipa::ToSchema;
+
+use super::error::Denials;
+use super::{Agent, ErrorObject};
+use crate::owner::ClientPort;
+
+/// The code of a setting that is none, or not taken.
+const CODE: &str = "setting";
+
+/// When a setting may be changed.
+#[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum When {
+    /// Without torque: in Init and in Error.
+    Unpowered,
+    /// Also while the arm is held, taught or paused.
+    Standing,
+    /// Also while it moves.
+    Always,
+}
+
+impl From<Live> for When {
+    fn from(live: Live) -> Self {
+        match live {
+            Live::No | Live::Unpowered => Self::Unpowered,
+            Live::Standing => Self::Standing,
+            Live::Always => Self::Always,
+        }
+    }
+}
+
+/// A setting as the controller has it.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct SettingObject {
+    /// Its name, with its unit.
+    pub name: String,
+    /// Which joint, 1 to 6 from the base; missing: it is one of the arm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<u8>,
+    /// The value; switches are 0 or 1.
+    pub value: f64,
+    /// Its unit; empty where it has none.
+    pub unit: String,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// Whole numbers only.
+    pub whole: bool,
+    /// When it may be changed.
+    pub when: When,
+    /// It is stored with the arm, and in its hash.
+    pub of_arm: bool,
+    /// What it is.
+    pub meaning: String,
+}
+
+impl SettingObject {
+    fn new(row: &Setting, SettingValue { joint, value, .. }: SettingValue) -> Self {
+        Self {
+            name: row.name.to_owned(),
+            joint: Joint::from_number(joint.into()).map(Joint::number),
+            value,
+            unit: row.unit.to_owned(),
+            low: row.low,
+            high: row.high,
+            whole: row.whole,
+            when: row.live.into(),
+            of_arm: row.of_arm(),
+            meaning: row.meaning.to_owned(),
+        }
+    }
+}
+
+/// A setting that is to have another value.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SettingChange {
+    /// Its name, with its unit.
+    pub name: String,
+    /// Which joint, from the base; missing for a setting of the arm.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 6)]
+    pub joint: Option<u8>,
+    /// The value; switches are 0 or 1.
+    pub value: f64,
+}
+
+/// Settings that are to have other values: all of them, or none.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SettingsRequest {
+    /// Each at most once.
+    #[schema(min_items = 1, max_items = 256)]
+    pub settings: Vec<SettingChange>,
+}
+
+impl SettingsRequest {
+    /// As the wire has them.
+    fn values(&self) -> Result<Vec<SettingValue>, ErrorObject> {
+        let count = self.settings.len();
+        if !(1..=SET_VALUES_MAX).contains(&count) {
+            let message = format!("{count} settings: 1 to {SET_VALUES_MAX} are changed at once");
+            return Err(none(message, "send them in parts"));
+        }
+        let mut values: Vec<SettingValue> = Vec::with_capacity(count);
+        for change in &self.settings {
+            let value = change.value()?;
+            if values.iter().any(|other| (other.setting, other.joint) == (value.setting, value.joint)) {
+                let message = format!("{} is given twice; nothing was changed", change.words());
+                return Err(none(message, "send each setting once").with(&change.facts()));
+            }
+            values.push(value);
+        }
+        Ok(values)
+    }
+
+    /// For the log of commands.
+    fn words(&self) -> String {
+        let all: Vec<String> =
+            self.settings.iter().map(|change| format!("{} = {}", change.words(), change.value)).collect();
+        format!("settings: {}", all.join(", "))
+    }
+}
+
+impl SettingChange {
+    /// As the wire has it: of a setting that there is, and within its range.
+    fn value(&self) -> Result<SettingValue, ErrorObject> {
+        let row = settings::named(&self.name).ok_or_else(|| {
+            let message = format!("there is no setting {:?}; nothing was changed", short(&self.name));
+            none(message, "GET /api/settings lists all of them")
+        })?;
+        if PAYLOAD.contains(&row.number) {
+            let message = format!("{} is part of the payload; nothing was changed", row.name);
+            return Err(none(message, "PUT /api/payload changes it, and checks that the arm can hold it"));
+        }
+        let refused = |what: &str, next: &str| {
+            let message = format!("{}: {what}; nothing was changed", self.words());
+            Err(none(message, next).with(&self.facts()))
+        };
+        let joint = match (self.joint, row.of_joint()) {
+            (None, false) => 0,
+            (Some(joint @ 1..=6), true) => joint,
+            (Some(_), true) => return refused("joints are 1 to 6", "count them from the base"),
+            (None, true) => return refused("each joint has one", "name the joint, 1 to 6 from the base"),
+            (Some(_), false) => return refused("it is one of the arm, and of no joint", "leave joint out"),
+        };
+        let Self { value, .. } = *self;
+        let facts = |limit| Facts { limit: Some(limit), ..self.facts() };
+        let (low, high) = (row.low, row.high);
+        if !(low..=high).contains(&value) {
+            let message = format!(
+                "{}: {value} {} is outside {low} to {high}; nothing was changed",
+                self.words(),
+                row.unit
+            );
+            let limit = if value < low { low } else { high };
+            return Err(none(message, "GET /api/settings has the range of each").with(&facts(limit)));
+        }
+        if row.whole && value.fract() != 0.0 {
+            return refused("it has whole numbers only", "GET /api/settings has the range of each");
+        }
+        Ok(SettingValue { setting: row.number, joint, value })
+    }
+
+    fn words(&self) -> String {
+        let name = short(&self.name);
+        self.joint.map_or_else(|| name.clone(), |joint| format!("{name} of joint {joint}"))
+    }
+
+    fn facts(&self) -> Facts {
+        let joint = self.joint.and_then(|joint| Joint::from_number(joint.into()));
+        Facts { joint, value: Some(self.value), ..Facts::default() }
+    }
+}
+
+/// What somebody has sent as a name, as a line can have it.
+fn short(name: &str) -> String {
+    agent_kit::gate::plain(name)
+}
+
+/// Nothing of this is changed.
+fn none(message: String, next: &str) -> ErrorObject {
+    ErrorObject::new(CODE, message, next).kind(ErrorKind::Usage)
+}
+
+/// All settings, as the controller has them.
+#[utoipa::path(
+    get,
+    path = "/api/settings",
+    operation_id = "get_settings",
+    responses((status = 200, description = "Those that this agent knows, in the order of their numbers", body = Vec<SettingObject>), Refusals, Denials)
+)]
+pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingObject>>, ErrorObject> {
+    let values = agent.ask(|session| Ok(session.settings()?)).await?;
+    let known = values
+        .into_iter()
+        .filter_map(|value| settings::setting(value.setting).map(|row| SettingObject::new(row, value)));
+    Ok(Json(known.collect()))
+}
+
+/// Changes settings: all that are sent, or none. Most of them change without torque only.
+#[utoipa::path(
+    put,
+    path = "/api/settings",
+    operation_id = "set_settings",
+    params(LeaseKey),
+    request_body = SettingsRequest,
+    responses((status = 204, description = "The controller has them"), Refusals, Denials)
+)]
+pub(super) async fn change(
+    State(agent): State<Agent>,
+    asker: Asker,
+    Body(request): Body<SettingsRequest>,
+) -> Result<StatusCode, ErrorObject> {
+    let values = request.values()?;
+    let change = move |session: &mut Session<ClientPort>| session.change_settings(&values);
+    agent.command(&asker, request.words(), change).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

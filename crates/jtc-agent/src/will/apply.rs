@@ -1,0 +1,98 @@
+//! What an agent does first with what the one before was killed in.
+use std::time::{Duration, Instant};
+
+use jtc_wire::ExecCommand;
+use serde_json::json;
+
+use super::file::{Found, Stored};
+use super::keeper::Keeper;
+use crate::line::{Applied, Policy, SharedLine};
+use crate::owner::Line;
+use crate::record::Notice;
+
+/// A controller that is there reports within this time.
+const REPORTS: Duration = Duration::from_secs(1);
+/// Longest that is waited until it has taken a Stop; that is sent on and on behind that.
+const TAKES: Duration = Duration::from_secs(1);
+/// How often is looked.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Does what the policy in the file demands of what the controller moves. What was found, and what was done; `None`: there was nothing.
+pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
+    let (client, policy) = match found {
+        Found::Nothing => {
+            keeper.settle(None);
+            return None;
+        }
+        Found::Left(stored) => (stored.client.as_str(), stored.policy),
+        Found::Doubtful(_) => ("an unknown client", Policy::Stop),
+    };
+    until(line, REPORTS, |line| line.status().is_some());
+    let reports = line.with(|line, _| line.status().is_some());
+    let applied = line.with(|line, now| line.apply_left(client, policy, now));
+    let taken = until(line, TAKES, SharedLine::is_idle);
+    keeper.settle(match found {
+        Found::Left(stored) => Some(stored.since_unix_s),
+        _ => None,
+    });
+    Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
+}
+
+/// Waits for something on the line; whether it came.
+fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> bool {
+    let end = Instant::now() + time;
+    loop {
+        if line.with(|line, _| came(line)) {
+            return true;
+        }
+        if Instant::now() >= end || line.lost().is_some() {
+            return false;
+        }
+        line.wait(LOOK);
+    }
+}
+
+/// In words; whether the controller reports, and has taken what was sent.
+fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
+    let sent = match applied {
+        Applied::Rests => return "nothing moves any more".into(),
+        Applied::GoesOn if !reports => return "nothing is received from the controller".into(),
+        Applied::GoesOn => return "it goes on".into(),
+        Applied::Paused => return "it stays paused".into(),
+        Applied::Sent(ExecCommand::Pause) => "a Pause",
+        Applied::Sent(_) => "a Stop",
+    };
+    match (reports, taken) {
+        (true, true) => format!("{sent} was sent, and the controller has taken it"),
+        (true, false) => format!("{sent} was sent, and is sent until the controller has taken it"),
+        (false, _) => {
+            format!("nothing is received from the controller: {sent} is sent until it has taken it")
+        }
+    }
+}
+
+fn notice(found: &Found, moves: bool, done: &str) -> Notice {
+    match found {
+        Found::Left(Stored { client, policy, what, since_unix_s, .. }) => Notice {
+            what: "policy-found",
+            warning: Some(format!(
+                "the agent before ended in {} of {client}, policy {}: {done}",
+                what.text(),
+                policy.name()
+            )),
+            facts: json!({
+                "by": client, "policy": policy, "of": what, "since_unix_s": since_unix_s, "moves": moves, "done": done,
+            }),
+        },
+        Found::Nothing | Found::Doubtful(_) => {
+            let why = if let Found::Doubtful(why) = found { why.as_str() } else { "" };
+            Notice {
+                what: "policy-in-doubt",
+                warning: Some(format!(
+                    "what the agent before has left cannot be read ({why}), and in doubt the arm is stopped: {done}"
+                )),
+                facts: json!({ "why": why, "moves": moves, "done": done }),
+            }
+        }
+    }
+}

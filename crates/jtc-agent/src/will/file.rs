@@ -1,0 +1,231 @@
+//! The file: one for each port, which its owner alone can read, there or not, never half.
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::line::{Moves, Policy, Will};
+
+/// Version of its contents.
+const VERSION: u32 = 1;
+/// Longer than any.
+const LEN_MAX: u64 = 16 << 10;
+/// Longest name that is shown.
+const NAME_MAX: usize = 100;
+
+/// Its contents.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stored {
+    version: u32,
+    /// The port, as it was named.
+    port: String,
+    /// What people call the client.
+    pub client: String,
+    /// Its policy.
+    pub policy: Policy,
+    /// What moves.
+    pub what: Moves,
+    /// Since when, s since 1970.
+    pub since_unix_s: f64,
+}
+
+/// What lies there when an agent begins.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Found {
+    /// Nothing: the agent before has ended, or nothing moved.
+    Nothing,
+    /// What the agent before was killed in.
+    Left(Stored),
+    /// Something else, and why: nobody knows whose policy it is.
+    Doubtful(String),
+}
+
+/// Where the file of a port is in this folder. The port counts as it is named: a name by what is plugged in stays, where that of the device may be
+/// another one the next time.
+pub(super) fn path(folder: &Path, port: &str) -> PathBuf {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.' || byte == b'-';
+    let escaped = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("_{byte:02x}") };
+    folder.join(format!("moves-{}.json", port.bytes().map(escaped).collect::<String>()))
+}
+
+/// What lies at this path, for this port.
+pub(super) fn read(path: &Path, port: &str) -> Found {
+    let metadata = match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Found::Nothing,
+        Err(error) => return Found::Doubtful(error.to_string()),
+        Ok(metadata) => metadata,
+    };
+    if !metadata.is_file() || metadata.len() > LEN_MAX {
+        return Found::Doubtful("it is no such file".into());
+    }
+    if is_open(&metadata) {
+        return Found::Doubtful("other users can write it".into());
+    }
+    let text = match fs::read(path) {
+        Err(error) => return Found::Doubtful(error.to_string()),
+        Ok(text) => text,
+    };
+    match serde_json::from_slice::<Stored>(&text) {
+        Err(error) => Found::Doubtful(format!("it is damaged: {error}")),
+        Ok(stored) if stored.version != VERSION => {
+            Found::Doubtful(format!("it has version {}, and this agent knows {VERSION}", stored.version))
+        }
+        Ok(stored) if stored.port != port => Found::Doubtful("it is that of another port".into()),
+        Ok(stored) => {
+            let client = stored.client.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect();
+            Found::Left(Stored { client, ..stored })
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_open(metadata: &fs::Metadata) -> bool {
+    std::os::unix::fs::MetadataExt::mode(metadata) & 0o022 != 0
+}
+
+#[cfg(not(unix))]
+fn is_open(_: &fs::Metadata) -> bool {
+    false
+}
+
+/// Puts it there, in one step. It counts for a killed agent from then on; it outlasts a loss of power as soon as the disk has it.
+pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
+    let Will { client, policy, what } = will.clone();
+    let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
+    let text = serde_json::to_vec_pretty(&stored)?;
+    let part = part_of(path);
+    let mut file = begin(&part)?;
+    let written = file.write_all(&text).and_then(|()| fs::rename(&part, path));
+    if written.is_err() {
+        // What is wrong is the first error.
+        let _ = fs::remove_file(&part);
+    }
+    written?;
+    file.sync_all()
+}
+
+/// Takes it away.
+pub(super) fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Files can be written there; where there is no folder one is made.
+pub(super) fn try_out(path: &Path) -> io::Result<()> {
+    if let Some(folder) = path.parent() {
+        let mut builder = fs::DirBuilder::new();
+        builder.recursive(true);
+        #[cfg(unix)]
+        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+        builder.create(folder)?;
+    }
+    let part = part_of(path);
+    begin(&part)?.write_all(b"{}")?;
+    fs::remove_file(part)
+}
+
+fn part_of(path: &Path) -> PathBuf {
+    path.with_extension("part")
+}
+
+/// A new file that only its owner can read, in place of what a killed agent has left of one.
+fn begin(part: &Path) -> io::Result<File> {
+    remove(part)?;
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PORT: &str = "/dev/serial/by-id/usb-FTDI_A";
+
+    fn will(policy: Policy) -> Will {
+        Will { client: "anna: jtc traj".into(), policy, what: Moves::Motion }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_by_its_owner_alone_and_in_one_step() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = path(&dir.path().join("state"), PORT);
+        try_out(&path).expect("there is room");
+        assert_eq!(read(&path, PORT), Found::Nothing);
+        for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
+            write(&path, PORT, &will(policy), 1.5).expect("there is room");
+            let Found::Left(stored) = read(&path, PORT) else { panic!("{:?}", read(&path, PORT)) };
+            assert_eq!((stored.client.as_str(), stored.policy), ("anna: jtc traj", policy));
+            assert_eq!((stored.what, stored.since_unix_s), (Moves::Motion, 1.5));
+        }
+        let folder = path.parent().expect("a folder");
+        assert_eq!(fs::read_dir(folder).expect("it is there").count(), 1, "nothing is left beside it");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt as _;
+            let mode = |path: &Path| fs::metadata(path).expect("it is there").mode() & 0o777;
+            assert_eq!((mode(&path), mode(folder)), (0o600, 0o700));
+        }
+        remove(&path).expect("it is there");
+        remove(&path).expect("it is gone already");
+        assert_eq!(read(&path, PORT), Found::Nothing);
+    }
+
+    #[test]
+    fn each_port_has_a_file_of_its_own_by_name() {
+        let ports = ["/dev/ttyUSB0", "/dev/ttyUSB1", "dev/ttyUSB0", "_2fdev_2fttyUSB0", "COM3", "../x", "ü"];
+        let files: std::collections::BTreeSet<PathBuf> =
+            ports.iter().map(|port| path("folder".as_ref(), port)).collect();
+        assert_eq!(files.len(), ports.len());
+        assert!(files.iter().all(|file| file.parent() == Some("folder".as_ref())), "{files:?}");
+    }
+
+    #[test]
+    fn what_is_damaged_or_somebody_elses_is_in_doubt() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = path(dir.path(), PORT);
+        let doubtful = |why: &str| match read(&path, PORT) {
+            Found::Doubtful(text) => assert!(text.contains(why), "{text}"),
+            other => panic!("{why}: {other:?}"),
+        };
+        write(&path, "/dev/other", &will(Policy::Continue), 0.0).expect("there is room");
+        doubtful("another port");
+        write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
+        let good = fs::read_to_string(&path).expect("text");
+        // Cut anywhere it is damaged, and never another policy.
+        for n in 0..good.len() {
+            fs::write(&path, &good[..n]).expect("a file");
+            doubtful("damaged");
+        }
+        for (from, to, why) in [
+            ("\"continue\"", "\"go_on\"", "damaged"),
+            ("\"version\": 1", "\"version\": 2", "version 2"),
+            ("\"version\": 1", "\"version\": 1, \"more\": 2", "damaged"),
+        ] {
+            fs::write(&path, good.replace(from, to)).expect("a file");
+            doubtful(why);
+        }
+        fs::write(&path, " ".repeat(1 << 20)).expect("a file");
+        doubtful("no such file");
+        fs::write(&path, good.replace("anna", "an\\u001b[31mna")).expect("a file");
+        assert!(matches!(read(&path, PORT), Found::Left(stored) if stored.client == "an[31mna: jtc traj"));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            fs::set_permissions(&path, fs::Permissions::from_mode(0o666)).expect("it is there");
+            doubtful("other users");
+            remove(&path).expect("it is there");
+            std::os::unix::fs::symlink(dir.path().join("elsewhere"), &path).expect("a link");
+            doubtful("no such file");
+            remove(&path).expect("it is there");
+        }
+        fs::create_dir(&path).expect("a directory");
+        doubtful("no such file");
+    }
+}

@@ -1,0 +1,288 @@
+//! Keeps the file as it is to be, as soon as the disk takes it.
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+
+use super::file::{self, Found};
+use crate::line::{LineEvent, Will};
+use crate::record::{Notice, Notify};
+
+/// A disk that took nothing is tried again after this time.
+const AGAIN: Duration = Duration::from_secs(5);
+/// Longest that the end waits for the disk.
+const LAST: Duration = Duration::from_secs(1);
+
+/// What is to be in the file, and since when.
+type Wanted = Option<(Will, f64)>;
+
+struct Slot {
+    wanted: Wanted,
+    /// What lies there stays until it was acted on.
+    held: bool,
+    ended: bool,
+    /// The thread has ended.
+    done: bool,
+}
+
+struct Shared {
+    slot: Mutex<Slot>,
+    changed: Condvar,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Slot> {
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Sees what happens on the line, for the file. It never waits.
+pub struct Witness(Arc<Shared>);
+
+impl Witness {
+    /// Something happened on the line.
+    pub fn see(&self, event: &LineEvent) {
+        let LineEvent::Will(will) = event else { return };
+        let mut slot = self.0.lock();
+        let since = slot.wanted.take().map(|(_, since)| since);
+        slot.wanted = will.clone().map(|will| (will, since.unwrap_or_else(now)));
+        drop(slot);
+        self.0.changed.notify_all();
+    }
+}
+
+/// The file of a port, kept as long as this is there. What moves when it goes stays in it.
+pub struct Keeper(Arc<Shared>);
+
+impl Keeper {
+    /// Begins to keep that of `port` in `folder`; and what lies there, which stays until [`settle`](Self::settle).
+    ///
+    /// # Errors
+    ///
+    /// The system has no threads.
+    pub fn begin(folder: &Path, port: &str, notify: Notify) -> io::Result<(Self, Found)> {
+        let path = file::path(folder, port);
+        let found = file::read(&path, port);
+        let slot = Slot { wanted: None, held: true, ended: false, done: false };
+        let shared = Arc::new(Shared { slot: Mutex::new(slot), changed: Condvar::new() });
+        let mut writer = Writer {
+            shared: shared.clone(),
+            path,
+            port: port.to_owned(),
+            there: if found == Found::Nothing { Some(None) } else { None },
+            fails: false,
+            notify,
+        };
+        std::thread::Builder::new().name("what moves".into()).spawn(move || writer.run())?;
+        Ok((Self(shared), found))
+    }
+
+    /// For whoever sees what happens on the line.
+    pub fn witness(&self) -> Witness {
+        Witness(self.0.clone())
+    }
+
+    /// What lay there was acted on: from now on the file is as the line has it. `since`: what still moves has done so since then.
+    pub fn settle(&self, since: Option<f64>) {
+        let mut slot = self.0.lock();
+        slot.held = false;
+        if let (Some((_, moves_since)), Some(since)) = (&mut slot.wanted, since) {
+            *moves_since = since;
+        }
+        drop(slot);
+        self.0.changed.notify_all();
+    }
+
+    /// The arm was brought to rest for the end.
+    pub fn forget(&self) {
+        self.0.lock().wanted = None;
+        self.0.changed.notify_all();
+    }
+}
+
+impl Drop for Keeper {
+    fn drop(&mut self) {
+        let mut slot = self.0.lock();
+        slot.ended = true;
+        self.0.changed.notify_all();
+        let end = Instant::now() + LAST;
+        while !slot.done {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            slot = self.0.changed.wait_timeout(slot, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+/// s since 1970.
+fn now() -> f64 {
+    host_kit::unix_time().as_secs_f64()
+}
+
+/// The thread.
+struct Writer {
+    shared: Arc<Shared>,
+    path: PathBuf,
+    port: String,
+    /// What is there; `None`: nobody knows.
+    there: Option<Wanted>,
+    fails: bool,
+    notify: Notify,
+}
+
+impl Writer {
+    fn run(&mut self) {
+        // A folder that takes nothing is known before anything moves.
+        let tried = file::try_out(&self.path);
+        self.report(tried);
+        while let Some(wanted) = self.next() {
+            let done = match &wanted {
+                Some((will, since)) => file::write(&self.path, &self.port, will, *since),
+                None => file::remove(&self.path),
+            };
+            self.there = done.is_ok().then_some(wanted);
+            self.report(done);
+        }
+        self.shared.lock().done = true;
+        self.shared.changed.notify_all();
+    }
+
+    /// What is to be there and is not; `None`: the end.
+    fn next(&self) -> Option<Wanted> {
+        let mut slot = self.shared.lock();
+        let mut tried = self.fails.then(|| slot.wanted.clone());
+        let end = Instant::now() + AGAIN;
+        loop {
+            let is_there = self.there.as_ref() == Some(&slot.wanted);
+            // What failed is tried again in a while, and at once where it is something else now.
+            if !slot.held && !is_there && tried.as_ref() != Some(&slot.wanted) {
+                return Some(slot.wanted.clone());
+            }
+            if slot.ended {
+                return None;
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            slot = if tried.is_none() {
+                self.shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner)
+            } else if left.is_zero() {
+                tried = None;
+                continue;
+            } else {
+                self.shared.changed.wait_timeout(slot, left).unwrap_or_else(PoisonError::into_inner).0
+            };
+        }
+    }
+
+    /// The first error of writing is noted, and when it is over.
+    fn report(&mut self, done: io::Result<()>) {
+        let path = self.path.display().to_string();
+        match &done {
+            Err(error) if !self.fails => (self.notify)(Notice {
+                what: "policy-not-kept",
+                facts: json!({ "file": path, "why": error.to_string() }),
+                warning: Some(format!(
+                    "{path}: {error}; motions are begun all the same, and if this agent is killed the next one may not know whose policy is to act on them"
+                )),
+            }),
+            Ok(()) if self.fails => {
+                (self.notify)(Notice { what: "policy-kept", facts: json!({ "file": path }), warning: None });
+            }
+            _ => {}
+        }
+        self.fails = done.is_err();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, channel};
+
+    use super::*;
+    use crate::line::{Moves, Policy};
+
+    const PORT: &str = "/dev/arm";
+
+    fn begin(folder: &Path) -> (Keeper, Found, Receiver<Notice>) {
+        let (send, notices) = channel();
+        let notify = Box::new(move |notice| send.send(notice).expect("somebody reads"));
+        let (keeper, found) = Keeper::begin(folder, PORT, notify).expect("a thread");
+        (keeper, found, notices)
+    }
+
+    fn moves(policy: Policy) -> LineEvent {
+        LineEvent::Will(Some(Will { client: "anna".into(), policy, what: Moves::Motion }))
+    }
+
+    fn until(folder: &Path, what: &str, reached: impl Fn(&Found) -> bool) {
+        let end = Instant::now() + Duration::from_secs(20);
+        while !reached(&file::read(&file::path(folder, PORT), PORT)) {
+            assert!(Instant::now() < end, "{what}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn left(policy: Policy) -> impl Fn(&Found) -> bool {
+        move |found| matches!(found, Found::Left(stored) if stored.policy == policy)
+    }
+
+    #[test]
+    fn the_file_is_there_while_something_moves_and_what_moves_at_the_end_stays() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let (keeper, found, _notices) = begin(dir.path());
+        assert_eq!(found, Found::Nothing);
+        keeper.settle(None);
+        let witness = keeper.witness();
+        witness.see(&moves(Policy::Pause));
+        until(dir.path(), "pause", left(Policy::Pause));
+        witness.see(&moves(Policy::Stop));
+        until(dir.path(), "stop", left(Policy::Stop));
+        witness.see(&LineEvent::Will(None));
+        until(dir.path(), "rest", |found| *found == Found::Nothing);
+        witness.see(&moves(Policy::Stop));
+        drop(keeper);
+        let (keeper, found, _notices) = begin(dir.path());
+        let Found::Left(stored) = &found else { panic!("{found:?}") };
+        // It stays until it was acted on, however the agent ends, and keeps its time.
+        drop(keeper);
+        assert_eq!(begin(dir.path()).1, found);
+        let (keeper, _, _notices) = begin(dir.path());
+        keeper.witness().see(&moves(Policy::Stop));
+        keeper.settle(Some(stored.since_unix_s));
+        drop(keeper);
+        let (keeper, again, _notices) = begin(dir.path());
+        assert_eq!(again, found);
+        // At rest it goes.
+        keeper.settle(Some(stored.since_unix_s));
+        until(dir.path(), "nothing moves", |found| *found == Found::Nothing);
+        keeper.witness().see(&moves(Policy::Continue));
+        keeper.forget();
+        drop(keeper);
+        assert_eq!(begin(dir.path()).1, Found::Nothing);
+    }
+
+    #[test]
+    fn a_folder_that_takes_nothing_is_noted_once_and_tried_again() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let folder = dir.path().join("state");
+        std::fs::write(&folder, "no folder").expect("a file");
+        let (keeper, _, notices) = begin(&folder);
+        let first = notices.recv().expect("a notice");
+        assert!(first.what == "policy-not-kept" && first.warning.is_some_and(|w| w.contains("all the same")));
+        keeper.settle(None);
+        let witness = keeper.witness();
+        for policy in [Policy::Pause, Policy::Stop, Policy::Pause] {
+            witness.see(&moves(policy));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(notices.try_recv().is_err(), "once");
+        std::fs::remove_file(&folder).expect("a file");
+        std::fs::create_dir(&folder).expect("a folder");
+        witness.see(&moves(Policy::Stop));
+        until(&folder, "there is room again", left(Policy::Stop));
+        assert_eq!(notices.recv().expect("a notice").what, "policy-kept");
+    }
+}

@@ -1,0 +1,140 @@
+//! Whose policy acts on what moves when the agent is killed.
+mod board;
+
+use std::time::Duration;
+
+use board::Board;
+use jtc_agent::line::{Applied, Moves, Will};
+use jtc_agent::{LineEvent, Policy, Role};
+use jtc_wire::{ControllerState, ExecCommand, FrameType, RawPoint, TrajectoryState, fixed, trajectory};
+
+/// The wills that were reported since, in order.
+fn wills(board: &mut Board) -> Vec<Option<Will>> {
+    let events = board.line.take_events().into_iter();
+    events.filter_map(|event| if let LineEvent::Will(will) = event { Some(will) } else { None }).collect()
+}
+
+fn will(client: &str, policy: Policy, what: Moves) -> Option<Will> {
+    Some(Will { client: client.into(), policy, what })
+}
+
+fn segment() -> Vec<u8> {
+    let mut bytes = vec![0; 60_000];
+    let n = trajectory(&mut bytes, (1, 0, 9), 1, vec![RawPoint::default(); 20]).expect("it fits");
+    bytes.truncate(n);
+    bytes
+}
+
+#[test]
+fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
+    let mut board = Board::new(115_200);
+    board.status.state = ControllerState::HoldPos.into();
+    let anna = board.join("anna", Role::Operator, Policy::Stop);
+    board.run_ms(100);
+    assert_eq!(wills(&mut board), []);
+    board.send(anna, &segment());
+    board.run_ms(300);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Upload)]);
+    // Before any status shows it.
+    board.send(anna, &fixed::exec(ExecCommand::Execute));
+    board.run_ms(20);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Motion)]);
+    board.status.trajectory = TrajectoryState::Execute.into();
+    board.run_ms(3_000);
+    board.line.set_policy(anna, Policy::Continue);
+    board.run_ms(20);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
+    // Nothing is received: in doubt it moves on.
+    board.deaf_until = board.now() + Duration::from_secs(3);
+    board.run_ms(3_500);
+    assert_eq!(wills(&mut board), []);
+    // What she has left it to lasts without her, and somebody else's counts when somebody else commands.
+    let now = board.now();
+    board.line.leave(anna, now);
+    let bob = board.join("bob", Role::Operator, Policy::Pause);
+    board.run_ms(20);
+    board.send(bob, &fixed::gripper_control(true));
+    board.run_ms(50);
+    assert_eq!(wills(&mut board), [will("bob", Policy::Pause, Moves::Motion)]);
+    let now = board.now();
+    board.line.release_lease(bob, now).expect("it is his");
+    board.run_ms(20);
+    assert_eq!(wills(&mut board), [will("bob", Policy::Continue, Moves::Motion)]);
+    board.status.trajectory = TrajectoryState::Finish.into();
+    board.run_ms(1_100);
+    assert_eq!(wills(&mut board), [None]);
+}
+
+#[test]
+fn teaching_has_a_will_before_it_shows_and_an_upload_that_leads_nowhere_none_after_a_while() {
+    let mut board = Board::new(115_200);
+    board.status.state = ControllerState::HoldPos.into();
+    let anna = board.join("anna", Role::Operator, Policy::Pause);
+    board.send(anna, &fixed::TEACHING_MODE_ENABLE);
+    board.run_ms(5_000);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Pause, Moves::Teaching)]);
+    board.send(anna, &fixed::empty(FrameType::TeachingModeDisable));
+    board.run_ms(1_500);
+    assert_eq!(wills(&mut board), [None]);
+    board.send(anna, &segment());
+    board.run_ms(6_000);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Pause, Moves::Upload), None]);
+}
+
+/// Whoever has asked for more than the policy has it from the next agent, too, where the controller has not taken it.
+#[test]
+fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
+    let mut board = Board::new(115_200);
+    board.status.trajectory = TrajectoryState::Execute.into();
+    let anna = board.join("anna", Role::Operator, Policy::Continue);
+    board.send(anna, &fixed::gripper_control(true));
+    board.run_ms(200);
+    assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
+    board.deaf_until = board.now() + Duration::from_secs(1);
+    let now = board.now();
+    board.line.halt_for(None, "the desk", ExecCommand::Stop, now);
+    board.run_ms(900);
+    // The owner looks also where nothing is received.
+    let now = board.now();
+    board.line.from_device(&[], now);
+    assert_eq!(wills(&mut board), [will("the desk", Policy::Stop, Moves::Motion)]);
+}
+
+#[test]
+fn what_was_left_is_done_and_nothing_where_nothing_moves() {
+    use TrajectoryState::{Execute, Finish, Pause as Paused};
+    let (pause, stop) = (Applied::Sent(ExecCommand::Pause), Applied::Sent(ExecCommand::Stop));
+    for (policy, state, trajectory, applied) in [
+        (Policy::Continue, ControllerState::Operate, Execute, Applied::GoesOn),
+        (Policy::Pause, ControllerState::Operate, Execute, pause),
+        (Policy::Stop, ControllerState::Operate, Execute, stop),
+        (Policy::Continue, ControllerState::HoldPos, Paused, Applied::GoesOn),
+        (Policy::Pause, ControllerState::HoldPos, Paused, Applied::Paused),
+        (Policy::Stop, ControllerState::HoldPos, Paused, stop),
+        (Policy::Pause, ControllerState::Teaching, Finish, pause),
+        (Policy::Continue, ControllerState::HoldPos, Finish, Applied::Rests),
+        (Policy::Pause, ControllerState::HoldPos, Finish, Applied::Rests),
+        (Policy::Stop, ControllerState::HoldPos, Finish, Applied::Rests),
+    ] {
+        let mut board = Board::new(115_200);
+        (board.status.state, board.status.trajectory) = (state.into(), trajectory.into());
+        board.run_ms(50);
+        let now = board.now();
+        assert_eq!(
+            board.line.apply_left("anna", policy, now),
+            applied,
+            "{policy:?} {state:?} {trajectory:?}"
+        );
+        board.run_ms(300);
+        // Nobody is held up where nothing moves; what moves on does so with what was left.
+        let sent = matches!(applied, Applied::Sent(_));
+        assert_eq!(board.line.last_halt(), u64::from(sent));
+        assert_eq!(
+            board.arrived(FrameType::TeachingModeDisable) > 0,
+            sent || (applied == Applied::Rests && policy != Policy::Continue)
+        );
+        let what = if state == ControllerState::Teaching { Moves::Teaching } else { Moves::Motion };
+        let left = (applied != Applied::Rests).then(|| will("anna", policy, what));
+        assert_eq!(wills(&mut board).last().cloned(), left, "{policy:?} {state:?} {trajectory:?}");
+    }
+}

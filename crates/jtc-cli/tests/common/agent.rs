@@ -1,0 +1,85 @@
+//! An agent (`jtc serve`) with places of its own for tokens and for what it leaves behind.
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use cli_kit::trial::{CommandOutput, run};
+use serde_json::Value;
+
+use super::{command, slow_motion};
+
+/// `jtc` whose state and sockets lie in this directory.
+pub fn command_in(dir: &tempfile::TempDir) -> Command {
+    let mut command = command();
+    command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
+    command
+}
+
+/// Starts an agent with these options at a free port of this computer; what it prints when it is ready.
+pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
+    let mut child = command_in(dir)
+        .args(["--json", "serve", "--listen", "127.0.0.1:0"])
+        .args(options)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("jtc serve starts");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+    let ready: Value = serde_json::from_str(&line).expect("an object");
+    assert!(ready["token_file"].is_string() && ready["simulated"].is_boolean(), "{line}");
+    (child, ready)
+}
+
+/// An agent that serves; it ends with the test.
+pub struct Agent {
+    pub child: Child,
+    pub url: String,
+    pub dir: tempfile::TempDir,
+}
+
+impl Agent {
+    /// Starts one, and waits until it serves.
+    pub fn start(options: &[&str]) -> Self {
+        Self::start_in(tempfile::tempdir().expect("a directory"), options)
+    }
+
+    /// The same in a directory that may hold what another left behind.
+    pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
+        let (child, ready) = serve(&dir, options);
+        Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
+    }
+
+    /// `jtc` at this port, or at the agent's address.
+    pub fn command(&self, words: &[&str], port: &str) -> Command {
+        let mut command = command_in(&self.dir);
+        command.args(words).args(["--port", port]);
+        command
+    }
+
+    /// Runs `jtc` through it.
+    pub fn jtc(&self, words: &[&str]) -> CommandOutput {
+        run(self.command(words, &self.url), &[], "")
+    }
+
+    /// A file with a motion of so many tenths of a second.
+    pub fn motion(&self, tenths: i32) -> String {
+        let file = self.dir.path().join("motion.csv");
+        std::fs::write(&file, slow_motion(tenths)).expect("a file");
+        file.to_str().expect("a name").to_owned()
+    }
+
+    /// Ends it with this signal; its exit code, and what it leaves behind.
+    pub fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
+        Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
+        let code = self.child.wait().expect("it ends").code();
+        (code, std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory")))
+    }
+}
+
+impl Drop for Agent {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}

@@ -1,0 +1,206 @@
+//! An agent of a simulated controller behind a serial port, each a process of its own.
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use test_kit::http::Http;
+
+use crate::common::agent::{self, command_in};
+use crate::common::{Sim, slow_motion};
+
+pub const WAIT: Duration = Duration::from_secs(40);
+
+/// Both of them.
+pub struct Cell {
+    pub sim: Option<Sim>,
+    pub agent: Child,
+    pub url: String,
+    pub motion: String,
+    pub dir: tempfile::TempDir,
+    baud: String,
+}
+
+impl Cell {
+    /// `tenths`: how long its motion takes, 0.1 s.
+    pub fn new(baud: &str, tenths: i32) -> Self {
+        let dir = tempfile::tempdir().expect("a directory");
+        let sim = Sim::start(&["--baud", baud]).with_parameters();
+        let (agent, url) = serve(&dir, &sim.port, baud);
+        let motion = dir.path().join("motion.csv");
+        std::fs::write(&motion, slow_motion(tenths)).expect("a file");
+        let cell = Self {
+            sim: Some(sim),
+            agent,
+            url,
+            motion: motion.to_str().expect("a name").to_owned(),
+            dir,
+            baud: baud.into(),
+        };
+        cell.until("HoldPos", |status| {
+            status["state"] == "HoldPos" && status["errors"] == Value::Array(vec![])
+        });
+        cell
+    }
+
+    /// A run through the agent, with what is to become of it without its program.
+    pub fn run(&self, policy: &str) -> Child {
+        self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts")
+    }
+
+    pub fn jtc(&self, words: &[&str]) -> Command {
+        let mut command = command_in(&self.dir);
+        command.args(words);
+        command
+    }
+
+    /// What the controller reports through the agent.
+    pub fn status(&self) -> Value {
+        self.status_at(&self.url)
+    }
+
+    pub fn status_at(&self, port: &str) -> Value {
+        let shown = self.jtc(&["--json", "status", "--port", port]).stderr(Stdio::null()).output();
+        serde_json::from_slice(&shown.expect("it ran").stdout).unwrap_or(Value::Null)
+    }
+
+    pub fn until(&self, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
+        self.until_at(&self.url, what, reached)
+    }
+
+    pub fn until_at(&self, port: &str, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
+        let end = Instant::now() + WAIT;
+        loop {
+            let status = self.status_at(port);
+            if reached(&status) {
+                return status;
+            }
+            assert!(Instant::now() < end, "{what} is not reached: {status}");
+        }
+    }
+
+    /// The agent goes without a word.
+    pub fn kill_agent(&mut self) {
+        self.agent.kill().expect("it is there");
+        self.agent.wait().expect("it ends");
+    }
+
+    /// Another agent takes its place.
+    pub fn next_agent(&mut self) {
+        let port = &self.sim.as_ref().expect("it is there").port;
+        (self.agent, self.url) = serve(&self.dir, port, &self.baud);
+    }
+
+    /// `jtc --json` with these words at the agent, when it has reported this event.
+    pub fn at(&self, words: &[&str], event: &str) -> Program {
+        let words = [&["--json"], words, &["--port", &self.url]].concat();
+        let mut jtc = self.jtc(&words);
+        let mut child = jtc.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        let mut program = Program { err: BufReader::new(child.stderr.take().expect("stderr")), child };
+        program.until(event);
+        program
+    }
+
+    /// The same that is over, well.
+    pub fn done(&self, words: &[&str]) {
+        let ended = self.jtc(&[words, &["--port", &self.url]].concat()).output().expect("it ran");
+        assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
+    }
+
+    /// A program that knows HTTP alone, with the operator's token.
+    pub fn http(&self) -> Http {
+        let file = self.dir.path().join("state/openjtc/tokens.toml");
+        let text = std::fs::read_to_string(file).expect("a token file");
+        let token = text.lines().find_map(|line| line.strip_prefix("operator = \"")?.strip_suffix('"'));
+        let address = self.url.strip_prefix("http://").expect("an address").parse().expect("an address");
+        Http { address, operator: token.expect("the operator's").to_owned() }
+    }
+
+    /// What agents have found of the one before: the lines of their log.
+    pub fn found(&self) -> Vec<Value> {
+        let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
+        let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("an object"));
+        lines.filter(|line| line["what"].as_str().is_some_and(|what| what.starts_with("policy-"))).collect()
+    }
+
+    /// The file with whose policy is to act on what moves, if it is there.
+    pub fn left(&self) -> Option<PathBuf> {
+        let files = std::fs::read_dir(self.dir.path().join("state/openjtc")).expect("it is there");
+        let mut paths = files.map(|file| file.expect("a file").path());
+        paths.find(|path| path.extension().is_some_and(|kind| kind == "json"))
+    }
+
+    /// Nothing moves, and nothing begins to.
+    pub fn rests(&self, time: Duration) -> Value {
+        let seen = Instant::now();
+        loop {
+            let status = self.status();
+            assert!(status.is_object() && !moves(&status), "{status}");
+            if seen.elapsed() >= time {
+                return status;
+            }
+        }
+    }
+}
+
+impl Drop for Cell {
+    fn drop(&mut self) {
+        self.agent.kill().ok();
+        self.agent.wait().ok();
+    }
+}
+
+fn serve(dir: &tempfile::TempDir, port: &Path, baud: &str) -> (Child, String) {
+    let name = |path: &Path| path.to_str().expect("a name").to_owned();
+    let (port, log) = (name(port), name(&dir.path().join("commands.jsonl")));
+    let (child, ready) = agent::serve(dir, &["--baud", baud, "--port", &port, "--command-log", &log]);
+    (child, ready["url"].as_str().expect("an address").to_owned())
+}
+
+/// A command at work.
+pub struct Program {
+    child: Child,
+    err: BufReader<ChildStderr>,
+}
+
+impl Program {
+    /// Waits until it has reported this event.
+    pub fn until(&mut self, event: &str) {
+        let (mut line, mut all) = (String::new(), String::new());
+        while !line.contains(&format!("\"event\":\"{event}\"")) {
+            line.clear();
+            assert!(self.err.read_line(&mut line).expect("text") > 0, "it ended before {event}: {all}");
+            all += &line;
+        }
+    }
+
+    /// It goes without a word.
+    pub fn kill(mut self) {
+        assert!(self.child.try_wait().expect("a child").is_none(), "it is at work");
+        self.child.kill().expect("it runs");
+        self.child.wait().expect("it ends");
+    }
+
+    /// It finds out that nobody is there any more.
+    pub fn ends_without_link(self) -> String {
+        let Self { child, err } = self;
+        let ended = child.wait_with_output().expect("it ends");
+        drop(err);
+        let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
+        assert_eq!(ended.status.code(), Some(3), "{report}");
+        report["error"]["message"].as_str().unwrap_or_default().to_owned()
+    }
+}
+
+pub fn trajectory(status: &Value) -> &str {
+    status["trajectory"].as_str().unwrap_or_default()
+}
+
+pub fn moves(status: &Value) -> bool {
+    status["state"] == "Operate" || trajectory(status) == "Execute"
+}

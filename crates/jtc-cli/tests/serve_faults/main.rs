@@ -1,0 +1,90 @@
+//! What becomes of the arm when a program, the agent or the controller is killed, in each phase of its work.
+#![cfg(unix)]
+
+mod cell;
+#[path = "../common/mod.rs"]
+mod common;
+mod phases;
+mod restarted;
+
+use std::time::{Duration, Instant};
+
+use cell::{Cell, WAIT, moves, trajectory};
+use serde_json::Value;
+
+#[test]
+fn a_program_that_is_killed_leaves_its_motion_to_its_policy() {
+    for (policy, left) in [("continue", "Finish"), ("pause", "Pause"), ("stop", "Stop")] {
+        let cell = Cell::new("921600", 60);
+        let mut run = cell.run(policy);
+        cell.until("Execute", |status| trajectory(status) == "Execute");
+        run.kill().expect("it runs");
+        run.wait().expect("it ends");
+        let status = cell.until(left, |status| !moves(status));
+        assert_eq!(trajectory(&status), left, "{policy}: {status}");
+        // The next one commands at once.
+        let gripper = cell.jtc(&["gripper", "on", "--port", &cell.url]).output().expect("it ran");
+        assert!(gripper.status.success(), "{}", String::from_utf8_lossy(&gripper.stderr));
+    }
+}
+
+#[test]
+fn a_program_that_is_killed_in_its_upload_moves_nothing_whatever_its_policy() {
+    for policy in ["continue", "stop"] {
+        let cell = Cell::new("57600", 150);
+        let mut run = cell.run(policy);
+        // Its upload takes seconds; the controller forgets what it had, and has not all of it yet.
+        std::thread::sleep(Duration::from_secs(2));
+        assert!(run.try_wait().expect("a child").is_none() && !moves(&cell.status()), "it uploads");
+        run.kill().expect("it runs");
+        run.wait().expect("it ends");
+        let seen = Instant::now();
+        while seen.elapsed() < Duration::from_secs(3) {
+            assert!(!moves(&cell.status()), "{policy}");
+        }
+    }
+}
+
+#[test]
+fn an_agent_that_is_killed_leaves_the_motion_to_the_controller_and_says_so_to_its_programs() {
+    let mut cell = Cell::new("921600", 50);
+    let run = cell.run("stop");
+    cell.until("Execute", |status| trajectory(status) == "Execute");
+    cell.kill_agent();
+    let ended = run.wait_with_output().expect("it ends");
+    assert_eq!(ended.status.code(), Some(3), "no link");
+    let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
+    let message = report["error"]["message"].as_str().unwrap_or_default().to_owned();
+    assert!(message.contains("MAY BE MOVING"), "{report}");
+    // The controller has the whole of it, and anyone finds it there.
+    let port = cell.sim.as_ref().expect("it is there").port.to_str().expect("a name").to_owned();
+    let baud = |words: &[&str]| {
+        let mut command = cell.jtc(words);
+        command.args(["--port", &port, "--baud", "921600"]);
+        command.output().expect("it ran")
+    };
+    let end = Instant::now() + WAIT;
+    loop {
+        let shown = baud(&["--json", "status"]);
+        let status: Value = serde_json::from_slice(&shown.stdout).unwrap_or_default();
+        if trajectory(&status) == "Finish" {
+            break;
+        }
+        assert!(Instant::now() < end && trajectory(&status) == "Execute", "{status}");
+    }
+    cell.next_agent();
+    cell.until("HoldPos", |status| status["state"] == "HoldPos");
+}
+
+#[test]
+fn a_controller_that_is_gone_ends_agent_and_programs_with_words() {
+    let mut cell = Cell::new("921600", 60);
+    let run = cell.run("continue");
+    cell.until("Execute", |status| trajectory(status) == "Execute");
+    drop(cell.sim.take());
+    let ended = run.wait_with_output().expect("it ends");
+    let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
+    assert_eq!(ended.status.code(), Some(3), "{report}");
+    assert!(report["error"]["message"].as_str().is_some_and(|m| m.contains("MAY BE MOVING")), "{report}");
+    assert_eq!(cell.agent.wait().expect("it ends").code(), Some(3));
+}

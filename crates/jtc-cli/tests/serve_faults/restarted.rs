@@ -1,0 +1,170 @@
+//! What another agent does first where the one before was killed: the policy of who commanded acts on what still moves.
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::cell::{Cell, WAIT, moves, trajectory};
+use crate::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
+
+/// The file is there before anybody kills the agent: it is written by a thread of its own.
+fn is_left(cell: &Cell, policy: &str) {
+    let end = Instant::now() + WAIT;
+    loop {
+        let text = cell.left().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+        let left: Value = serde_json::from_str(&text).unwrap_or_default();
+        if left["policy"] == policy {
+            return;
+        }
+        assert!(Instant::now() < end, "{policy}: {text}");
+    }
+}
+
+fn is_gone(cell: &Cell) {
+    let end = Instant::now() + WAIT;
+    while cell.left().is_some() {
+        assert!(Instant::now() < end, "nothing moves, and the file stays");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Another agent, and what it has found and done.
+fn next(cell: &mut Cell) -> Value {
+    cell.kill_agent();
+    follow(cell)
+}
+
+/// The same in place of one that was killed.
+fn follow(cell: &mut Cell) -> Value {
+    let before = cell.found().len();
+    cell.next_agent();
+    // The log is written by a thread of its own.
+    let end = Instant::now() + WAIT;
+    while cell.found().len() == before {
+        assert!(Instant::now() < end, "nothing was found");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let found = cell.found();
+    assert_eq!(found.len(), before + 1, "{found:?}");
+    found.last().expect("it is there").clone()
+}
+
+fn done(found: &Value) -> &str {
+    found["done"].as_str().unwrap_or_default()
+}
+
+fn each<const N: usize>(cases: [&str; N], act: impl Fn(&str) + Sync) {
+    let act = &act;
+    std::thread::scope(|scope| cases.iter().for_each(|case| drop(scope.spawn(move || act(case)))));
+}
+
+#[test]
+fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_another_comes() {
+    each(["continue", "pause", "stop"], |policy| {
+        let mut cell = Cell::new("921600", 80);
+        let mut run = cell.run(policy);
+        cell.until("Execute", |status| trajectory(status) == "Execute");
+        is_left(&cell, policy);
+        let found = next(&mut cell);
+        run.wait().expect("it ends");
+        assert_eq!(
+            (&found["policy"], &found["of"], &found["moves"]),
+            (&json!(policy), &json!("motion"), &json!(true))
+        );
+        assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
+        // Before anyone was served it was sent.
+        let taken = [("continue", "it goes on"), ("pause", "a Pause was sent"), ("stop", "a Stop was sent")];
+        let taken = taken.iter().find(|taken| taken.0 == policy).expect("a policy").1;
+        assert!(done(&found).starts_with(taken), "{found}");
+        let left = match policy {
+            "continue" => "Finish",
+            "pause" => "Pause",
+            _ => "Stop",
+        };
+        let status = cell.until(left, |status| !moves(status));
+        assert_eq!(trajectory(&status), left, "{policy}: {status}");
+        if policy == "pause" {
+            // It can be gone on with: that is left to the next one, too.
+            is_left(&cell, policy);
+            let found = next(&mut cell);
+            assert_eq!(done(&found), "it stays paused");
+            assert_eq!(trajectory(&cell.rests(REST)), "Pause");
+            cell.done(&["traj", "resume"]);
+            cell.until("Finish", |status| trajectory(status) == "Finish");
+        }
+        is_gone(&cell);
+        // Where nothing moves nothing is found, nor done.
+        let before = cell.found().len();
+        cell.kill_agent();
+        cell.next_agent();
+        assert_eq!(cell.found().len(), before);
+        assert_eq!(trajectory(&cell.rests(REST)), if policy == "stop" { "Stop" } else { "Finish" });
+    });
+}
+
+#[test]
+fn each_other_phase_follows_the_policy_when_the_agent_is_killed_and_another_comes() {
+    each(["upload", "pause", "teaching, stop", "teaching, continue"], |phase| {
+        let mut cell = Cell::new("115200", 50);
+        cell.until("a held arm", is_held);
+        match phase {
+            "upload" => {
+                let words = ["traj", "run", &long_motion(&cell), "--when-gone", "stop"];
+                let run = cell.at(&words, "checked");
+                std::thread::sleep(IN_UPLOAD);
+                is_left(&cell, "stop");
+                let found = next(&mut cell);
+                run.ends_without_link();
+                assert_eq!((&found["of"], done(&found)), (&json!("upload"), "nothing moves any more"));
+                assert!(is_held(&cell.rests(REST)));
+            }
+            "pause" => {
+                let words = ["traj", "run", &cell.motion.clone(), "--when-gone", "stop"];
+                let run = cell.at(&words, "executing");
+                pause(&cell);
+                is_left(&cell, "stop");
+                let found = next(&mut cell);
+                run.ends_without_link();
+                assert!(done(&found).starts_with("a Stop was sent"), "{found}");
+                cell.until("Stop", |status| trajectory(status) == "Stop");
+            }
+            _ => {
+                let policy = phase.split(", ").last().expect("a policy");
+                let silent = Silent::come_for(&cell, policy, Duration::from_secs(40));
+                silent.ask("POST /api/teach", json!({ "on": true }));
+                cell.until("Teaching", is_taught);
+                is_left(&cell, policy);
+                let found = next(&mut cell);
+                assert_eq!((&found["of"], &found["by"]), (&json!("teaching"), &json!("cell 3")));
+                if policy == "continue" {
+                    assert_eq!(state(&cell.rests(REST)), "Teaching");
+                    cell.done(&["teach", "off"]);
+                }
+                cell.until("HoldPos", |status| state(status) == "HoldPos");
+            }
+        }
+        is_gone(&cell);
+    });
+}
+
+#[test]
+fn a_file_in_doubt_stops_what_moves_and_nothing_else() {
+    let mut cell = Cell::new("921600", 80);
+    let mut run = cell.run("continue");
+    cell.until("Execute", |status| trajectory(status) == "Execute");
+    is_left(&cell, "continue");
+    let path = cell.left().expect("it is there");
+    cell.kill_agent();
+    run.wait().expect("it ends");
+    std::fs::write(&path, "{\"version\": 1, \"pol").expect("a file");
+    let found = follow(&mut cell);
+    assert_eq!((&found["what"], &found["moves"]), (&json!("policy-in-doubt"), &json!(true)));
+    let status = cell.until("Stop", |status| !moves(status));
+    assert_eq!(trajectory(&status), "Stop", "{status}");
+    is_gone(&cell);
+    cell.kill_agent();
+    std::fs::write(&path, "").expect("a file");
+    let found = follow(&mut cell);
+    assert_eq!((&found["what"], &found["moves"]), (&json!("policy-in-doubt"), &json!(false)));
+    is_gone(&cell);
+    assert_eq!(trajectory(&cell.rests(REST)), "Stop");
+}

@@ -1,0 +1,148 @@
+//! The line: a pseudo-terminal, the controller at its other end, and what a UART at this rate does with what the agent hands over.
+use std::os::fd::OwnedFd;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use jtc_host::port::{SerialPort, line_time};
+use jtc_host::{Port, PortError};
+use jtc_wire::{ExecCommand, fixed};
+use rustix::fs::{Mode, OFlags};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+use crate::common::simulated;
+
+/// Rate of the line, Bd.
+pub const BAUD: u32 = 115_200;
+const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
+
+/// A Stop on the line.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    pub first_byte: Instant,
+    pub last_byte: Instant,
+    /// The silence ahead of it, where it is behind a frame that was abandoned.
+    pub gap: Option<Duration>,
+}
+
+/// What the agent has handed to the line.
+#[derive(Debug)]
+pub struct Seen {
+    /// When the line has carried everything.
+    free_at: Instant,
+    /// Bytes of a frame that have not come yet.
+    left: usize,
+    /// Most bytes that had been handed over and not been carried, at once.
+    pub queued_most: usize,
+    /// Bytes of frames since the last Stop.
+    pub since_stop: usize,
+    pub stops: Vec<Stop>,
+}
+
+impl Seen {
+    /// A frame is on its way, and not to its end.
+    pub fn is_in_a_frame(&self) -> bool {
+        self.left > 0
+    }
+
+    /// `began`, `ended`: when the bytes were being handed over.
+    fn take(&mut self, mut bytes: &[u8], began: Instant, ended: Instant) {
+        let queued = self.free_at.saturating_duration_since(began).as_secs_f64() * f64::from(BAUD) / 10.0;
+        self.queued_most = self.queued_most.max(queued as usize + bytes.len());
+        let begins = self.free_at.max(ended);
+        let silence = begins.saturating_duration_since(self.free_at);
+        self.free_at = begins + line_time(bytes.len(), Some(BAUD));
+        if let Some(before) = bytes.strip_suffix(&STOP) {
+            let gap = (self.left > before.len()).then_some(silence);
+            let first_byte = begins + line_time(before.len(), Some(BAUD));
+            self.stops.push(Stop { first_byte, last_byte: self.free_at, gap });
+            (self.left, self.since_stop) = (0, 0);
+            return;
+        }
+        self.since_stop += bytes.len();
+        while !bytes.is_empty() {
+            if self.left == 0 {
+                // Pieces of frames are no shorter than their heads.
+                self.left = usize::from(u16::from_be_bytes([bytes[2], bytes[3]]));
+            }
+            let taken = self.left.min(bytes.len());
+            self.left -= taken;
+            bytes = &bytes[taken..];
+        }
+    }
+}
+
+/// The agent's port, looked at.
+pub struct Watched {
+    port: SerialPort,
+    seen: Arc<Mutex<Seen>>,
+}
+
+/// What was seen of a line so far.
+#[derive(Clone)]
+pub struct Watch(Arc<Mutex<Seen>>);
+
+impl Watch {
+    pub fn look(&self) -> MutexGuard<'_, Seen> {
+        self.0.lock().expect("nobody panics with it")
+    }
+}
+
+/// A line with a controller.
+pub fn begin() -> (Watched, Watch) {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
+    grantpt(&master).and_then(|()| unlockpt(&master)).expect("it is granted");
+    let name = ptsname(&master, Vec::new()).expect("a name").into_string().expect("of letters");
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let slave = rustix::fs::open(&name, flags, Mode::empty()).expect("it is there");
+    let mut settings = tcgetattr(&slave).expect("its settings");
+    settings.make_raw();
+    tcsetattr(&slave, OptionalActions::Now, &settings).expect("raw mode");
+    let port = SerialPort::open(&name, BAUD).expect("it is a port");
+    std::thread::spawn(move || control(&master, &slave));
+    let seen = Seen { free_at: Instant::now(), left: 0, queued_most: 0, since_stop: 0, stops: Vec::new() };
+    let seen = Arc::new(Mutex::new(seen));
+    (Watched { port, seen: seen.clone() }, Watch(seen))
+}
+
+/// The controller's end, to the end of this program. `slave` is held: without a host it would be a hang-up.
+fn control(master: &OwnedFd, _slave: &OwnedFd) {
+    let flags = rustix::fs::fcntl_getfl(master).expect("flags");
+    rustix::fs::fcntl_setfl(master, flags | OFlags::NONBLOCK).expect("flags");
+    let mut controller = simulated(BAUD);
+    let mut buffer = [0; 4096];
+    loop {
+        while let Ok(n @ 1..) = rustix::io::read(master, &mut buffer) {
+            controller.write_all(&buffer[..n]).expect("it takes everything");
+        }
+        let n = controller.read(&mut buffer, Duration::from_millis(2)).expect("it is there");
+        if n > 0 {
+            rustix::io::write(master, &buffer[..n]).expect("there is room");
+        }
+    }
+}
+
+impl Port for Watched {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        self.port.read(buffer, timeout)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let began = Instant::now();
+        self.port.write_all(bytes)?;
+        self.seen.lock().expect("nobody panics with it").take(bytes, began, Instant::now());
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.port.baud()
+    }
+
+    fn name(&self) -> String {
+        self.port.name()
+    }
+}

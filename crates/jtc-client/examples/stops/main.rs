@@ -1,0 +1,30 @@
+//! How soon a Stop is on the line, one JSON object: `cargo run --release -p jtc-client --example stops [N]`, N Stops under each load.
+//!
+//! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller behind it. Whoever looks is in a process of its own.
+#[cfg(unix)]
+#[path = "../../tests/common/mod.rs"]
+mod common;
+#[cfg(unix)]
+mod crowd;
+#[cfg(unix)]
+mod line;
+#[cfg(unix)]
+mod measure;
+#[cfg(unix)]
+mod operator;
+
+#[cfg(unix)]
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    match words.as_slice() {
+        [what, address] if what == "crowd" => crowd::look(address),
+        [] => measure::print(200),
+        [n] => measure::print(n.parse().expect("how many Stops")),
+        _ => panic!("stops [N]"),
+    }
+}
+
+#[cfg(not(unix))]
+fn main() {
+    println!("{{}}");
+}

@@ -1,0 +1,116 @@
+//! Stops under each load, beside plain round trips to a server of the same library at the same time.
+use std::net::TcpListener;
+use std::time::{Duration, Instant};
+
+use serde_json::{Map, Value};
+use test_kit::http::Http;
+
+use crate::common::Served;
+use crate::crowd::Crowd;
+use crate::line::{self, Watch};
+use crate::operator::Operator;
+
+/// Between two Stops: the first has its record by then. And up to as much as this more, so that they come at any time.
+const BETWEEN: Duration = Duration::from_millis(220);
+const AT_ANY_TIME_US: u64 = 120_000;
+/// No Stop takes as long.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Bytes of an upload that are on their way before it is stopped.
+const UPLOADED: usize = 300;
+
+/// What was measured under one load, ms.
+#[derive(Default)]
+struct Samples {
+    /// From the request, before it connects, to the first and to the last byte of the Stop on the line.
+    first: Vec<f64>,
+    last: Vec<f64>,
+    /// From a request to its response, of a server that does nothing.
+    bare: Vec<f64>,
+    /// Silence behind an abandoned frame.
+    gaps: Vec<f64>,
+    queued_most: usize,
+}
+
+/// Measures, and prints what it has found.
+pub fn print(n: usize) {
+    let (port, watch) = line::begin();
+    let served = Served::start_on(port, None, &[]);
+    let bare = bare_server();
+    let operator = Operator::come(&served, &watch);
+    std::thread::sleep(Duration::from_secs(1));
+    let mut figures = Map::new();
+    let idle = measure("idle", n, &served, &bare, &watch, 0);
+    idle.put(&mut figures, "idle");
+    let crowd = Crowd::gather(served.address);
+    measure("viewers", n, &served, &bare, &watch, 0).put(&mut figures, "viewers");
+    operator.upload(true);
+    let upload = measure("upload", n, &served, &bare, &watch, UPLOADED);
+    upload.put(&mut figures, "upload");
+    let lowest = upload.gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    figures.insert("stop.upload_gap_ms".into(), lowest.into());
+    figures.insert("stop.upload_abandoned".into(), upload.gaps.len().into());
+    figures.insert("stop.upload_queued_bytes".into(), upload.queued_most.into());
+    figures.insert("stop.viewers_hz".into(), crowd.dismiss().into());
+    println!("{}", Value::Object(figures));
+}
+
+/// A server of the same library and settings that answers and does nothing else.
+fn bare_server() -> Http {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
+    let address = listener.local_addr().expect("it listens");
+    let router = axum::Router::new().route("/", axum::routing::post(async || "{}"));
+    std::thread::spawn(move || jtc_agent::serve::serve(router, listener, None, || false));
+    Http { address, operator: String::new() }
+}
+
+fn measure(what: &str, n: usize, served: &Served, bare: &Http, watch: &Watch, uploaded: usize) -> Samples {
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    let mut samples = Samples::default();
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    watch.look().queued_most = 0;
+    for _ in 0..n {
+        // xorshift64: when in the cycle of the statuses, and where in a frame.
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        std::thread::sleep(BETWEEN + Duration::from_micros(state % AT_ANY_TIME_US));
+        let asked = Instant::now();
+        assert_eq!(bare.get("POST /").0, 200);
+        samples.bare.push(ms(asked.elapsed()));
+        wait("an upload", || watch.look().since_stop >= uploaded);
+        let before = watch.look().stops.len();
+        let asked = Instant::now();
+        assert_eq!(served.get("POST /api/stop").0, 200);
+        wait("a Stop on the line", || watch.look().stops.len() > before);
+        let stop = watch.look().stops[before];
+        samples.first.push(ms(stop.first_byte.saturating_duration_since(asked)));
+        samples.last.push(ms(stop.last_byte.saturating_duration_since(asked)));
+        samples.gaps.extend(stop.gap.map(ms));
+    }
+    eprintln!("{what}: {n} Stops");
+    samples.queued_most = watch.look().queued_most;
+    samples
+}
+
+fn wait(what: &str, reached: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !reached() {
+        assert!(begun.elapsed() < PATIENCE, "{what} does not come");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+impl Samples {
+    fn put(&self, figures: &mut Map<String, Value>, load: &str) {
+        let kinds =
+            [("stop", "first", &self.first), ("stop", "last", &self.last), ("bare", "http", &self.bare)];
+        for (group, kind, samples) in kinds {
+            let mut sorted = samples.clone();
+            sorted.sort_by(f64::total_cmp);
+            let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+            for (name, share) in [("median", 0.5), ("99", 0.99), ("worst", 1.0)] {
+                figures.insert(format!("{group}.{load}_{kind}_{name}_ms"), at(share).into());
+            }
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The one who commands, and uploads one segment after the other.
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use jtc_client::{AgentPort, Options};
+use jtc_host::Port as _;
+use jtc_wire::{FRAME_MAX, RawPoint, fixed, trajectory};
+
+use crate::common::Served;
+use crate::line::Watch;
+
+/// Points of a segment: five seconds of the line.
+const POINTS: usize = 1600;
+/// A segment that is not on the line after this time will not be: it was stopped.
+const AGAIN: Duration = Duration::from_millis(30);
+
+/// Somebody who has the lease, until it is dropped.
+pub struct Operator {
+    uploads: Arc<AtomicBool>,
+    ended: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Operator {
+    pub fn come(served: &Served, watch: &Watch) -> Self {
+        let token = Some(served.tokens.operator.clone());
+        let options = Options { name: "anna".into(), token, ..Options::default() };
+        let mut port = AgentPort::open(&served.url(), &options).expect("it is let in");
+        port.write_all(&fixed::CLEAR_OCCURRED_ERRORS).expect("it is there");
+        let mut segment = vec![0; FRAME_MAX];
+        let n = trajectory(&mut segment, (0, 0, 9), 1, [RawPoint::default(); POINTS]).expect("it fits");
+        segment.truncate(n);
+        let (uploads, ended) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let (wanted, end, watch) = (uploads.clone(), ended.clone(), watch.clone());
+        let thread = std::thread::spawn(move || {
+            let (mut sent_at, mut buffer) = (Instant::now(), [0; 4096]);
+            while !end.load(Ordering::Relaxed) {
+                port.read(&mut buffer, Duration::from_millis(5)).expect("it is there");
+                let due = wanted.load(Ordering::Relaxed) && sent_at.elapsed() > AGAIN;
+                if due && !watch.look().is_in_a_frame() {
+                    port.write_all(&segment).expect("it is there");
+                    sent_at = Instant::now();
+                }
+            }
+        });
+        Self { uploads, ended, thread: Some(thread) }
+    }
+
+    pub fn upload(&self, wanted: bool) {
+        self.uploads.store(wanted, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Operator {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("nobody has disturbed it");
+        }
+    }
+}

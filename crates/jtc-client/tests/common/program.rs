@@ -1,0 +1,101 @@
+//! A program that commands by HTTP.
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::Served;
+
+/// Longest that is waited for anything.
+pub const WAIT: Duration = Duration::from_secs(60);
+
+/// A program that has the lease.
+pub struct Program<'a> {
+    pub served: &'a Served,
+    pub key: String,
+}
+
+impl<'a> Program<'a> {
+    pub fn new(served: &'a Served, name: &str, lasts_s: f64, policy: &str) -> Self {
+        let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
+        let (status, grant) = served.api("POST /api/lease", None, Some(body));
+        assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
+        Self { served, key: grant["key"].as_str().expect("a key").to_owned() }
+    }
+
+    pub fn ask(&self, request: &str, body: Option<Value>) -> (u16, Value) {
+        self.served.api(request, Some(&self.key), body)
+    }
+
+    /// Begins a job.
+    pub fn begin(&self, request: &str, body: Value) -> u64 {
+        let (status, job) = self.ask(request, Some(body));
+        assert_eq!(status, 202, "{job}");
+        job["number"].as_u64().expect("a number")
+    }
+
+    pub fn recover(&self) {
+        let job = self.begin("POST /api/recover", json!({ "defaults": true }));
+        let done = self.over(job);
+        assert_eq!(done["stage"], "finished", "{done}");
+    }
+
+    /// The job when it is over; the lease is renewed meanwhile.
+    pub fn over(&self, job: u64) -> Value {
+        over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
+    }
+}
+
+/// The job when it is over.
+pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
+    let end = Instant::now() + WAIT;
+    while Instant::now() < end {
+        let (status, job) = served.api(&format!("GET /api/jobs/{job}"), None, None);
+        assert_eq!(status, 200);
+        if job["stage"] != "running" {
+            return job;
+        }
+        meanwhile();
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    panic!("job {job} is not over");
+}
+
+/// Waits until an event of this kind came behind a number, and returns it with its number.
+pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
+    let (end, mut last) = (Instant::now() + WAIT, after);
+    while Instant::now() < end {
+        let (_, found) = served.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
+        for event in found["events"].as_array().expect("events") {
+            let number = event["number"].as_u64().expect("a number");
+            assert_eq!(number, last + 1, "none is left out");
+            last = number;
+            if event["event"]["kind"] == kind {
+                return (number, event["event"].clone());
+            }
+        }
+    }
+    panic!("no {kind} behind {after}");
+}
+
+/// A viewer, an operator without the lease and one who waits for it are refused.
+pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
+    let ask =
+        |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));
+    let (operator, viewer) = (&served.tokens.operator, &served.tokens.viewer);
+    for (token, key) in [(viewer, None), (operator, None), (operator, Some("x"))] {
+        let (status, error) = ask(token, key);
+        let helps = error["next"].as_str().is_some_and(|next| !next.is_empty());
+        assert!(status == 403 && helps, "{request}: {status} {error}");
+    }
+    let waits = json!({ "name": "bob", "ask": true });
+    let (_, grant) = served.api("POST /api/lease", None, Some(waits));
+    let (status, error) = ask(operator, grant["key"].as_str());
+    assert!(status == 409 && error["message"].as_str().is_some_and(|m| m.contains("anna")), "{error}");
+}
+
+/// Lines of the log of commands with this in what was commanded.
+pub fn logged(served: &Served, what: &str) -> Vec<Value> {
+    let text = std::fs::read_to_string(&served.log).expect("the log");
+    let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    lines.filter(|line| line["command"].as_str().is_some_and(|command| command.contains(what))).collect()
+}

@@ -1,0 +1,71 @@
+//! The flight recorder by HTTP: what it does, its log as a file, and beginning anew.
+mod common;
+
+use common::Served;
+use common::program::Program;
+use jtc_host::log::{Account, FlightLog};
+use jtc_host::recording::Recording;
+use serde_json::{Value, json};
+
+fn blocks(served: &Served) -> u64 {
+    let (status, log) = served.api_as(Some(&served.tokens.viewer), "GET /api/log/status", None, None);
+    assert_eq!((status, log["state"].as_str()), (200, Some("recording")), "{log}");
+    log["blocks"].as_u64().expect("a number")
+}
+
+#[test]
+fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_commands() {
+    let served = Served::start(460_800);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    anna.recover();
+    let before = blocks(&served);
+    let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0] }));
+    assert_eq!(anna.over(job)["stage"], "finished");
+    assert!(blocks(&served) > before, "it records");
+    // Two at once: one of them reads it, and the other is refused or reads it when that is over. Others are served meanwhile.
+    let viewer = served.tokens.viewer.clone();
+    let files = std::thread::scope(|scope| {
+        let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(&viewer), "GET /api/log")));
+        assert_eq!(served.get("POST /api/pause").0, 200);
+        assert_eq!(served.api("GET /api/info", None, None).0, 200);
+        both.map(|one| one.join().expect("an answer"))
+    });
+    assert!(files.iter().any(|(status, ..)| *status == 200), "{files:?}");
+    let refused = files.iter().filter(|(status, ..)| *status != 200);
+    for (status, _, body) in refused {
+        let error: Value = serde_json::from_slice(body).expect("JSON");
+        assert_eq!((*status, error["code"].as_str()), (409, Some("busy")), "{error}");
+    }
+    let (_, head, file) = files.iter().find(|(status, ..)| *status == 200).expect("one of them");
+    assert!(head.to_ascii_lowercase().contains("content-type: application/octet-stream"), "{head}");
+
+    // What `jtc log fetch` writes: a recording for every program, with a log that gives every tick again.
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().join("log.mcap");
+    std::fs::write(&path, file).expect("a file");
+    let samples = Recording::read(&path).expect("a recording").samples;
+    let account = Account::of(FlightLog::load(&path).expect("a log"), None, "the test");
+    assert!(account.replayed.difference.is_none() && account.replayed.same > 1000, "{:?}", account.story);
+    assert_eq!(samples.len(), account.replayed.ticks.len());
+    let said: Vec<&str> = account.story.events.iter().map(|event| event.text.as_str()).collect();
+    assert!(said.iter().any(|text| text.contains("HoldPos")), "{said:?}");
+
+    // Nobody else clears it.
+    for (token, key) in [(&served.tokens.viewer, None), (&served.tokens.operator, None)] {
+        assert_eq!(served.api_as(Some(token), "DELETE /api/log", key, None).0, 403);
+    }
+    assert_eq!(served.api_as(None, "DELETE /api/log", Some(&anna.key), None).0, 403);
+    assert_eq!(anna.ask("DELETE /api/log", None).0, 204);
+    let text = std::fs::read_to_string(&served.log).expect("the log of commands");
+    assert!(text.contains("\"clear log\""), "{text}");
+    let (_, _, file) = served.bytes_as(None, "GET /api/log");
+    std::fs::write(&path, &file).expect("a file");
+    if let Ok(log) = FlightLog::load(&path) {
+        let again = Account::of(log, None, "the test");
+        let last = account.replayed.ticks.last().map(|tick| tick.tick);
+        assert!(again.replayed.ticks.first().map(|tick| tick.tick) > last, "what was before is gone");
+    } else {
+        let error: Value = serde_json::from_slice(&file).expect("JSON");
+        assert_eq!(error["code"], "empty-log");
+    }
+}

@@ -8,140 +8,38 @@ status`, `jtc monitor` and `jtc traj stop` look and stop from elsewhere; the sec
 compares every answer with the description. Needs openapi-python-client and schemathesis.
 """
 
-import contextlib
-import importlib
 import json
-import math
-import os
-import pathlib
-import re
 import subprocess
-import sys
-import tempfile
 import time
 import urllib.request
 
-DESCRIPTION = pathlib.Path(__file__).parents[2] / "docs" / "openapi.json"
-SCRIPTS = pathlib.Path(sys.executable).parent
-SEED = 20261123
-PATIENCE_S = 60.0
+import served
 
-
-@contextlib.contextmanager
-def agent(jtc, directory):
-    """`jtc serve --sim`, with its own folders; its address and its operator's token."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("JTC_")}
-    environment |= {"XDG_STATE_HOME": str(directory / "state"), "XDG_RUNTIME_DIR": str(directory / "run")}
-    (directory / "run").mkdir(exist_ok=True)
-    command = [jtc, "serve", "--sim", "--listen", "127.0.0.1:0", "--json"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=directory)
-    try:
-        ready = json.loads(process.stdout.readline())
-        assert ready["simulated"] is True
-        token = re.search('^operator = "(.*)"', pathlib.Path(ready["token_file"]).read_text(), re.M)[1]
-        yield ready["url"], token, environment
-    finally:
-        process.terminate()
-        assert process.wait(20) == 0
-
-
-def generated(directory):
-    """The client that openapi-python-client makes of the description."""
-    command = [SCRIPTS / "openapi-python-client", "generate", "--path", DESCRIPTION, "--meta", "none"]
-    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"
-    subprocess.run(
-        [*command, "--output-path", directory / "arm_client", "--fail-on-warning"],
-        check=True,
-        env=os.environ | {"PATH": path},
-        stdout=subprocess.DEVNULL,
-    )
-    sys.path.insert(0, str(directory))
-    return importlib.import_module("arm_client")
-
-
-class Arm:
-    """The generated client, with what every request of it needs."""
-
-    def __init__(self, package, url, token):
-        client = importlib.import_module(f"{package.__name__}.client")
-        self.package = package
-        self.client = client.AuthenticatedClient(base_url=url, token=token, timeout=20)
-        self.key = None
-
-    def model(self, kind, **values):
-        return getattr(importlib.import_module(f"{self.package.__name__}.models"), kind).from_dict(values)
-
-    def ask(self, operation, **values):
-        """Status and parsed body of an operation."""
-        module = importlib.import_module(f"{self.package.__name__}.api.default.{operation}")
-        response = module.sync_detailed(client=self.client, **values)
-        return int(response.status_code), response.parsed
-
-    def command(self, operation, **values):
-        return self.ask(operation, lease_key=self.key, **values)
-
-    def take(self, name, **values):
-        status, grant = self.ask("take_lease", body=self.model("LeaseRequest", name=name, **values))
-        assert status == 200, grant
-        self.key = grant.key
-        return grant
-
-    def over(self, number):
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            status, job = self.ask("get_job", number=number)
-            assert status == 200
-            if job.stage != "running":
-                return job
-            if self.key:
-                self.command("renew_lease")
-            time.sleep(0.1)
-        raise AssertionError(f"job {number} is not over")
-
-    def event(self, kind, after=0):
-        """The first event of a kind behind a number: no number is left out."""
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            status, found = self.ask("get_events", after=after, wait_s=2.0)
-            assert status == 200 and not found.missed
-            for event in found.events:
-                assert event.number == after + 1, (event.number, after)
-                after = event.number
-                if event.event.kind == kind:
-                    return after, event.event
-        raise AssertionError(f"no {kind} behind {after}: {self.ask('list_jobs')}")
-
-
-def text(amplitude, seconds):
-    """All joints there and back, at rest at both ends, every 10 ms; made with nothing of ours."""
-    lines = ["t," + ",".join(f"q{j}" for j in range(1, 7))]
-    steps = round(100 * seconds)
-    for n in range(steps + 1):
-        x = n / steps
-        way = x - math.sin(2 * math.pi * x) / (2 * math.pi)
-        q = amplitude * 0.5 * (1 - math.cos(2 * math.pi * way))
-        lines.append(",".join(f"{v:.9f}" for v in [n / 100, q, -q, q, q, -q, q]))
-    return "\n".join(lines) + "\n"
+DESCRIPTION = "openapi.json"
+# Bd: a log is there within the time that a request of Schemathesis has.
+RATE = "3000000"
+# Of a recording in MCAP, first bytes and last.
+MCAP = b"\x89MCAP0\r\n"
 
 
 def programs(jtc, directory):
-    with agent(jtc, directory) as (url, token, environment):
-        package = generated(directory)
-        anna, bob = Arm(package, url, token), Arm(package, url, token)
+    with served.serving(jtc, directory) as agent:
+        package = served.generated(DESCRIPTION, directory, "arm_client")
+        anna, bob = served.Generated(package, agent), served.Generated(package, agent)
 
         def run_jtc(*words):
-            command = [jtc, *words, "--port", url]
-            return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+            command = [jtc, *words, "--port", agent.url]
+            return subprocess.run(command, capture_output=True, text=True, env=agent.environment, timeout=60)
 
         status, kept = anna.ask(
-            "put_trajectory", number=3, body=anna.model("TrajectoryRequest", name="sway", text=text(0.3, 6))
+            "put_trajectory", number=3, body=anna.model("TrajectoryRequest", name="sway", text=served.sway(0.3, 6))
         )
         assert (status, kept.points, kept.duration_s) == (200, 601, 6.0), kept
         assert anna.take("anna", lasts_s=30.0, policy="pause").held
         status, denied = bob.ask("take_lease", body=bob.model("LeaseRequest", name="bob"))
         assert status == 409 and "anna" in denied.message, denied
         status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
-        assert status == 202 and anna.over(job.number).stage == "finished"
+        assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
 
         # The whole of it: run, pause, slower, on, result.
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=3))
@@ -164,7 +62,7 @@ def programs(jtc, directory):
         assert seen.returncode == 0 and seen.stdout.count("\n") == 20, seen
         assert anna.command("set_speed", body=anna.model("SpeedObject", percent=60))[0] == 204
         assert anna.command("resume")[0] == 204
-        done = anna.over(job.number)
+        done = anna.over(job.number, renewing=True)
         assert (done.stage, done.runs) == ("finished", 1), done
         assert all(joint.max_error_mrad < 20 for joint in done.result.joints), done.result
         assert anna.command("set_speed", body=anna.model("SpeedObject", percent=100))[0] == 204
@@ -181,38 +79,78 @@ def programs(jtc, directory):
                 after = anna.event("executing", after)[0]
             time.sleep(0.5)
             assert stop()
-            assert anna.over(job.number).stage == "stopped"
+            assert anna.over(job.number, renewing=True).stage == "stopped"
         assert anna.command("release_lease")[0] == 204
         assert bob.take("bob").held
         print("generated client: lease, trajectory, run, pause, speed, resume, result, two stops, two terminals")
 
 
+def everything_else(jtc, directory):
+    """What a controller is given and asked for beside motions: settings, absent joints, flight recorder, arm, plans."""
+    # The log of the flight recorder takes its time on a slow line.
+    with served.serving(jtc, directory, "--baud", RATE) as agent:
+        anna = served.Generated(served.generated(DESCRIPTION, directory, "whole_arm_client"), agent)
+        assert anna.take("anna", lasts_s=60.0).held
+
+        def setting(name, joint=None):
+            status, settings = anna.ask("get_settings")
+            assert status == 200
+            (found,) = [one for one in settings if one.name == name and (getattr(one, "joint", None) or None) == joint]
+            return found
+
+        def change(*changes):
+            settings = [dict(zip(("name", "value", "joint"), one)) for one in changes]
+            return anna.command("set_settings", body=anna.model("SettingsRequest", settings=settings))
+
+        assert setting("stop_ms").high == 10000
+        assert change(("stop_ms", 400), ("velocity_max_rad_s", 1.25, 4))[0] == 204
+        assert setting("stop_ms").value == 400 and setting("velocity_max_rad_s", 4).value == 1.25
+        status, denied = change(("stop_ms", 300), ("ramp_ms", 1))
+        assert (status, denied.value, denied.limit) == (422, 1, 20) and setting("stop_ms").value == 400, denied
+
+        for absent in ([{"joint": 5, "position_rad": 0.25}], []):
+            assert anna.command("set_absent", body=anna.model("AbsentObject", absent=absent))[0] == 204
+            status, found = anna.ask("get_absent")
+            assert (status, found.to_dict()) == (200, {"absent": absent}), found
+
+        # The arm as it is, under another name, and as it was.
+        status, arm = anna.ask("get_arm")
+        assert status == 200 and arm.hash_ == anna.ask("get_info")[1].hash_
+        for text in (arm.text.replace('name = "avena"', 'name = "other"', 1), arm.text):
+            status, job = anna.command("put_arm", body=anna.model("ArmRequest", text=text, store=True))
+            assert status == 202, job
+            done = anna.over(job.number, renewing=True)
+            assert done.stage == "finished" and len(done.given.parts) == 3, done
+            assert anna.ask("get_arm")[1].text == text
+        status, denied = anna.command("put_arm", body=anna.model("ArmRequest", text=arm.text[:1000]))
+        assert status == 422 and anna.ask("get_arm")[1].text == arm.text, denied
+
+        # Planned, kept, run; and then in the flight recorder.
+        status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
+        assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
+        way = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.3,-0.2,0.2,0,0,0\n0,0,0,0,0,0.2\n"
+        keep = {"number": 9, "name": "bow"}
+        status, plan = anna.ask("plan", body=anna.model("PlanRequest", waypoints=way, blend_rad=0.02, keep=keep))
+        assert status == 200 and plan.kept.number == 9 and plan.binding and plan.waypoint_times_s[1] > 0, plan
+        status, job = anna.command("run", body=anna.model("RunRequest", trajectory=9))
+        assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
+        assert anna.ask("get_log_status")[1].state == "recording"
+        url = f"{agent.url}/api/log"
+        with urllib.request.urlopen(url, timeout=60) as response:
+            log = response.read()
+        # The magic of the format stands at both ends.
+        assert log.startswith(MCAP) and log.endswith(MCAP), log[:20]
+        path = directory / "log.mcap"
+        path.write_bytes(log)
+        replayed = subprocess.run([jtc, "--json", "log", "replay", path], capture_output=True, text=True, timeout=60)
+        assert replayed.returncode == 0 and json.loads(replayed.stdout)["replayed"] > 1000, replayed
+        assert anna.command("clear_log")[0] == 204
+        print("generated client: settings, absent joints, arm, plan, flight recorder")
+
+
 def requests_of_all_kinds(jtc, directory):
-    for lease in (False, True):
-        with agent(jtc, directory) as (url, token, _):
-            command = [SCRIPTS / "schemathesis", "run", DESCRIPTION, "--url", url, "--seed", str(SEED)]
-            command += ["-H", f"Authorization: Bearer {token}", "--max-examples", "30"]
-            command += ["--request-timeout", "15", "--phases", "examples,coverage,fuzzing"]
-            # A body of the right form may be no trajectory, and a payload no body.
-            command += ["--exclude-checks", "positive_data_acceptance"]
-            if lease:
-                # Whoever has the lease gets further; it cannot be tried without its key then.
-                body = json.dumps({"name": "everything", "lasts_s": 60.0}).encode()
-                headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
-                request = urllib.request.Request(f"{url}/api/lease", body, headers)
-                key = json.load(urllib.request.urlopen(request))["key"]
-                command += ["-H", f"Lease-Key: {key}", "--exclude-path", "/api/lease"]
-            done = subprocess.run(command, capture_output=True, text=True, cwd=directory)
-            assert done.returncode == 0, done.stdout[-6000:]
-            print(f"Schemathesis, seed {SEED}, lease {lease}:", re.search(r"\d+ generated, .*", done.stdout)[0])
-
-
-def main():
-    jtc = str(pathlib.Path(sys.argv[1]).resolve())
-    for check in (programs, requests_of_all_kinds):
-        with tempfile.TemporaryDirectory() as directory:
-            check(jtc, pathlib.Path(directory))
+    served.requests_of_all_kinds(DESCRIPTION, 30, lambda: served.serving(jtc, directory, "--baud", RATE), directory)
 
 
 if __name__ == "__main__":
-    main()
+    served.run(programs, everything_else, requests_of_all_kinds)

@@ -12,17 +12,11 @@ import asyncio
 import contextlib
 import json
 import math
-import os
 import pathlib
 import re
 import struct
-import subprocess
-import sys
-import tempfile
 import time
 import types
-import urllib.error
-import urllib.request
 import xml.etree.ElementTree
 
 import mcap_ros2.decoder
@@ -30,55 +24,16 @@ import prometheus_client.parser
 import websockets
 from websockets.asyncio.client import connect
 
+import served
+
 ORIGIN = "https://app.example"
 NAMES = ["foxglove.websocket.v1", "foxglove.sdk.v1"]
-PATIENCE_S = 60.0
 # One that never reads is put out after 10 s without a pong; the machine may be slow.
 GONE_S = 60.0
 
 
-@contextlib.contextmanager
-def agent(jtc, directory):
-    """`jtc serve --sim`, with its own folders; its address, its tokens, its log of commands."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("JTC_")}
-    environment |= {"XDG_STATE_HOME": str(directory / "state"), "XDG_RUNTIME_DIR": str(directory / "run")}
-    (directory / "run").mkdir()
-    log = directory / "commands.jsonl"
-    command = [jtc, "serve", "--sim", "--listen", "127.0.0.1:0", "--json", "--allow-origin", ORIGIN]
-    command += ["--command-log", log]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=directory)
-    try:
-        ready = json.loads(process.stdout.readline())
-        text = pathlib.Path(ready["token_file"]).read_text()
-        tokens = {role: re.search(f'^{role} = "(.*)"', text, re.M)[1] for role in ("operator", "viewer")}
-        yield ready["url"], tokens, log
-    finally:
-        process.terminate()
-        assert process.wait(20) == 0
-
-
-class Agent:
-    """Requests to an agent."""
-
-    def __init__(self, url, token):
-        self.url, self.token, self.key = url, token, None
-
-    def ask(self, method, path, body=None, **headers):
-        data = None if body is None else json.dumps(body).encode()
-        headers |= {"Content-Type": "application/json"} if data else {}
-        headers |= {"Authorization": f"Bearer {self.token}"} if self.token else {}
-        headers |= {"Lease-Key": self.key} if self.key else {}
-        request = urllib.request.Request(self.url + path, data, headers, method=method)
-        try:
-            with urllib.request.urlopen(request, timeout=20) as response:
-                return response.status, response.read().decode(), response.headers
-        except urllib.error.HTTPError as error:
-            return error.code, error.read().decode(), error.headers
-
-    def json(self, method, path, body=None):
-        status, text, _ = self.ask(method, path, body)
-        assert status < 300, (method, path, status, text)
-        return json.loads(text) if text else None
+class Agent(served.Requests):
+    """Requests to an agent, and its metrics."""
 
     def metrics(self):
         """Samples by name and labels, as Prometheus would keep them."""
@@ -94,26 +49,6 @@ class Agent:
                 assert sample.name.endswith("_total") == (family.type == "counter"), sample
                 found[key] = sample.value
         return found
-
-    def over(self, number):
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            job = self.json("GET", f"/api/jobs/{number}")
-            if job["stage"] != "running":
-                return job["stage"]
-            time.sleep(0.1)
-        raise AssertionError(f"job {number} is not over")
-
-
-def sway(amplitude, seconds):
-    """All joints there and back, at rest at both ends."""
-    lines = ["t," + ",".join(f"q{j}" for j in range(1, 7))]
-    steps = round(100 * seconds)
-    for n in range(steps + 1):
-        way = n / steps - math.sin(2 * math.pi * n / steps) / (2 * math.pi)
-        q = amplitude * 0.5 * (1 - math.cos(2 * math.pi * way))
-        lines.append(",".join(f"{v:.9f}" for v in [n / 100, q, -q, q, q, -q, q]))
-    return "\n".join(lines) + "\n"
 
 
 def states(metrics, name):
@@ -242,7 +177,7 @@ class Viewer:
         return self.answers[call]
 
     async def until(self, topic, wanted=lambda value: True):
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + served.PATIENCE_S
         while time.monotonic() < end:
             taken = await self.take()
             if taken and taken[0] == topic and wanted(taken[2]):
@@ -417,12 +352,13 @@ async def check_origins(arm, tokens, log):
     print("origins: an allowed one looks, and does nothing else; no token in the log")
 
 
-def main():
-    jtc = str(pathlib.Path(sys.argv[1]).resolve())
-    with tempfile.TemporaryDirectory() as directory, agent(jtc, pathlib.Path(directory)) as (url, tokens, log):
-        arm = Agent(url, tokens["operator"])
+def watched(jtc, directory):
+    """An agent at rest and in motion, and what its metrics count in between."""
+    log = directory / "commands.jsonl"
+    with served.serving(jtc, directory, "--allow-origin", ORIGIN, "--command-log", log) as agent:
+        arm = Agent(agent.url, agent.tokens["operator"])
         arm.key = arm.json("POST", "/api/lease", {"name": "reference", "lasts_s": 60})["key"]
-        arm.json("PUT", "/api/trajectories/3", {"name": "sway", "text": sway(0.3, 6)})
+        arm.json("PUT", "/api/trajectories/3", {"name": "sway", "text": served.sway(0.3, 6)})
         assert arm.over(arm.json("POST", "/api/recover", {"defaults": True})["number"]) == "finished"
         before = check_metrics(arm)
         asyncio.run(check_channels(arm))
@@ -440,8 +376,8 @@ def main():
         assert 5 <= answered <= more("jtc_frames_sent_total"), answered
         assert more("jtc_statuses_total") > 100 and more("jtc_put_outs_total") == 0
         print(f"metrics: {len(after)} samples, as /api/status, /api/info and this script have them")
-        asyncio.run(check_origins(arm, tokens, log))
+        asyncio.run(check_origins(arm, agent.tokens, log))
 
 
 if __name__ == "__main__":
-    main()
+    served.run(watched)

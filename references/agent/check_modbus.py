@@ -9,24 +9,18 @@ the speed, compares what it reads with /api/status, stops, loses its connection,
 import contextlib
 import json
 import math
-import os
-import pathlib
 import re
 import socket
 import struct
-import subprocess
-import sys
-import tempfile
 import threading
 import time
-import urllib.error
-import urllib.request
 
 from pymodbus.client import ModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-PAGE = pathlib.Path(__file__).parents[2] / "docs" / "modbus.md"
-PATIENCE_S = 60.0
+import served
+
+PAGE = served.DOCS / "modbus.md"
 # One code of each table that is used here, by the page's own numbers.
 DONE, SEQUENCE, VALUE, NO_TRAJECTORY, BUSY, HELD, STOPPED, COIL, NOT_READY = 1, 2, 3, 4, 5, 6, 7, 8, 9
 START, PAUSE, RESUME, STOP, TEACH, TEACH_OFF, PUMP_ON, PUMP_OFF, CLEAR, RECOVER, DEFAULTS, SPEED, RELEASE = range(1, 14)
@@ -116,7 +110,7 @@ class Plc:
         now = self.until(lambda now: now["acknowledged"] == sequence)
         return now["result"], now
 
-    def until(self, reached, patience=PATIENCE_S):
+    def until(self, reached, patience=served.PATIENCE_S):
         end = time.monotonic() + patience
         while time.monotonic() < end:
             now = self.inputs()
@@ -129,44 +123,30 @@ class Plc:
         return self.until(lambda now: now["job_stage"] != RUNNING)
 
 
-class Agent:
-    """`jtc serve --sim` with a Modbus server; it ends with the block."""
+class Agent(served.Requests):
+    """Requests to an agent, and the port of its Modbus server."""
 
-    def __init__(self, jtc, directory):
-        self.directory = directory
-        self.log = directory / "commands.jsonl"
-        environment = {**os.environ, "XDG_STATE_HOME": str(directory / "state"), "XDG_RUNTIME_DIR": str(directory)}
-        words = ["--json", "serve", "--sim", "--baud", "921600", "--listen", "127.0.0.1:0", "--modbus", "127.0.0.1:0"]
-        words += ["--trajectories", str(directory / "motions"), "--command-log", str(self.log)]
-        self.program = subprocess.Popen([jtc, *words], stdout=subprocess.PIPE, env=environment, text=True)
-        ready = json.loads(self.program.stdout.readline())
-        self.url, self.port = ready["url"], int(ready["modbus"].rsplit(":", 1)[1])
-        self.token = re.search(r'operator = "(.*)"', pathlib.Path(ready["token_file"]).read_text())[1]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        self.program.terminate()
-        code = self.program.wait(timeout=PATIENCE_S)
-        assert code == 0, f"the agent ended with {code}"
+    def __init__(self, agent):
+        super().__init__(agent.url, agent.tokens["operator"])
+        self.port = int(agent.ready["modbus"].rsplit(":", 1)[1])
 
     def http(self, request, body=None, key=None):
+        """Status and body of the answer."""
         method, path = request.split(" ")
-        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/json"}
-        headers |= {"Lease-Key": key} if key else {}
-        data = json.dumps(body).encode() if body is not None else None
-        asked = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
-        try:
-            with urllib.request.urlopen(asked, timeout=20) as response:
-                text = response.read()
-        except urllib.error.HTTPError as error:
-            return error.code, json.loads(error.read() or "null")
-        return response.status, json.loads(text) if text else None
+        status, text, _ = self.ask(method, path, body, **({"Lease-Key": key} if key else {}))
+        return status, json.loads(text) if text else None
 
     def joints(self):
         controller = self.http("GET /api/status")[1]["controller"]
         return controller, [joint["position_rad"] for joint in controller["joints"]]
+
+
+@contextlib.contextmanager
+def serving(jtc, directory):
+    """`jtc serve --sim` with a Modbus server."""
+    options = ["--baud", "921600", "--modbus", "127.0.0.1:0", "--trajectories", directory / "motions"]
+    with served.serving(jtc, directory, *options, "--command-log", directory / "commands.jsonl") as agent:
+        yield Agent(agent)
 
 
 def motion(seconds, amplitude=0.3):
@@ -412,7 +392,7 @@ def watchdog(agent, plc):
 
 def restarted(jtc, directory, sequence, motions):
     """An agent that was started again, and a PLC that goes on writing what it wrote before."""
-    with Agent(jtc, directory) as agent:
+    with serving(jtc, directory) as agent:
         plc = Plc(agent.port)
         if plc.inputs()["acknowledged"] != (sequence - 1) % 65536:
             assert not plc.write("watchdog_ms", 1000, 1, 3, 100, 1, 1, START, sequence).isError()
@@ -425,36 +405,35 @@ def restarted(jtc, directory, sequence, motions):
         plc.leave()
 
 
-def main():
-    jtc = sys.argv[1]
+def commanded(jtc, directory):
+    """A PLC at an agent from its start to its restart."""
     assert len(COILS) == 2 and len(HOLDINGS) == 8 and len(INPUTS) > 20, MAP
-    with tempfile.TemporaryDirectory() as directory:
-        directory = pathlib.Path(directory)
-        with Agent(jtc, directory) as agent:
-            assert agent.http("PUT /api/trajectories/3", {"name": "there and back", "text": motion(6)})[0] == 200
-            plc = Plc(agent.port)
-            first = plc.until(lambda now: plc.bits()["controller_there"])
-            assert first["simulated"] == 1 and first["port_lost"] == 0 and first["result"] == 0 and first["lease"] == 0, first
-            assert plc.command(START, trajectory=3)[0] == NOT_READY, "the controller has no arm yet"
-            recover(agent, plc)
-            runs(agent, plc)
-            repeats(agent, plc)
-            nonsense(agent, plc)
-            two(agent, plc)
-            held(agent, plc)
-            beats = plc.inputs()["heartbeat"]
-            took = watchdog(agent, plc)
-            last = Plc(agent.port, cyclic=False)
-            now = last.inputs()
-            assert now["heartbeat"] != beats
-            last.leave()
-        lines = [json.loads(line) for line in agent.log.read_text().splitlines()]
-        commands = [line for line in lines if line["what"] == "command"]
-        refused = sum(line["why_not"] is not None for line in commands)
-        halts = [line for line in lines if line["what"] == "halt" and line["by"].startswith("the PLC at 127.0.0.1")]
-        assert len(commands) > 30 and refused > 10 and len(halts) >= 4, (len(commands), refused, len(halts))
-        restarted(jtc, directory, now["acknowledged"], [3, 4])
+    with serving(jtc, directory) as agent:
+        assert agent.http("PUT /api/trajectories/3", {"name": "there and back", "text": motion(6)})[0] == 200
+        plc = Plc(agent.port)
+        first = plc.until(lambda now: plc.bits()["controller_there"])
+        assert first["simulated"] == 1 and first["port_lost"] == 0 and first["result"] == 0 and first["lease"] == 0, first
+        assert plc.command(START, trajectory=3)[0] == NOT_READY, "the controller has no arm yet"
+        recover(agent, plc)
+        runs(agent, plc)
+        repeats(agent, plc)
+        nonsense(agent, plc)
+        two(agent, plc)
+        held(agent, plc)
+        beats = plc.inputs()["heartbeat"]
+        took = watchdog(agent, plc)
+        last = Plc(agent.port, cyclic=False)
+        now = last.inputs()
+        assert now["heartbeat"] != beats
+        last.leave()
+    lines = [json.loads(line) for line in (directory / "commands.jsonl").read_text().splitlines()]
+    commands = [line for line in lines if line["what"] == "command"]
+    refused = sum(line["why_not"] is not None for line in commands)
+    halts = [line for line in lines if line["what"] == "halt" and line["by"].startswith("the PLC at 127.0.0.1")]
+    assert len(commands) > 30 and refused > 10 and len(halts) >= 4, (len(commands), refused, len(halts))
+    restarted(jtc, directory, now["acknowledged"], [3, 4])
     print(f"{len(commands)} commands by Modbus, {refused} of them refused; paused {took:.2f} s after the connection was lost")
 
 
-main()
+if __name__ == "__main__":
+    served.run(commanded)

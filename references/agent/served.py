@@ -1,0 +1,232 @@
+"""What the checks of the agents share: a served arm or chain that ends with its block, and clients that know its HTTP API alone.
+
+`run` calls the checks of a script and `serving` starts an agent for one. `Requests` reaches it by method and path, `Generated` by the client
+that openapi-python-client makes of the agent's description, and Schemathesis asks everything else (`requests_of_all_kinds`).
+"""
+
+import contextlib
+import dataclasses
+import importlib
+import json
+import math
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
+SCRIPTS = pathlib.Path(sys.executable).parent
+SEED = 20261123
+PATIENCE_S = 60.0
+# From the request to end until the agent has ended.
+ENDING_S = 20.0
+
+
+def run(*checks):
+    """Calls each check with the program that the script is given and an empty folder of its own."""
+    # A script that is terminated leaves its blocks, and so ends the agents that it has started.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
+    program = pathlib.Path(sys.argv[1]).resolve()
+    for check in checks:
+        with tempfile.TemporaryDirectory() as directory:
+            check(program, pathlib.Path(directory))
+
+
+@dataclasses.dataclass(frozen=True)
+class Agent:
+    """A running agent."""
+
+    # What it printed when it was ready.
+    ready: dict
+    # By role.
+    tokens: dict
+    # For commands that are to find the same folders.
+    environment: dict
+
+    @property
+    def url(self):
+        return self.ready["url"]
+
+
+@contextlib.contextmanager
+def serving(program, directory, *options):
+    """`PROGRAM serve --sim` on a free port, with its folders below `directory`: an `Agent`. It ends with the block, also one that fails."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("JTC_", "UCOM_"))}
+    for name in ("state", "run", "cache"):
+        (directory / name).mkdir(exist_ok=True)
+    environment |= {
+        "XDG_STATE_HOME": str(directory / "state"),
+        "XDG_RUNTIME_DIR": str(directory / "run"),
+        "XDG_CACHE_HOME": str(directory / "cache"),
+    }
+    command = [program, "--json", "serve", "--sim", "--listen", "127.0.0.1:0", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=directory) as process:
+        try:
+            ready = json.loads(process.stdout.readline())
+            assert ready["simulated"] is True, ready
+            text = pathlib.Path(ready["token_file"]).read_text()
+            yield Agent(ready, dict(re.findall(r'^(\w+) = "(.*)"', text, re.M)), environment)
+        finally:
+            process.terminate()
+            try:
+                ended = process.wait(ENDING_S)
+            finally:
+                # One that does not end is not left behind; for one that has ended this is nothing.
+                process.kill()
+            assert ended == 0, f"the agent ended with {ended}"
+
+
+def over(ask, number):
+    """The job of this number when it is over; `ask` returns its stage and the job as they are now."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        stage, job = ask()
+        if stage != "running":
+            return job
+        time.sleep(0.1)
+    raise AssertionError(f"job {number} is not over")
+
+
+class Requests:
+    """Requests to an agent by method and path, with a token and, once `key` is set, with a lease."""
+
+    def __init__(self, url, token):
+        self.url, self.token, self.key = url, token, None
+
+    def ask(self, method, path, body=None, **headers):
+        """Status, text and headers of the answer."""
+        data = None if body is None else json.dumps(body).encode()
+        headers |= {"Content-Type": "application/json"} if data else {}
+        headers |= {"Authorization": f"Bearer {self.token}"} if self.token else {}
+        headers |= {"Lease-Key": self.key} if self.key else {}
+        request = urllib.request.Request(self.url + path, data, headers, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=20) as response:
+                return response.status, response.read().decode(), response.headers
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode(), error.headers
+
+    def json(self, method, path, body=None):
+        """The body of the answer to a request that succeeds."""
+        status, text, _ = self.ask(method, path, body)
+        assert status < 300, (method, path, status, text)
+        return json.loads(text) if text else None
+
+    def over(self, number):
+        """The stage in which a job ends."""
+
+        def ask():
+            stage = self.json("GET", f"/api/jobs/{number}")["stage"]
+            return stage, stage
+
+        return over(ask, number)
+
+
+def generated(description, directory, name):
+    """The client that openapi-python-client makes of a description in docs/: a package of this name below `directory`, imported."""
+    command = [SCRIPTS / "openapi-python-client", "generate", "--path", DOCS / description, "--meta", "none"]
+    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run(
+        [*command, "--output-path", directory / name, "--fail-on-warning"],
+        check=True,
+        env=os.environ | {"PATH": path},
+        stdout=subprocess.DEVNULL,
+    )
+    sys.path.insert(0, str(directory))
+    return importlib.import_module(name)
+
+
+class Generated:
+    """A generated client with the operator's token, and what every request of it needs."""
+
+    def __init__(self, package, agent):
+        client = importlib.import_module(f"{package.__name__}.client")
+        self.package = package
+        self.client = client.AuthenticatedClient(base_url=agent.url, token=agent.tokens["operator"], timeout=20)
+        self.key = None
+
+    def model(self, kind, **values):
+        """A body of the description's kind."""
+        return getattr(importlib.import_module(f"{self.package.__name__}.models"), kind).from_dict(values)
+
+    def ask(self, operation, **values):
+        """Status and parsed body of an operation."""
+        module = importlib.import_module(f"{self.package.__name__}.api.default.{operation}")
+        response = module.sync_detailed(client=self.client, **values)
+        return int(response.status_code), response.parsed
+
+    def command(self, operation, **values):
+        """The same, with the key of the lease."""
+        return self.ask(operation, lease_key=self.key, **values)
+
+    def take(self, name, **values):
+        """Takes the lease, which later commands are sent with; the grant."""
+        status, grant = self.ask("take_lease", body=self.model("LeaseRequest", name=name, **values))
+        assert status == 200, grant
+        self.key = grant.key
+        return grant
+
+    def over(self, number, renewing=False):
+        """A job when it is over; a lease that is shorter than the job is to be renewed meanwhile."""
+
+        def ask():
+            status, job = self.ask("get_job", number=number)
+            assert status == 200
+            if renewing and self.key and job.stage == "running":
+                self.command("renew_lease")
+            return job.stage, job
+
+        return over(ask, number)
+
+    def event(self, kind, after=0):
+        """Number and contents of the first event of a kind behind a number: no number is left out."""
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            status, found = self.ask("get_events", after=after, wait_s=2.0)
+            assert status == 200 and not found.missed
+            for event in found.events:
+                assert event.number == after + 1, (event.number, after)
+                after = event.number
+                if event.event.kind == kind:
+                    return after, event.event
+        raise AssertionError(f"no {kind} behind {after}: {self.ask('list_jobs')}")
+
+
+def requests_of_all_kinds(description, examples, serve, directory):
+    """Requests that Schemathesis makes of a description in docs/, right and wrong, to an agent that `serve` starts, without a lease and with.
+
+    Every answer is compared with the description; `examples` is how many requests it makes up for each operation, at the most.
+    """
+    for lease in (False, True):
+        with serve() as agent:
+            token = agent.tokens["operator"]
+            command = [SCRIPTS / "schemathesis", "run", DOCS / description, "--url", agent.url, "--seed", str(SEED)]
+            command += ["-H", f"Authorization: Bearer {token}", "--max-examples", str(examples)]
+            command += ["--request-timeout", "15", "--phases", "examples,coverage,fuzzing"]
+            # A body of the right form may be refused for what it says: no trajectory, no image, no payload of a body, no board's number.
+            command += ["--exclude-checks", "positive_data_acceptance"]
+            if lease:
+                # Whoever has the lease gets further; it cannot be tried without its key then.
+                grant = Requests(agent.url, token).json("POST", "/api/lease", {"name": "everything", "lasts_s": 60.0})
+                command += ["-H", f"Lease-Key: {grant['key']}", "--exclude-path", "/api/lease"]
+            done = subprocess.run(command, capture_output=True, text=True, cwd=directory)
+            assert done.returncode == 0, done.stdout[-6000:]
+            print(f"Schemathesis, seed {SEED}, lease {lease}:", re.search(r"\d+ generated, .*", done.stdout)[0])
+
+
+def sway(amplitude, seconds):
+    """A trajectory's text: all joints there and back, at rest at both ends, every 10 ms; made with nothing of ours."""
+    lines = ["t," + ",".join(f"q{j}" for j in range(1, 7))]
+    steps = round(100 * seconds)
+    for n in range(steps + 1):
+        x = n / steps
+        way = x - math.sin(2 * math.pi * x) / (2 * math.pi)
+        q = amplitude * 0.5 * (1 - math.cos(2 * math.pi * way))
+        lines.append(",".join(f"{v:.9f}" for v in [n / 100, q, -q, q, q, -q, q]))
+    return "\n".join(lines) + "\n"

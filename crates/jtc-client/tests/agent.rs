@@ -9,6 +9,7 @@ use jtc_host::check::CheckOptions;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, PortError, Session, plan};
 use jtc_wire::{ControllerState, TrajectoryState};
+use test_kit::written::text_with;
 
 const WAIT: Duration = Duration::from_secs(30);
 
@@ -55,10 +56,8 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     drop(anna);
     std::thread::sleep(Duration::from_millis(200));
     bob.gripper(true).expect("nobody else commands");
-    let log = std::fs::read_to_string(&served.log).expect("the log of commands");
-    for words in ["\"joined\"", "anna", "\"denied\"", "TrajSetExecStatus", "\"lease\"", "\"left\""] {
-        assert!(log.contains(words), "{words} in {log}");
-    }
+    let words = ["\"joined\"", "anna", "\"denied\"", "TrajSetExecStatus", "\"lease\"", "\"left\""];
+    text_with(&served.log, &words);
 }
 
 #[test]

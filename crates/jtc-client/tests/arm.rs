@@ -8,6 +8,7 @@ use common::program::{Program, WAIT, event, is_for_the_one_who_commands};
 use jtc_host::Arm;
 use jtc_host::arm::AVENA_TOML;
 use serde_json::{Value, json};
+use test_kit::written::text_with;
 
 fn arm(served: &Served) -> (Arm, Value) {
     let (status, found) = served.api_as(Some(&served.tokens.viewer), "GET /api/arm", None, None);
@@ -84,6 +85,5 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
     let done = anna.over(job);
     assert_eq!((&done["stage"], &done["given"]["stored_number"]), (&json!("finished"), &json!(1)), "{done}");
     assert!(same(&arm(&served).0, &before));
-    let text = std::fs::read_to_string(&served.log).expect("the log of commands");
-    assert!(text.contains("\"arm bench two\"") && text.contains("\"arm avena, stored\""), "{text}");
+    text_with(&served.log, &["\"arm bench two\"", "\"arm avena, stored\""]);
 }

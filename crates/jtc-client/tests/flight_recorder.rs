@@ -6,6 +6,7 @@ use common::program::Program;
 use jtc_host::log::{Account, FlightLog};
 use jtc_host::recording::Recording;
 use serde_json::{Value, json};
+use test_kit::written::text_with;
 
 fn blocks(served: &Served) -> u64 {
     let (status, log) = served.api_as(Some(&served.tokens.viewer), "GET /api/log/status", None, None);
@@ -56,8 +57,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     }
     assert_eq!(served.api_as(None, "DELETE /api/log", Some(&anna.key), None).0, 403);
     assert_eq!(anna.ask("DELETE /api/log", None).0, 204);
-    let text = std::fs::read_to_string(&served.log).expect("the log of commands");
-    assert!(text.contains("\"clear log\""), "{text}");
+    text_with(&served.log, &["\"clear log\""]);
     let (_, _, file) = served.bytes_as(None, "GET /api/log");
     std::fs::write(&path, &file).expect("a file");
     if let Ok(log) = FlightLog::load(&path) {

@@ -6,6 +6,7 @@ pub mod clock;
 pub mod existing;
 pub mod http;
 pub mod page;
+pub mod written;
 
 use std::fs::read_dir;
 use std::path::{Path, PathBuf};

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use common::{Served, WAIT, frame};
 use serde_json::{Value, json};
+use test_kit::written::text_with;
 use ucom::Profile;
 use ucom_agent::Config;
 use ucom_host::session::Cache;
@@ -180,10 +181,7 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
     assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
     served.board_when(1, "stopped", |board| board["state"] == "exloader");
     served.run(&key, &[1]);
-    let log = std::fs::read_to_string(&served.log).expect("the log");
-    for what in ["\"halt\"", "\"command\":\"run\"", "\"joined\""] {
-        assert!(log.contains(what), "{what} in {log}");
-    }
+    text_with(&served.log, &["\"halt\"", "\"command\":\"run\"", "\"joined\""]);
 }
 
 /// A Stop ends what is under way before it moves anything.

@@ -2,6 +2,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use test_kit::written::text_with;
 
 use super::Served;
 
@@ -93,9 +94,9 @@ pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value)
     assert!(status == 409 && error["message"].as_str().is_some_and(|m| m.contains("anna")), "{error}");
 }
 
-/// Lines of the log of commands with this in what was commanded.
+/// Lines of the log of commands with this in what was commanded; there is one at least.
 pub fn logged(served: &Served, what: &str) -> Vec<Value> {
-    let text = std::fs::read_to_string(&served.log).expect("the log");
+    let text = text_with(&served.log, &[what]);
     let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
     lines.filter(|line| line["command"].as_str().is_some_and(|command| command.contains(what))).collect()
 }

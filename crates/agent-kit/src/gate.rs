@@ -16,6 +16,7 @@ use crate::access::{self, Access, Entry, Refusal, Role, looks};
 use crate::api::Problem;
 use crate::lease::key_of;
 use crate::log::CommandLog;
+use crate::problem::Denial;
 
 /// Longest name of a client.
 const NAME_MAX: usize = 64;
@@ -145,7 +146,12 @@ pub async fn let_in(
     match gate.access.enter(&asked) {
         Ok(Entry { role, looks_only }) => {
             request.extensions_mut().insert(Caller { role, looks_only, peer });
+            let command = (!request.method().is_safe()).then(|| line_of(&request));
             let response = next.run(request).await;
+            if let Some((asked, Denial { code, why })) = command.zip(response.extensions().get()) {
+                let facts = json!({ "from": peer.to_string(), "asked": asked, "code": code, "why": why });
+                gate.note("denied", facts);
+            }
             let mut response = if looks_only { may_read(response, origin) } else { response };
             let headers = response.headers_mut();
             headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -162,6 +168,11 @@ pub async fn let_in(
             refusal.into_response()
         }
     }
+}
+
+/// What is asked for, without what may be behind the question mark.
+fn line_of(request: &Request<Body>) -> String {
+    format!("{} {}", request.method(), request.uri().path())
 }
 
 /// A page of this origin may read it.

@@ -5,17 +5,20 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread::JoinHandle;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
 /// Lines that may wait for a slow disk.
 const WAITING_MAX: usize = 4096;
+/// How long the end of a program waits until its last lines are written: a disk that hangs must not keep it.
+const LAST_LINES: Duration = Duration::from_secs(3);
 
 /// A file with one JSON object a line, written by a thread of its own: a Stop waits for no disk.
 pub struct CommandLog {
     lines: Option<SyncSender<Value>>,
-    writer: Option<JoinHandle<()>>,
+    /// Ends when all lines are written.
+    written: Receiver<()>,
     /// Lines that wait for the disk.
     waiting: Arc<AtomicUsize>,
     /// Lines that found no place since the last that did.
@@ -40,7 +43,7 @@ impl CommandLog {
         let Some(path) = path else {
             return Ok(Self {
                 lines: None,
-                writer: None,
+                written: sync_channel(0).1,
                 waiting: Arc::default(),
                 lost: 0,
                 lost_in_all: 0,
@@ -54,8 +57,12 @@ impl CommandLog {
         let (lines, incoming) = sync_channel(WAITING_MAX);
         let (waiting, unwritten) = (Arc::<AtomicUsize>::default(), Arc::<AtomicU64>::default());
         let (done, missing) = (waiting.clone(), unwritten.clone());
-        let writer = std::thread::spawn(move || write(file, &incoming, &done, &missing, failed));
-        Self { lines: Some(lines), writer: Some(writer), waiting, lost: 0, lost_in_all: 0, unwritten }
+        let (writes, written) = sync_channel(0);
+        std::thread::spawn(move || {
+            write(file, &incoming, &done, &missing, failed);
+            drop::<SyncSender<()>>(writes);
+        });
+        Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten }
     }
 
     /// Writes a line: what happened, and what is to be known of it. Never waits.
@@ -91,10 +98,8 @@ impl CommandLog {
 impl Drop for CommandLog {
     fn drop(&mut self) {
         self.lines = None;
-        if let Some(writer) = self.writer.take() {
-            // A panic of that thread has been printed.
-            drop(writer.join());
-        }
+        // Nothing is ever sent: it ends with the thread that writes, also where that panicked, or is left behind.
+        let _ = self.written.recv_timeout(LAST_LINES);
     }
 }
 
@@ -179,6 +184,29 @@ mod tests {
         }
     }
 
+    /// A disk that hangs keeps the end of a program for a moment, not for ever.
+    #[test]
+    fn a_disk_that_hangs_keeps_nobody() {
+        struct Hung(Receiver<()>);
+        impl io::Write for Hung {
+            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+                // Until the test is over.
+                self.0.recv().unwrap_or_default();
+                Ok(bytes.len())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let (hangs, until) = sync_channel(0);
+        let mut log = CommandLog::on(Hung(until), |_| {});
+        log.write("sent", json!({}));
+        // It comes back at all.
+        drop(log);
+        drop::<SyncSender<()>>(hangs);
+    }
+
     /// However full the disk is when: it is reported once for each time, lines are whole but for the one that broke off, and the next one
     /// names how many are missing.
     #[test]
@@ -200,10 +228,8 @@ mod tests {
             // The last line may be at the disk still: three more are refused for certain, or taken after it.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
-            log.writer.take().map(|writer| {
-                log.lines = None;
-                writer.join()
-            });
+            log.lines = None;
+            log.written.recv().unwrap_or_default();
             let text = disk.with(|(_, taken)| String::from_utf8(taken.clone()).expect("text"));
             let whole: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             let lost = log.lost_in_all();

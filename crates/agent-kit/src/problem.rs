@@ -115,8 +115,18 @@ impl<F: Facts> From<Problem> for ProblemWith<F> {
 
 impl<F: Serialize> IntoResponse for ProblemWith<F> {
     fn into_response(self) -> Response {
-        (self.status, Json(self)).into_response()
+        let denial = Denial { code: self.code, why: self.message.clone() };
+        let mut response = (self.status, Json(self)).into_response();
+        response.extensions_mut().insert(denial);
+        response
     }
+}
+
+/// A response is a [`ProblemWith`]: for whoever writes down what was not done.
+#[derive(Clone, Debug)]
+pub(crate) struct Denial {
+    pub code: &'static str,
+    pub why: Box<str>,
 }
 
 impl<F: PartialSchema> PartialSchema for ProblemWith<F> {

@@ -72,3 +72,21 @@ fn a_lapse_its_stop_and_what_became_of_jobs_are_in_the_log() {
     line(&served, "who commanded", lease(json!("anna")));
     line(&served, "lapse", lease(Value::Null));
 }
+
+/// Who may not is in the log as well as who did, with what was asked for and why it was not done; who only asks is not.
+#[test]
+fn what_was_denied_is_in_the_log() {
+    let (served, key) = Served::numbered(1);
+    let (_, error) = served.api("POST /api/run", None, Some(json!({})));
+    let denied = |asked: &'static str| move |line: &Value| line["what"] == "denied" && line["asked"] == asked;
+    let found = line(&served, "denial without a lease", denied("POST /api/run"));
+    assert_eq!((&found["why"], &found["code"]), (&error["message"], &json!("no-lease")), "{found}");
+    assert!(found["from"].as_str().is_some_and(|from| from.starts_with("127.0.0.1:")), "{found}");
+    assert_eq!(served.api("POST /api/boards/77/start", Some(&key), None).0, 422);
+    line(&served, "denial of a board", denied("POST /api/boards/77/start"));
+    assert_eq!(served.api("GET /api/boards/77", None, None).0, 404);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    line(&served, "end", |line| line["what"] == "left");
+    let log = std::fs::read_to_string(&served.log).expect("the log");
+    assert!(!log.contains("GET /api/boards/77"), "{log}");
+}

@@ -281,6 +281,23 @@ fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     assert_eq!(again["stage"], "finished", "{again}");
 }
 
+/// Inputs of a board that runs are repeated, and one alone needs no answer. A board without power takes none.
+#[test]
+fn d34_an_input_of_a_board_without_power_is_no_success() {
+    let (served, key) = Served::numbered(1);
+    served.run(&key, &[1]);
+    let first = served.board(1)["offers"]["inputs"][0].as_str().expect("a name").to_owned();
+    let input = format!("PUT /api/boards/1/inputs/{}", first.split(' ').next().unwrap_or_default());
+    let set = || served.api(&input, Some(&key), Some(json!({ "value": 7 })));
+    let (status, error) = set();
+    assert_eq!(status, 200, "{error}");
+    served.chain.fault("power-loss board=1 for_s=60");
+    // Its last outputs are as new as those of a board that runs, for half a second.
+    std::thread::sleep(Duration::from_millis(600));
+    let (status, error) = set();
+    assert_eq!(status, 409, "{error}");
+}
+
 /// Who commands does not go while something begins for it: its outputs would be enabled later, with nobody there.
 #[test]
 fn the_lease_is_not_let_go_while_a_run_begins() {

@@ -148,9 +148,9 @@ fn set(
     note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = hands.driver.now_us();
     let boards = hands.driver.master.boards();
-    // Of a board that runs inputs are repeated: one that is lost is followed by others.
-    let runs =
-        hands.driver.master.is_master() && boards.get(board).is_some_and(|board| board.running(now_us));
+    // Of a board that runs inputs are repeated: one that is lost is followed by others. One without power does not run.
+    let runs = hands.driver.master.repeats_inputs(board)
+        && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
     if !quick {
         become_master(&mut hands.driver, board, false)?;

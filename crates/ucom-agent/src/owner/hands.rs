@@ -9,7 +9,7 @@ use host_kit::{Diagnose as _, ErrorKind};
 use ucom::Status;
 use ucom_host::files::SignalTable;
 use ucom_host::master::Request;
-use ucom_host::session::{Cache, CleanupList, Driver, Followed, Known, Link, SessionError};
+use ucom_host::session::{Cache, Driver, Followed, Known, Link, SessionError};
 
 use super::Config;
 use super::operator::{Hand, Local};
@@ -37,10 +37,10 @@ pub(crate) struct Hands {
 impl Hands {
     /// Those of a session on this link.
     pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
-        let Config { profile, signals, cache } = config;
+        let Config { profile, signals, cache, cleanup } = config;
         let local = Rc::default();
         let hand = Hand { shared: shared.clone(), local: Rc::clone(&local) };
-        let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
+        let driver = Driver::new(profile, link, Box::new(hand), cleanup);
         Self { driver, cache, signals, shared, local }
     }
 

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 
 use ucom::Profile;
 use ucom_host::files::SignalTable;
-use ucom_host::session::{Cache, Link, SessionError};
+use ucom_host::session::{Cache, CleanupList, Link, SessionError};
 
 pub(crate) use ask::fault;
 pub(crate) use hands::Hands;
@@ -28,6 +28,8 @@ pub struct Config {
     pub signals: SignalTable,
     /// Where names are remembered.
     pub cache: Cache,
+    /// What would be left undone if the process ended now, for those who end it.
+    pub cleanup: CleanupList,
 }
 
 /// The thread that owns a bus.

@@ -36,9 +36,13 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
             .hint("name one with --token-file FILE")
     })?;
-    let config =
-        Config { profile: link.profile()?, signals: link.signal_table()?, cache: args.cache.cache() };
-    let stop = listen(&CleanupList::default())?;
+    let config = Config {
+        profile: link.profile()?,
+        signals: link.signal_table()?,
+        cache: args.cache.cache(),
+        cleanup: CleanupList::default(),
+    };
+    let stop = listen(&config.cleanup)?;
     let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))

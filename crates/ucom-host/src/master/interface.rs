@@ -207,6 +207,11 @@ impl Master {
         lock(&self.core).descriptions.insert(key, description);
     }
 
+    /// Whether the inputs of a board are sent again and again: one that is lost is followed by others (D-34).
+    pub fn repeats_inputs(&self, board: u8) -> bool {
+        lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
+    }
+
     /// Inputs of a board as last set, or as it wants them first; `None`: neither is known since its application started.
     pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
         lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()

@@ -107,10 +107,15 @@ impl Board {
         self.info.map(|info| info.status)
     }
 
+    /// Whether it sends its outputs: its control loop runs now, whatever was last answered.
+    pub fn sends_outputs(&self, now: u64) -> bool {
+        self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
+    }
+
     /// Whether the control loop runs, by what was last received.
     pub fn running(&self, now: u64) -> bool {
-        let so = self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000);
-        so || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
+        self.sends_outputs(now)
+            || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
     /// A piece of a text of its own; the text when it is whole. `passed_us` is the time that has passed between frames.

@@ -305,7 +305,7 @@ impl Stage<'_> {
         };
         let leg = Leg::run(session, checked, phase, operator, &mut record)?;
         if let (Some(reel), Some(last)) = (reel, leg.samples.last()) {
-            reel.until_s = last.time_s;
+            reel.until_s = last.time_s + 1e-6;
         }
         Ok(leg)
     }

@@ -31,7 +31,7 @@ pub struct Reel {
     pub tape: Option<Tape>,
     /// When its first motion began, on the clock of the session.
     pub start: Duration,
-    /// Time of its last sample, s. The next motion's come behind it also where the controller's time runs ahead of ours, as that of a
+    /// Just behind its last sample, s. The next motion's come behind it also where the controller's time runs ahead of ours, as that of a
     /// simulator does that is faster than time.
     pub until_s: f64,
 }

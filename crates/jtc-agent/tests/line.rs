@@ -80,7 +80,10 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
+        // A frame that a system has torn leaves more than one bad record, and a Stop that may be meant by one is sent again: each comes whole.
+        let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
+        prop_assert!(stops >= 1);
+        prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
         // And one that is just being over.
         prop_assert!(board.queued_most <= 256 + 1, "{}", board.queued_most);
     }

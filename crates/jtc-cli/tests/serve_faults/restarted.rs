@@ -6,16 +6,16 @@ use serde_json::{Value, json};
 use crate::cell::{Cell, WAIT, moves, trajectory};
 use crate::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// The file is there before anybody kills the agent: it is written by a thread of its own.
-fn is_left(cell: &Cell, policy: &str) {
+/// The file is there before anybody kills the agent, and says what moves: it is written by a thread of its own.
+fn is_left(cell: &Cell, policy: &str, what: &str) {
     let end = Instant::now() + WAIT;
     loop {
         let text = cell.left().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
         let left: Value = serde_json::from_str(&text).unwrap_or_default();
-        if left["policy"] == policy {
+        if left["policy"] == policy && left["what"] == what {
             return;
         }
-        assert!(Instant::now() < end, "{policy}: {text}");
+        assert!(Instant::now() < end, "{policy} of {what}: {text}");
     }
 }
 
@@ -63,7 +63,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let mut cell = Cell::new("921600", 80);
         let mut run = cell.run(policy);
         cell.until("Execute", |status| trajectory(status) == "Execute");
-        is_left(&cell, policy);
+        is_left(&cell, policy, "motion");
         let found = next(&mut cell);
         run.wait().expect("it ends");
         assert_eq!(
@@ -84,7 +84,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
             // It can be gone on with: that is left to the next one, too.
-            is_left(&cell, policy);
+            is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "it stays paused");
             assert_eq!(trajectory(&cell.rests(REST)), "Pause");
@@ -111,7 +111,7 @@ fn each_other_phase_follows_the_policy_when_the_agent_is_killed_and_another_come
                 let words = ["traj", "run", &long_motion(&cell), "--when-gone", "stop"];
                 let run = cell.at(&words, "checked");
                 std::thread::sleep(IN_UPLOAD);
-                is_left(&cell, "stop");
+                is_left(&cell, "stop", "upload");
                 let found = next(&mut cell);
                 run.ends_without_link();
                 assert_eq!((&found["of"], done(&found)), (&json!("upload"), "nothing moves any more"));
@@ -121,7 +121,7 @@ fn each_other_phase_follows_the_policy_when_the_agent_is_killed_and_another_come
                 let words = ["traj", "run", &cell.motion.clone(), "--when-gone", "stop"];
                 let run = cell.at(&words, "executing");
                 pause(&cell);
-                is_left(&cell, "stop");
+                is_left(&cell, "stop", "motion");
                 let found = next(&mut cell);
                 run.ends_without_link();
                 assert!(done(&found).starts_with("a Stop was sent"), "{found}");
@@ -132,7 +132,7 @@ fn each_other_phase_follows_the_policy_when_the_agent_is_killed_and_another_come
                 let silent = Silent::come_for(&cell, policy, Duration::from_secs(40));
                 silent.ask("POST /api/teach", json!({ "on": true }));
                 cell.until("Teaching", is_taught);
-                is_left(&cell, policy);
+                is_left(&cell, policy, "teaching");
                 let found = next(&mut cell);
                 assert_eq!((&found["of"], &found["by"]), (&json!("teaching"), &json!("cell 3")));
                 if policy == "continue" {
@@ -151,7 +151,7 @@ fn a_file_in_doubt_stops_what_moves_and_nothing_else() {
     let mut cell = Cell::new("921600", 80);
     let mut run = cell.run("continue");
     cell.until("Execute", |status| trajectory(status) == "Execute");
-    is_left(&cell, "continue");
+    is_left(&cell, "continue", "motion");
     let path = cell.left().expect("it is there");
     cell.kill_agent();
     run.wait().expect("it ends");

@@ -84,7 +84,8 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
     let value = sim.json(&words, 0);
     let executed = value["verdict"]["duration_s"].as_f64().unwrap();
-    assert!((2.4..8.0).contains(&executed), "{executed} s");
+    // 2.4 s; the time of a measured end is known to a tenth of a second.
+    assert!((2.3..8.0).contains(&executed), "{executed} s");
     let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }

@@ -71,9 +71,13 @@ def programs(jtc, directory):
         for stop in [lambda: bob.ask("stop")[0] == 200, lambda: run_jtc("traj", "stop").returncode == 0]:
             # What somebody else has stopped is not begun again for three seconds.
             time.sleep(3.2)
-            after = anna.ask("get_status")[1].last_event
+            shown = anna.ask("get_status")[1]
+            after = shown.last_event
             request = anna.model("RunRequest", trajectory=3, approach=True, repeat=5)
-            status, job = anna.command("run", body=request)
+            # What was asked for before a Stop moves nothing, however late it comes.
+            status, denied = anna.command("run", body=request, asked_after=shown.last_halt - 1)
+            assert status == 409 and denied.code == "denied", denied
+            status, job = anna.command("run", body=request, asked_after=shown.last_halt)
             assert status == 202, job
             while anna.event("executing", after)[1].phase == "approach":
                 after = anna.event("executing", after)[0]

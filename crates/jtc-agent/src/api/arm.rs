@@ -1,5 +1,5 @@
 //! The arm of the controller as one thing: read as an arm file, and given whole.
-use agent_kit::api::Refusals;
+use agent_kit::api::{Asked, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use super::body::read;
 use super::error::Denials;
+use super::lease::AskedAfter;
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Given, Task, give};
@@ -105,19 +106,20 @@ pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, E
     put,
     path = "/api/arm",
     operation_id = "put_arm",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = ArmRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn put_arm(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     // Nobody else's text is read.
     agent.commander(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
-    let (commander, turn) = agent.mover(&asker)?;
+    let (commander, turn) = agent.mover(&asker, after)?;
     let what = format!("arm {}{}", plain(&arm.name), if store { ", stored" } else { "" });
     let hash = arm.hash().ok().flatten().map(in_words);
     let give = move |task: &Task<'_>, session: &mut Session<ClientPort>| give(task, session, &arm, store);

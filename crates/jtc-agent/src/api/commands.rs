@@ -2,7 +2,7 @@
 use std::borrow::Cow;
 use std::time::Duration;
 
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Asked, Body, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -15,6 +15,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
+use super::lease::AskedAfter;
 use super::objects::PayloadObject;
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
@@ -82,6 +83,7 @@ impl Agent {
     async fn motion<T, E>(
         &self,
         asker: &Asker,
+        after: AskedAfter,
         what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
     ) -> Result<T, ErrorObject>
@@ -89,7 +91,7 @@ impl Agent {
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let (commander, turn) = self.mover(asker)?;
+        let (commander, turn) = self.mover(asker, after)?;
         self.act(&commander, turn, what, act).await
     }
 
@@ -131,10 +133,14 @@ impl Agent {
 #[utoipa::path(
     post,
     path = "/api/resume",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     responses((status = 204, description = "The motion goes on, or will in a moment"), Refusals, Denials)
 )]
-pub(super) async fn resume(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+pub(super) async fn resume(
+    State(agent): State<Agent>,
+    asker: Asker,
+    Asked(after): Asked<AskedAfter>,
+) -> Result<StatusCode, ErrorObject> {
     let commander = agent.commander(&asker)?;
     if commander.is_moving() {
         // A motion that somebody stopped before it began is not what is gone on with.
@@ -142,14 +148,14 @@ pub(super) async fn resume(State(agent): State<Agent>, asker: Asker) -> Result<S
             line.could_ask(commander.client, now)?;
             match line.status() {
                 Some((_, status)) if status.trajectory != TrajectoryState::Pause => Err(not_paused(status)),
-                _ => Ok(line.ask_to_move(commander.client, line.last_halt(), now)?),
+                _ => Ok(line.ask_to_move(commander.client, after.halt(line), now)?),
             }
         })?;
         if let Some(done) = commander.wish(Flow::Resume).await {
             return done.map(|()| StatusCode::NO_CONTENT);
         }
     }
-    agent.motion(&asker, "resume", Session::resume).await?;
+    agent.motion(&asker, after, "resume", Session::resume).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -191,18 +197,19 @@ pub(super) async fn speed(
 #[utoipa::path(
     post,
     path = "/api/jog",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = JogRequest,
     responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
 )]
 pub(super) async fn jog(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
 ) -> Result<StatusCode, ErrorObject> {
     let commander = agent.commander(&asker)?;
     let turn = commander.turn()?;
-    agent.line.with(|line, now| line.ask_to_jog(commander.client, line.last_halt(), now))?;
+    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.halt(line), now))?;
     agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -211,20 +218,21 @@ pub(super) async fn jog(
 #[utoipa::path(
     post,
     path = "/api/teach",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = Switch,
     responses((status = 204, description = "Teaching has begun, or ended"), Refusals, Denials)
 )]
 pub(super) async fn teach(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
     if on {
         let commander = agent.commander(&asker)?;
         let (line, client) = (agent.line.clone(), commander.client);
         let halted = move || line.with(|line, _| line.is_halted(client));
-        agent.motion(&asker, "teach", move |session| session.teach_until(halted)).await?;
+        agent.motion(&asker, after, "teach", move |session| session.teach_until(halted)).await?;
     } else {
         agent.command(&asker, "teach", |session| session.teach(false)).await?;
     }
@@ -304,16 +312,17 @@ pub(super) fn body(payload: PayloadObject) -> Result<Payload, ErrorObject> {
     post,
     path = "/api/recover",
     operation_id = "recover",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = RecoverRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_recover(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     Body(RecoverRequest { defaults }): Body<RecoverRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let (commander, turn) = agent.mover(&asker)?;
+    let (commander, turn) = agent.mover(&asker, after)?;
     let recover = move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, defaults);
     let job = agent.jobs.begin(&commander, turn, "recover".into(), recover)?;
     Ok((StatusCode::ACCEPTED, Json(job.into())))

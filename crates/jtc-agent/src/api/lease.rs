@@ -10,12 +10,12 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::{Extension, Json};
 use serde_json::json;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::{Commander, Turn, Unable};
-use crate::line::{Denied, Introduction, Policy};
+use crate::line::{Denied, Introduction, Policy, SharedLine};
 
 /// Who wants to command.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -48,6 +48,23 @@ pub struct LeaseGrant {
     pub policy: Policy,
 }
 
+/// What the client knew when it asked for what may move the arm.
+#[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct AskedAfter {
+    /// `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
+    /// request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+    asked_after: Option<u64>,
+}
+
+impl AskedAfter {
+    /// The last halt that whoever asks knows of.
+    pub fn halt(self, line: &SharedLine) -> u64 {
+        self.asked_after.unwrap_or_else(|| line.last_halt())
+    }
+}
+
 impl Agent {
     /// The client that asks with a key, with its lease renewed: it commands, or it is an error.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, ErrorObject> {
@@ -59,10 +76,14 @@ impl Agent {
 
     /// The same, for what may move the arm: nothing that was asked for before this moves it any more where somebody has stopped it, and
     /// nothing at all for three seconds then. The turn is taken first: what still waits for its own is not let through by this.
-    pub(super) fn mover(&self, asker: &Asker) -> Result<(Arc<Commander>, Turn), ErrorObject> {
+    pub(super) fn mover(
+        &self,
+        asker: &Asker,
+        after: AskedAfter,
+    ) -> Result<(Arc<Commander>, Turn), ErrorObject> {
         let commander = self.commander(asker)?;
         let turn = commander.turn()?;
-        self.line.with(|line, now| line.ask_to_move(commander.client, line.last_halt(), now))?;
+        self.line.with(|line, now| line.ask_to_move(commander.client, after.halt(line), now))?;
         Ok((commander, turn))
     }
 

@@ -171,14 +171,17 @@ impl Agent {
             return Err(object.kind(ErrorKind::NoLink));
         }
         let client = client.map(|client| client.client);
-        self.line.with(|line, now| line.halt_for(client, &name, command, now));
-        Ok(Json(SentObject { sent: command.name().to_owned() }))
+        let halt = self.line.with(|line, now| {
+            line.halt_for(client, &name, command, now);
+            line.last_halt()
+        });
+        Ok(Json(SentObject { sent: command.name().to_owned(), halt }))
     }
 
     /// The controller, as its last status has it, and who commands.
     fn status(&self, caller: &Caller) -> StatusObject {
         let lost = self.line.lost();
-        let (status, lease, clients) = self.line.with(|line, now| {
+        let (status, lease, clients, last_halt) = self.line.with(|line, now| {
             let name = |client| line.introduction(client).map(|client| client.name.clone());
             let lease = line.lease().map(|lease| LeaseObject {
                 holder: name(lease.holder).unwrap_or_default(),
@@ -187,7 +190,7 @@ impl Agent {
                 wanted_by: lease.wanted_by.and_then(name),
             });
             let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
-            (status, lease, line.clients())
+            (status, lease, line.clients(), line.last_halt())
         });
         StatusObject {
             simulated: self.simulated,
@@ -200,6 +203,7 @@ impl Agent {
             role: caller.role,
             agent: self.id.to_string(),
             last_event: self.jobs.journal.last(),
+            last_halt,
         }
     }
 }

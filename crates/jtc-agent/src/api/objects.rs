@@ -34,6 +34,8 @@ pub struct StatusObject {
     pub agent: String,
     /// Number of the last event.
     pub last_event: u64,
+    /// Number of the last Stop or Pause: `asked_after` of what is asked for now.
+    pub last_halt: u64,
 }
 
 /// What the controller reports.
@@ -127,6 +129,8 @@ impl From<Payload> for PayloadObject {
 pub struct SentObject {
     /// What was sent: `stop` or `pause`.
     pub sent: String,
+    /// Its number: `last_halt` until the next.
+    pub halt: u64,
 }
 
 impl From<&Status> for ControllerObject {

@@ -1,5 +1,5 @@
 //! Runs and moves: jobs, and what becomes of them.
-use agent_kit::api::{Body, Number, Refusals};
+use agent_kit::api::{Asked, Body, Number, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 
 use super::arm::GivenObject;
 use super::error::Denials;
+use super::lease::AskedAfter;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
 use crate::line::Policy;
@@ -152,13 +153,14 @@ impl From<Job> for JobObject {
     post,
     path = "/api/runs",
     operation_id = "run",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_run(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     Body(request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let RunRequest { trajectory: number, approach, speed_percent, repeat, policy, accept_device_limits } =
@@ -179,7 +181,7 @@ pub(super) async fn begin_run(
     let course = Course::Along(stored.trajectory.clone());
     begin(
         &agent,
-        &asker,
+        (&asker, after),
         what,
         policy,
         Order { course, approach, speed_percent, repeat, accept_device_limits },
@@ -191,13 +193,14 @@ pub(super) async fn begin_run(
     post,
     path = "/api/moves",
     operation_id = "move_to",
-    params(LeaseKey),
+    params(LeaseKey, AskedAfter),
     request_body = MoveRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_move(
     State(agent): State<Agent>,
     asker: Asker,
+    Asked(after): Asked<AskedAfter>,
     Body(request): Body<MoveRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let MoveRequest { to_rad, speed_percent, policy, accept_device_limits } = request;
@@ -205,7 +208,7 @@ pub(super) async fn begin_move(
     let what = format!("move to {}", to_rad.map(|q| q.to_string()).join(", "));
     let course = Course::To(to_rad);
     let order = Order { course, approach: false, speed_percent, repeat: 1, accept_device_limits };
-    begin(&agent, &asker, what, policy, order)
+    begin(&agent, (&asker, after), what, policy, order)
 }
 
 /// From 1 on, and no more than that.
@@ -220,12 +223,12 @@ fn within(name: &str, value: f64, most: f64) -> Result<(), ErrorObject> {
 
 fn begin(
     agent: &Agent,
-    asker: &Asker,
+    (asker, after): (&Asker, AskedAfter),
     what: String,
     policy: Option<Policy>,
     order: Order,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let (commander, turn) = agent.mover(asker)?;
+    let (commander, turn) = agent.mover(asker, after)?;
     let (client, own) = (commander.client, commander.policy);
     agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
     let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {

@@ -1,0 +1,293 @@
+// What the page of an arm knows: model, controller, jobs, what is previewed. Components read it, and ask by it.
+import { getContext, setContext } from 'svelte';
+
+import { ApiError } from '../api.ts';
+import type { AngleUnit } from '../format.ts';
+import { Session } from '../session.svelte.ts';
+import { History } from './history.ts';
+import type { ArmModel } from './kinematics.ts';
+import type { ArmEntry, Controller, InfoObject, JobObject, PayloadObject, Points, Pose, ProblemObject, Status, TrajectoryObject } from './types.ts';
+import { eventWords, isMoving, isPaused, jobWords, stateWords, type StateWords, whatStopDid } from './words.ts';
+
+/** Columns of the history: time, then six of each. */
+export const COLUMN = { position: 1, velocity: 7, torque: 13, temperature: 19, commanded: 25, error: 31 } as const;
+const COLUMNS = 37;
+/** Rows that are kept: ten minutes at 25 Hz. */
+const ROWS = 15_000;
+/** What people read changes so often at most, ms. */
+const READ_MS = 120;
+
+/** A job as its events tell it. */
+export interface Course {
+  number: number;
+  what: string;
+  client: string;
+  phase: string;
+  stage: 'begun' | 'uploading' | 'executing' | 'ended';
+  /** 0 to 1, of the phase. */
+  progress: number;
+  duration_s: number;
+  runs: number;
+  outcome?: string;
+  own: boolean;
+}
+
+export interface Preview {
+  points: Points;
+  /** s on the slider. */
+  time: number;
+  problems: ProblemObject[];
+  title: string;
+}
+
+export type Tab = 'state' | 'run' | 'jog' | 'teach' | 'arm' | 'plots' | 'log';
+
+const KEY = Symbol('arm');
+
+export class ArmPage {
+  readonly session = new Session<Status>((entry) => eventWords((entry as ArmEntry).event));
+  readonly history = new History(COLUMNS, ROWS);
+
+  tab = $state<Tab>('state');
+  unit = $state<AngleUnit>(localStorage.getItem('openjtc-unit') === 'rad' ? 'rad' : 'deg');
+  /** As of the last status that was read out; undefined: nothing that is known is of now. */
+  controller = $state.raw<Controller | undefined>(undefined);
+  /** For the picture and the plots: each status. */
+  latest: Controller | undefined;
+  model = $state.raw<ArmModel | undefined>(undefined);
+  info = $state.raw<InfoObject | undefined>(undefined);
+  payload = $state.raw<PayloadObject | undefined>(undefined);
+  poses = $state.raw<Pose[]>([]);
+  posesMissing = $state(false);
+  trajectories = $state.raw<TrajectoryObject[]>([]);
+  course = $state<Course | undefined>(undefined);
+  lastJob = $state.raw<JobObject | undefined>(undefined);
+  speed = $state(100);
+  preview = $state<Preview | undefined>(undefined);
+  /** The joint that somebody points at, from 1. */
+  pointed = $state<number | undefined>(undefined);
+  explained = $state<string | undefined>(undefined);
+  stopWords = $state('');
+
+  readonly #frames: ((controller: Controller | undefined) => void)[] = [];
+  #read = 0;
+  #agent = '';
+  #stop: { at: number; state: string | undefined; moved: boolean; job: boolean } | undefined;
+  #stopTimer: ReturnType<typeof setTimeout> | undefined;
+
+  readonly words = $derived.by<StateWords | undefined>(() => {
+    if (!this.controller) return undefined;
+    const course = this.course && this.course.stage !== 'ended' ? `${jobWords(this.course.what)}, by ${this.course.client}` : undefined;
+    return stateWords(this.controller, course, this.info?.missing ?? []);
+  });
+  readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);
+  readonly isRunning = $derived(this.course !== undefined && this.course.stage !== 'ended');
+
+  constructor() {
+    this.session.onStatus((status) => this.#take(status));
+    this.session.onEvent((entry, isNew) => this.#hear(entry as ArmEntry, isNew));
+    this.session.onLoss(() => this.#lose());
+    this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
+  }
+
+  /** Called with each status, and with undefined when there is none of now. */
+  onFrame(handler: (controller: Controller | undefined) => void): () => void {
+    this.#frames.push(handler);
+    return () => this.#frames.splice(this.#frames.indexOf(handler), 1);
+  }
+
+  setUnit(unit: AngleUnit): void {
+    this.unit = unit;
+    localStorage.setItem('openjtc-unit', unit);
+  }
+
+  /** Measured positions, or undefined where one is not known. */
+  get position(): number[] | undefined {
+    const values = this.controller?.joints.map((joint) => joint.position_rad);
+    return values?.every((value) => typeof value === 'number') ? (values as number[]) : undefined;
+  }
+
+  async stop(): Promise<void> {
+    const controller = this.latest;
+    const moved = isMoving(controller) || isPaused(controller) || this.words?.tone === 'move';
+    this.#stop = { at: performance.now(), state: controller?.state, moved, job: this.isRunning };
+    this.stopWords = 'Stop is being sent';
+    await this.session.stop();
+    const state = this.session.stopState;
+    this.stopWords = state.phase === 'failed' ? state.text : 'Stop was sent.';
+    if (state.phase === 'failed') this.#stop = undefined;
+    else this.#wordStop();
+  }
+
+  #wordStop(): void {
+    const stop = this.#stop;
+    if (!stop || this.session.stopState.phase !== 'sent') return;
+    const controller = this.latest;
+    const since = performance.now() - stop.at;
+    const waits = isMoving(controller) || (stop.state === 'Teaching' && controller?.state === 'Teaching') || since < 150;
+    this.stopWords = stop.job && !stop.moved ? 'Stop was sent: the job ends before anything moves.' : whatStopDid(stop.state, stop.moved, controller, since);
+    if (!waits || since > 4000) {
+      this.#stop = undefined;
+      clearTimeout(this.#stopTimer);
+      this.#stopTimer = setTimeout(() => (this.stopWords = ''), 8000);
+    }
+  }
+
+  #take(status: Status): void {
+    if (status.agent !== this.#agent) {
+      this.#agent = status.agent;
+      void this.refresh();
+    }
+    const controller = this.session.fresh ? (status.controller ?? undefined) : undefined;
+    if (controller) this.#remember(controller);
+    const before = this.latest;
+    this.latest = controller;
+    for (const frame of this.#frames) frame(controller);
+    const now = performance.now();
+    const turned = before?.state !== controller?.state || before?.trajectory !== controller?.trajectory;
+    if (turned || now - this.#read >= READ_MS) {
+      this.#read = now;
+      this.controller = controller;
+    }
+    if (turned && (controller?.state === 'Init' || before?.state === 'Init')) void this.readInfo();
+    this.#wordStop();
+  }
+
+  #lose(): void {
+    this.latest = undefined;
+    this.controller = undefined;
+    // A gap in the plots, and no line across it.
+    if (this.history.length > 0) this.history.push([Date.now() / 1000, ...new Array<number>(COLUMNS - 1).fill(NaN)]);
+    for (const frame of this.#frames) frame(undefined);
+  }
+
+  #remember(controller: Controller): void {
+    const row = new Float64Array(COLUMNS).fill(NaN);
+    row[0] = Date.now() / 1000;
+    controller.joints.forEach((joint, i) => {
+      const commanded = controller.commanded_rad?.[i] ?? NaN;
+      row[COLUMN.position + i] = joint.position_rad ?? NaN;
+      row[COLUMN.velocity + i] = joint.velocity_rad_s ?? NaN;
+      row[COLUMN.torque + i] = joint.torque_nm ?? NaN;
+      row[COLUMN.temperature + i] = joint.temperature_c ?? NaN;
+      row[COLUMN.commanded + i] = commanded;
+      row[COLUMN.error + i] = commanded - (joint.position_rad ?? NaN);
+    });
+    this.history.push(row);
+  }
+
+  #hear({ event }: ArmEntry, isNew: boolean): void {
+    const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
+    switch (event.kind) {
+      case 'begun':
+        this.course = {
+          number: event.job, what: event.what, client: event.client, phase: '', stage: 'begun', progress: 0, duration_s: 0, runs: 0,
+          own: this.session.leasePhase === 'held' && event.client === this.session.name,
+        };
+        break;
+      case 'uploading':
+        if (course) Object.assign(course, { stage: 'uploading', phase: event.phase, progress: event.segments_done / Math.max(1, event.segments) });
+        break;
+      case 'executing':
+        if (course) Object.assign(course, { stage: 'executing', phase: event.phase, progress: 0, duration_s: event.duration_s });
+        break;
+      case 'finished':
+        if (course) Object.assign(course, { runs: event.runs, progress: 1 });
+        break;
+      case 'ended':
+        if (course) Object.assign(course, { stage: 'ended', outcome: event.outcome });
+        if (isNew) void this.#ended(event.job, event.outcome);
+        break;
+      case 'halt':
+        if (isNew && this.session.leasePhase !== 'held') {
+          this.session.toast({ tone: 'info', title: event.command === 'pause' ? 'Paused' : 'Stopped', text: `By ${event.by}.` });
+        }
+        break;
+    }
+  }
+
+  async #ended(number: number, outcome: string): Promise<void> {
+    try {
+      const job = await this.session.api.get<JobObject>(`/api/jobs/${number}`);
+      this.lastJob = job;
+      const own = this.course?.number === number && this.course.own;
+      if (!own || outcome === 'stopped') return;
+      if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
+      else if (outcome === 'finished') this.session.toast({ tone: 'good', title: jobWords(job.what), text: 'Finished.' });
+    } catch {
+      // The log has the event; the figures come with the next look at the job.
+    }
+  }
+
+  /** Reads what the stream does not send. */
+  async refresh(): Promise<void> {
+    await Promise.all([this.readModel(), this.readInfo(), this.readPayload(), this.readPoses(), this.readTrajectories(), this.readJobs(), this.readSpeed()]);
+  }
+
+  async #quietly(act: () => Promise<void>): Promise<void> {
+    try {
+      await act();
+    } catch (error) {
+      if (!(error instanceof ApiError)) throw error;
+    }
+  }
+
+  readModel(): Promise<void> {
+    return this.#quietly(async () => {
+      this.model = await this.session.api.get<ArmModel>('/api/arm/model');
+    });
+  }
+
+  readInfo(): Promise<void> {
+    return this.#quietly(async () => {
+      const before = this.info?.hash;
+      this.info = await this.session.api.get<InfoObject>('/api/info');
+      if (before !== undefined && this.info.hash !== before) await this.readModel();
+    });
+  }
+
+  readPayload(): Promise<void> {
+    return this.#quietly(async () => {
+      this.payload = await this.session.api.get<PayloadObject>('/api/payload');
+    });
+  }
+
+  readPoses(): Promise<void> {
+    return this.#quietly(async () => {
+      try {
+        this.poses = (await this.session.api.get<{ poses: Pose[] }>('/api/poses')).poses;
+        this.posesMissing = false;
+      } catch (error) {
+        this.posesMissing = error instanceof ApiError && error.isMissingPath;
+        throw error;
+      }
+    });
+  }
+
+  readTrajectories(): Promise<void> {
+    return this.#quietly(async () => {
+      this.trajectories = await this.session.api.get<TrajectoryObject[]>('/api/trajectories');
+    });
+  }
+
+  readJobs(): Promise<void> {
+    return this.#quietly(async () => {
+      const jobs = await this.session.api.get<JobObject[]>('/api/jobs');
+      this.lastJob = jobs.filter((job) => job.stage !== 'running').at(-1);
+    });
+  }
+
+  readSpeed(): Promise<void> {
+    return this.#quietly(async () => {
+      this.speed = (await this.session.api.get<{ percent: number }>('/api/speed')).percent;
+    });
+  }
+}
+
+export function provideArm(arm: ArmPage): void {
+  setContext(KEY, arm);
+}
+
+export function useArm(): ArmPage {
+  return getContext<ArmPage>(KEY);
+}

@@ -1,0 +1,180 @@
+// What the controller reports, in words: what is, why, and what leads on.
+import type { Controller, Happening, Joint } from './types.ts';
+import { count, duration } from '../format.ts';
+
+/** A state's colour and shape; each shape is another one, for those who do not see colours. */
+export type Tone = 'off' | 'hold' | 'move' | 'pause' | 'teach' | 'error' | 'lost';
+
+export type Step = 'recover' | 'defaults' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
+
+export interface Cause {
+  words: string;
+  /** For `explain`. */
+  code: string;
+}
+
+export interface StateWords {
+  tone: Tone;
+  word: string;
+  /** Why it does not move, or what it does. */
+  detail: string;
+  causes: Cause[];
+  /** What leads on, in words, and what the button does. */
+  next: string;
+  step?: Step;
+}
+
+/** "emergency input" is explained as `emergency-input`. */
+export function codeOf(words: string): string {
+  return words.trim().toLowerCase().replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '');
+}
+
+function paired(words: readonly string[], codes: readonly string[] | undefined): Cause[] {
+  return words.map((each, i) => ({ words: each, code: codes?.[i] ?? codeOf(each) }));
+}
+
+/** The bits that only sum up others. */
+const SUMS = new Set([
+  'internal error', 'external error', 'internal joint error', 'internal joints error', 'external joint error', 'external joints error',
+  'emergency output',
+]);
+
+/** What is wrong now, the most particular first. */
+export function causesOf(controller: Controller): Cause[] {
+  const ofJoints = controller.joints.flatMap((joint) =>
+    paired(joint.errors, joint.error_codes).map(({ words, code }) => ({ words: `Joint ${joint.joint}: ${words}`, code })),
+  );
+  const own = paired(controller.errors, controller.error_codes);
+  const sums = own.filter((cause) => SUMS.has(cause.words));
+  return [...ofJoints, ...own.filter((cause) => !SUMS.has(cause.words)), ...sums];
+}
+
+/** Joints that are set absent: under torque no other drive is in Start. */
+export function absent(controller: Controller): number[] {
+  const powered = ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
+  return powered ? controller.joints.filter((joint) => joint.state === 'Start').map((joint) => joint.joint) : [];
+}
+
+export function hasTorque(controller: Controller | null | undefined): boolean {
+  return controller != null && ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
+}
+
+export function isMoving(controller: Controller | null | undefined): boolean {
+  return controller != null && controller.trajectory === 'Execute' && controller.state === 'Operate';
+}
+
+export function isPaused(controller: Controller | null | undefined): boolean {
+  return controller != null && controller.trajectory === 'Pause';
+}
+
+/** Fastest joint, rad/s. */
+export function fastest(controller: Controller): number {
+  return Math.max(...controller.joints.map((joint: Joint) => Math.abs(joint.velocity_rad_s ?? 0)));
+}
+
+const MOVES_RAD_S = 0.01;
+
+/** `job` is what goes on, in words; `missing` are parameters that the controller has not been given. */
+export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
+  const causes = causesOf(controller);
+  const base = { causes, next: '' };
+  if (controller.state === 'Error' || causes.length > 0) {
+    const first = causes[0]?.words ?? 'an error that is over';
+    const torque = controller.state === 'Error' ? 'All torques are off.' : '';
+    return {
+      ...base, tone: 'error', word: 'Error', detail: `${first}. ${torque}`.trim(),
+      next: 'Remove the cause, then recover: errors are cleared, and the arm is held where it is.', step: 'recover',
+    };
+  }
+  switch (controller.state) {
+    case 'Start':
+    case 'Init': {
+      const lacks = missing.length > 0;
+      return {
+        ...base, tone: 'off', word: 'No torque',
+        detail: lacks ? `The controller has not been given: ${missing.join(', ')}.` : 'The controller brings up its drives, or waits for them.',
+        next: lacks ? 'Recover with the stored arm or the defaults; or give it an arm file.' : 'Recover enables the drives and holds the arm.',
+        step: lacks ? 'defaults' : 'recover',
+      };
+    }
+    case 'Teaching':
+      return { ...base, tone: 'teach', word: 'Teaching', detail: 'Gravity is compensated: the arm can be led by hand.', next: 'End teaching to hold the arm.', step: 'teach-off' };
+    case 'Operate':
+      if (isPaused(controller)) {
+        return { ...base, tone: 'pause', word: 'Paused', detail: job ? `${job} stands on its path.` : 'The motion stands on its path.', next: 'Resume goes on; Stop ends the motion.', step: 'resume' };
+      }
+      return { ...base, tone: 'move', word: 'Moving', detail: job ?? 'A trajectory is executed.', next: '' };
+    case 'HoldPos': {
+      if (isPaused(controller)) {
+        return { ...base, tone: 'pause', word: 'Paused', detail: job ? `${job} stands on its path.` : 'The motion stands on its path.', next: 'Resume goes on; Stop ends the motion.', step: 'resume' };
+      }
+      const gone = absent(controller);
+      if (gone.length > 0) {
+        const names = gone.join(', ');
+        return { ...base, tone: 'hold', word: 'Holding', detail: `Set absent: ${gone.length === 1 ? 'joint' : 'joints'} ${names}. No motion is executed.`, next: 'Joints that are there can be jogged.' };
+      }
+      if (fastest(controller) > MOVES_RAD_S) return { ...base, tone: 'move', word: 'Moving', detail: job ?? 'Joints are jogged.', next: '' };
+      return { ...base, tone: 'hold', word: 'Holding', detail: job ?? 'The arm is held. Nothing is asked of it.', next: '' };
+    }
+    default:
+      return { ...base, tone: 'off', word: controller.state, detail: controller.next, next: '' };
+  }
+}
+
+/** What Stop did, from what was seen when it was touched and what is seen now. */
+export function whatStopDid(before: string | undefined, wasMoving: boolean, now: Controller | undefined | null, tookMs: number): string {
+  const took = `${(tookMs / 1000).toFixed(1)} s`;
+  if (!now) return 'Stop was sent. No status has come since.';
+  const held = now.state === 'HoldPos' ? 'the arm is held' : now.state === 'Init' || now.state === 'Error' || now.state === 'Start' ? 'there is no torque' : `state ${now.state}`;
+  if (before === 'Teaching') return now.state === 'Teaching' ? 'Stop was sent.' : `Teaching ended; ${held}.`;
+  if (!wasMoving) return `Stop was sent. Nothing was moving; ${held}.`;
+  return isMoving(now) ? 'Stop was sent: the arm decelerates on its path.' : `Stopped on the path in ${took}; ${held}.`;
+}
+
+/** "recover" is what an event calls it; people read a sentence. */
+export function jobWords(what: string): string {
+  return what.charAt(0).toUpperCase() + what.slice(1);
+}
+
+export type EventTone = 'info' | 'good' | 'warn' | 'error';
+
+/** An event in words; undefined: not worth a line. */
+export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
+  const of = 'job' in event ? `job ${event.job}` : '';
+  const line = (text: string, tone: EventTone = 'info', whose = of) => ({ text, tone, of: whose });
+  switch (event.kind) {
+    case 'lease':
+      return line(event.holder ? `${event.holder} commands` : 'Nobody commands', 'info', 'lease');
+    case 'halt':
+      return line(`${event.command === 'pause' ? 'Pause' : 'Stop'} by ${event.by}`, 'warn', 'halt');
+    case 'state': {
+      const errors = event.errors.length > 0 ? `: ${event.errors.join(', ')}` : '';
+      return line(`State ${event.state}, trajectory ${event.trajectory}${errors}`, event.errors.length > 0 ? 'error' : 'info', 'state');
+    }
+    case 'lost':
+      return line(`The port is gone: ${event.why}`, 'error', 'port');
+    case 'begun':
+      return line(`${jobWords(event.what)}, by ${event.client}`);
+    case 'note':
+      return line(event.text);
+    case 'checked':
+      return line(`${jobWords(event.phase)} checked: ${count(event.points, 'point')}, ${duration(event.duration_s)}${event.warnings.map((w) => `; ${w}`).join('')}`, event.warnings.length > 0 ? 'warn' : 'info');
+    case 'uploading':
+      return undefined;
+    case 'uploaded':
+      return line(`${jobWords(event.phase)} uploaded in ${duration(event.time_s)}`);
+    case 'given':
+      return line(`Confirmed: ${event.parameter}`);
+    case 'executing':
+      return line(`${jobWords(event.phase)} is executed: ${duration(event.duration_s)}`);
+    case 'moving':
+      return undefined;
+    case 'finished':
+      return line(`Motion ${event.runs} finished`, 'good');
+    case 'ended':
+      return line(
+        event.error ? `Ended: ${event.error.message}` : `Ended: ${event.outcome}`,
+        event.outcome === 'finished' ? 'good' : event.outcome === 'stopped' ? 'warn' : 'error',
+      );
+  }
+}

@@ -1,0 +1,26 @@
+// The space bar stops everywhere but where a space is typed.
+
+/** As much of an element as is needed. */
+export interface Focused {
+  tagName: string;
+  type?: string;
+  isContentEditable?: boolean;
+}
+
+const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'number', 'date', 'time', '']);
+
+/** Whether keys are text here. Buttons, sliders and switches take no text: there the space bar stops, and Enter presses. */
+export function takesText(element: Focused | null | undefined): boolean {
+  if (!element) return false;
+  if (element.isContentEditable) return true;
+  const tag = element.tagName.toUpperCase();
+  if (tag === 'TEXTAREA') return true;
+  return tag === 'INPUT' && TYPED.has((element.type ?? '').toLowerCase());
+}
+
+/** "Tablet", "Phone", "Computer": what others read as the name of who commands. */
+export function deviceKind(agent: string, touchPoints: number, width: number): string {
+  if (/iPhone|Android.*Mobile/i.test(agent)) return 'Phone';
+  if (/iPad|Android|Tablet/i.test(agent) || (/Macintosh/.test(agent) && touchPoints > 1)) return 'Tablet';
+  return touchPoints > 0 && width < 700 ? 'Phone' : 'Computer';
+}

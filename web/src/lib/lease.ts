@@ -1,0 +1,96 @@
+// The lease: one client commands at a time. Taken by the first command, renewed while the page is in use, let go by hand or with the page.
+import { type Api, ApiError } from './api.ts';
+
+export type Policy = 'continue' | 'pause' | 'stop';
+
+interface Grant {
+  key: string;
+  held: boolean;
+  lasts_s: number;
+}
+
+export type LeasePhase = 'none' | 'held' | 'waiting';
+
+export const LASTS_S = 10;
+export const RENEW_MS = 3000;
+
+export interface LeaseWishes {
+  name(): string;
+  policy(): Policy;
+  /** Phase or `wantedBy` is another one. */
+  changed(): void;
+}
+
+export class Lease {
+  key: string | undefined;
+  phase: LeasePhase = 'none';
+  wantedBy: string | undefined;
+  #taking: Promise<void> | undefined;
+  readonly #api: Api;
+  readonly #wishes: LeaseWishes;
+
+  constructor(api: Api, wishes: LeaseWishes) {
+    this.#api = api;
+    this.#wishes = wishes;
+  }
+
+  /** Takes the lease where this client does not have it. Two commands at once take it once. */
+  take(): Promise<void> {
+    if (this.phase === 'held') return Promise.resolve();
+    this.#taking ??= this.#post(false).finally(() => (this.#taking = undefined));
+    return this.#taking;
+  }
+
+  /** Asks whoever commands for it, and keeps the place in the queue by renewing. */
+  ask(): Promise<void> {
+    return this.#post(true);
+  }
+
+  async #post(ask: boolean): Promise<void> {
+    const body = { name: this.#wishes.name(), policy: this.#wishes.policy(), lasts_s: LASTS_S, ask };
+    const grant = await this.#api.json<Grant>('POST', '/api/lease', { body });
+    this.#enter(grant.held ? 'held' : 'waiting', grant.key);
+  }
+
+  /** Renews it, or shows that it is still waited for. Returns whether this client commands. */
+  async renew(): Promise<boolean> {
+    if (!this.key) return false;
+    const key = this.key;
+    try {
+      const state = await this.#api.json<{ held: boolean; wanted_by?: string | null }>('PUT', '/api/lease', { within: 5000 });
+      if (this.key !== key) return this.phase === 'held';
+      const lost = this.phase === 'held' && !state.held;
+      this.wantedBy = state.wanted_by ?? undefined;
+      if (lost) this.#enter('none', undefined);
+      else this.#enter(state.held ? 'held' : 'waiting', key);
+    } catch (error) {
+      // Without an answer it may still be ours; with a refusal it is not.
+      if (!(error instanceof ApiError) || error.isNoConnection) return this.phase === 'held';
+      if (this.key === key) this.#enter('none', undefined);
+    }
+    return this.phase === 'held';
+  }
+
+  /** A command was refused: somebody else has it, or nobody knows this key any more. */
+  lost(): void {
+    this.#enter('none', undefined);
+  }
+
+  async release(keepalive = false): Promise<void> {
+    if (!this.key) return;
+    try {
+      await this.#api.send('DELETE', '/api/lease', { keepalive, within: 5000 });
+      this.#enter('none', undefined);
+    } catch (error) {
+      if (!(error instanceof ApiError) || error.status !== 409) this.#enter('none', undefined);
+      throw error;
+    }
+  }
+
+  #enter(phase: LeasePhase, key: string | undefined): void {
+    this.phase = phase;
+    this.key = key;
+    if (phase !== 'held') this.wantedBy = undefined;
+    this.#wishes.changed();
+  }
+}

@@ -1,0 +1,400 @@
+// What every page has: connection, token, lease, Stop, messages, events. Free of what the agent drives.
+import { Api, ApiError, type Ask, type Problem } from './api.ts';
+import { type BaseStatus, browser, Connection, type Entry, type EventsMessage, type Phase } from './connection.ts';
+import { deviceKind } from './keys.ts';
+import { Lease, type LeasePhase, type Policy, RENEW_MS } from './lease.ts';
+import { applyTheme, savedTheme, type Theme } from './theme.ts';
+import { tokenIn, TokenStore } from './token.ts';
+
+export interface LeaseView {
+  holder: string;
+  age_ms: number;
+  left_ms?: number | null;
+  wanted_by?: string | null;
+}
+
+export interface SessionStatus extends BaseStatus {
+  role: 'viewer' | 'operator';
+  last_halt?: number;
+  lease?: LeaseView | null;
+  /** ms since the last status of what the agent drives. */
+  age_ms?: number | null;
+  lost?: string | null;
+  simulated?: boolean;
+}
+
+export interface Toast {
+  id: number;
+  tone: 'info' | 'good' | 'error';
+  title: string;
+  text: string;
+  problem?: Problem;
+  /** A word beside the message that does something about it. */
+  action?: { word: string; act: () => void };
+}
+
+export interface Line {
+  number: number;
+  unix_s: number;
+  text: string;
+  tone: 'info' | 'good' | 'warn' | 'error';
+  /** By whom or of what, in a word. */
+  of: string;
+}
+
+export interface StopState {
+  phase: 'idle' | 'sending' | 'sent' | 'failed';
+  /** performance.now() of the touch, and of the answer. */
+  at: number;
+  answered: number;
+  text: string;
+}
+
+/** What becomes of the words of an event. */
+export type Describe = (entry: Entry) => Omit<Line, 'number' | 'unix_s'> | undefined;
+
+/** Somebody has to have touched the page within this time, or something of ours has to be going on, for the lease to be renewed, ms. */
+const IN_USE_MS = 120_000;
+const LINES_MAX = 400;
+/** Status values older than this are not those of now, ms. */
+const OLD_MS = 1500;
+
+function load(name: string): string | null {
+  return localStorage.getItem(`openjtc-${name}`);
+}
+
+function save(name: string, value: string): void {
+  localStorage.setItem(`openjtc-${name}`, value);
+}
+
+export class Session<S extends SessionStatus> {
+  readonly api: Api;
+  readonly lease: Lease;
+  readonly connection: Connection<S>;
+  readonly tokens = new TokenStore(sessionStorage, localStorage);
+
+  phase = $state<Phase>('connecting');
+  /** Messages arrive. */
+  live = $state(false);
+  /** What is driven answers the agent. */
+  fresh = $state(false);
+  /** s without connection, whole. */
+  lostFor = $state(0);
+  status = $state.raw<S | undefined>(undefined);
+  role = $state<'viewer' | 'operator'>('viewer');
+  hasToken = $state(false);
+  denied = $state<Problem | undefined>(undefined);
+  /** The token dialog is open, for this reason. */
+  asksToken = $state<string | undefined>(undefined);
+  leasePhase = $state<LeasePhase>('none');
+  wantedBy = $state<string | undefined>(undefined);
+  holder = $state<string | undefined>(undefined);
+  toasts = $state<Toast[]>([]);
+  lines = $state.raw<Line[]>([]);
+  stopState = $state<StopState>({ phase: 'idle', at: 0, answered: 0, text: '' });
+  theme = $state<Theme>(savedTheme());
+  name = $state(load('name') ?? deviceKind(navigator.userAgent, navigator.maxTouchPoints, screen.width));
+  policy = $state<Policy>((load('policy') as Policy | null) ?? 'pause');
+
+  /** Something that this page has begun goes on. */
+  isBusy: () => boolean = () => false;
+  readonly #statusHandlers: ((status: S) => void)[] = [];
+  readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
+  readonly #lossHandlers: (() => void)[] = [];
+  #describe: Describe;
+  #touched = 0;
+  #toastId = 0;
+  #halt = 0;
+  #known = -1;
+  #agent = '';
+  #lostAt = performance.now();
+  #probing = false;
+
+  constructor(describe: Describe) {
+    this.#describe = describe;
+    const { token, rest } = tokenIn(location.hash);
+    if (token) {
+      this.tokens.set(token, this.tokens.isRemembered());
+      history.replaceState(null, '', location.pathname + location.search + rest);
+    }
+    this.hasToken = this.tokens.get() !== undefined;
+    this.api = new Api(
+      () => this.tokens.get(),
+      () => this.lease.key,
+    );
+    this.lease = new Lease(this.api, {
+      name: () => this.name,
+      policy: () => this.policy,
+      changed: () => {
+        this.leasePhase = this.lease.phase;
+        this.wantedBy = this.lease.wantedBy;
+      },
+    });
+    this.connection = new Connection<S>(
+      browser(),
+      {
+        status: (status) => this.#take(status),
+        events: (message) => this.#hear(message),
+        phase: (phase) => {
+          this.phase = phase;
+          this.#look();
+        },
+        refused: () => void this.#probe(),
+      },
+      () => this.tokens.get(),
+    );
+  }
+
+  onStatus(handler: (status: S) => void): void {
+    this.#statusHandlers.push(handler);
+  }
+
+  onEvent(handler: (entry: Entry, isNew: boolean) => void): void {
+    this.#eventHandlers.push(handler);
+  }
+
+  /** Called when what is shown is no more what is. */
+  onLoss(handler: () => void): void {
+    this.#lossHandlers.push(handler);
+  }
+
+  start(): void {
+    applyTheme(this.theme);
+    this.connection.start();
+    setInterval(() => this.#look(), 200);
+    setInterval(() => void this.#renew(), RENEW_MS);
+    const touch = () => (this.#touched = performance.now());
+    for (const event of ['pointerdown', 'keydown', 'wheel']) addEventListener(event, touch, { passive: true, capture: true });
+    addEventListener('online', () => this.connection.hurry());
+    document.addEventListener('visibilitychange', () => {
+      if (!document.hidden) this.connection.hurry();
+    });
+    addEventListener('pagehide', () => void this.lease.release(true).catch(() => {}));
+  }
+
+  setTheme(theme: Theme): void {
+    this.theme = theme;
+    applyTheme(theme);
+  }
+
+  setName(name: string): void {
+    this.name = name.trim().slice(0, 64) || deviceKind(navigator.userAgent, navigator.maxTouchPoints, screen.width);
+    save('name', this.name);
+  }
+
+  setPolicy(policy: Policy): void {
+    this.policy = policy;
+    save('policy', policy);
+  }
+
+  setToken(token: string, remember: boolean): void {
+    this.lease.lost();
+    this.tokens.set(token.trim(), remember);
+    this.hasToken = true;
+    this.denied = undefined;
+    this.asksToken = undefined;
+    this.connection.start();
+  }
+
+  forgetToken(): void {
+    void this.lease.release().catch(() => {});
+    this.tokens.forget();
+    this.hasToken = false;
+    this.connection.start();
+  }
+
+  /** The number that a command is to carry which was asked for now: what has been stopped since then, it does not move. */
+  get askedAfter(): number | undefined {
+    const shown = this.status?.last_halt;
+    return shown === undefined ? undefined : Math.max(shown, this.#halt);
+  }
+
+  /** Stops, ahead of all else. Tried again where the network drops it. */
+  async stop(): Promise<void> {
+    const at = performance.now();
+    this.stopState = { phase: 'sending', at, answered: 0, text: 'Stop is being sent' };
+    for (let attempt = 0; ; attempt += 1) {
+      try {
+        const sent = await this.api.json<{ halt?: number }>('POST', '/api/stop', { within: 1500 });
+        this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
+        if (this.stopState.at === at) this.stopState = { phase: 'sent', at, answered: performance.now(), text: 'Stop was sent' };
+        return;
+      } catch (error) {
+        const problem = error instanceof ApiError ? error : undefined;
+        if (problem?.isNoConnection && attempt < 4 && this.stopState.at === at) {
+          await new Promise((done) => setTimeout(done, 150));
+          continue;
+        }
+        if (this.stopState.at !== at) return;
+        const why = problem?.problem.message ?? 'it was not sent';
+        this.stopState = { phase: 'failed', at, answered: performance.now(), text: `STOP NOT SENT: ${why} Use the emergency stop.` };
+        if (problem?.wantsToken) this.asksToken = 'Stop from this device needs a token, too.';
+        return;
+      }
+    }
+  }
+
+  /** Pauses; needs no lease. */
+  async pause(): Promise<boolean> {
+    return (await this.attempt('Pause', () => this.api.json<{ halt?: number }>('POST', '/api/pause', { within: 3000 }), (sent) => {
+      this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
+    })) !== undefined;
+  }
+
+  /**
+   * Sends a command, with the lease; what may move also says what this page showed when it was asked for. Returns the answer, or undefined where it was
+   * refused: why is a message on the page then.
+   */
+  async command<T = unknown>(what: string, method: string, path: string, ask: Ask & { moves?: boolean; quiet?: boolean } = {}): Promise<{ value: T } | undefined> {
+    const after = ask.moves ? this.askedAfter : undefined;
+    const query = after === undefined ? ask.query : { ...ask.query, asked_after: after };
+    const act = async (): Promise<{ value: T }> => {
+      const had = this.lease.phase === 'held';
+      await this.lease.take();
+      try {
+        return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
+      } catch (error) {
+        // The lease lapsed while the page rested: taken again, once.
+        if (!had || !(error instanceof ApiError) || error.problem.code !== 'denied' || error.problem.next.includes('three seconds')) throw error;
+        if (await this.lease.renew()) throw error;
+        await this.lease.take();
+        return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
+      }
+    };
+    return this.attempt(what, act, undefined, ask.quiet);
+  }
+
+  /** Does it, and says why not where it fails. */
+  async attempt<T>(what: string, act: () => Promise<T>, then?: (value: T) => void, quiet = false): Promise<T | undefined> {
+    try {
+      const value = await act();
+      then?.(value);
+      return value;
+    } catch (error) {
+      if (!quiet) this.fail(what, error);
+      return undefined;
+    }
+  }
+
+  fail(what: string, error: unknown): void {
+    if (!(error instanceof ApiError)) {
+      this.toast({ tone: 'error', title: what, text: error instanceof Error ? error.message : String(error) });
+      return;
+    }
+    if (error.wantsToken) {
+      this.asksToken = this.hasToken
+        ? `${what}: this token does not allow it. ${error.problem.message}`
+        : `${what} needs the operator's token.`;
+      return;
+    }
+    const problem = error.problem;
+    const held = problem.code === 'denied' && this.leasePhase !== 'held' && this.holder !== undefined;
+    const toast: Omit<Toast, 'id'> = { tone: 'error', title: what, text: problem.message, problem };
+    if (held) {
+      toast.problem = { ...problem, next: `Ask ${this.holder} for the lease, or wait until it is free.` };
+      toast.action = { word: 'Ask for it', act: () => void this.askForLease() };
+    }
+    this.toast(toast);
+  }
+
+  async askForLease(): Promise<void> {
+    await this.attempt('Ask for the lease', () => this.lease.ask());
+  }
+
+  toast(toast: Omit<Toast, 'id'>): void {
+    this.#toastId += 1;
+    const id = this.#toastId;
+    const same = this.toasts.filter((other) => other.title !== toast.title || other.text !== toast.text);
+    this.toasts = [...same.slice(-3), { ...toast, id }];
+    if (toast.tone !== 'error') setTimeout(() => this.dismiss(id), 5000);
+  }
+
+  dismiss(id: number): void {
+    this.toasts = this.toasts.filter((toast) => toast.id !== id);
+  }
+
+  #take(status: S): void {
+    this.status = status;
+    if (this.role !== status.role) this.role = status.role;
+    const holder = status.lease?.holder;
+    if (this.holder !== holder) this.holder = holder;
+    this.denied = undefined;
+    this.#look();
+    for (const handler of this.#statusHandlers) handler(status);
+  }
+
+  #hear(message: EventsMessage): void {
+    if (message.agent !== this.#agent) {
+      this.#agent = message.agent;
+      this.#known = -1;
+    }
+    // What happened before the page was opened is history, and no news.
+    const isFirst = this.#known < 0;
+    const fresh: Line[] = [];
+    for (const entry of message.events) {
+      if (entry.number <= this.#known) continue;
+      const isNew = !isFirst || Date.now() / 1000 - entry.unix_s < 2;
+      const words = this.#describe(entry);
+      if (words) fresh.push({ number: entry.number, unix_s: entry.unix_s, ...words });
+      for (const handler of this.#eventHandlers) handler(entry, isNew);
+    }
+    this.#known = Math.max(this.#known, message.last);
+    if (message.missed && !isFirst) {
+      fresh.unshift({ number: message.last, unix_s: Date.now() / 1000, text: 'Some events are not kept any more.', tone: 'warn', of: 'agent' });
+    }
+    if (fresh.length > 0) this.lines = [...this.lines, ...fresh].slice(-LINES_MAX);
+  }
+
+  /** Whether what is shown is what is. */
+  #look(): void {
+    this.connection.check();
+    const live = this.connection.isLive;
+    const status = this.status;
+    const age = (status?.age_ms ?? Infinity) + this.connection.silence;
+    const fresh = live && status !== undefined && !status.lost && age < OLD_MS;
+    if (live !== this.live) {
+      this.live = live;
+      if (!live) this.#lostAt = performance.now() - Math.min(this.connection.silence, 10_000);
+    }
+    if (fresh !== this.fresh) {
+      this.fresh = fresh;
+      if (!fresh) for (const handler of this.#lossHandlers) handler();
+    }
+    const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
+    if (lostFor !== this.lostFor) this.lostFor = lostFor;
+  }
+
+  async #renew(): Promise<void> {
+    if (this.lease.phase === 'none' || document.hidden) return;
+    const inUse = performance.now() - this.#touched < IN_USE_MS || this.isBusy();
+    if (inUse || this.lease.phase === 'waiting') {
+      const had = this.lease.phase;
+      const held = await this.lease.renew();
+      if (had === 'held' && !held && this.connection.isLive) {
+        this.toast({ tone: 'error', title: 'The lease has ended', text: 'Commands from this page take it again, where nobody else has it.' });
+      } else if (had === 'waiting' && held) {
+        this.toast({ tone: 'good', title: 'You command now', text: 'The lease is here.' });
+      }
+    }
+  }
+
+  /** A browser does not say why a socket was refused; an ordinary request does. */
+  async #probe(): Promise<void> {
+    if (this.#probing) return;
+    this.#probing = true;
+    try {
+      await this.api.get('/api/status');
+    } catch (error) {
+      if (error instanceof ApiError && !error.isNoConnection) {
+        this.denied = error.problem;
+        if (error.wantsToken) {
+          this.asksToken ??= this.hasToken
+            ? `This token was not accepted. ${error.problem.message}`
+            : 'Looking at this agent from here needs a token.';
+        }
+      }
+    } finally {
+      this.#probing = false;
+    }
+  }
+}

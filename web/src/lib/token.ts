@@ -1,0 +1,48 @@
+// The token of this browser: from the address (#token=…), from this session, or remembered on this device.
+
+const NAME = 'openjtc-token';
+
+export interface Store {
+  getItem(name: string): string | null;
+  setItem(name: string, value: string): void;
+  removeItem(name: string): void;
+}
+
+/** The token in the fragment of an address, and the fragment without it. */
+export function tokenIn(hash: string): { token: string | undefined; rest: string } {
+  const parts = hash.replace(/^#/, '').split('&').filter(Boolean);
+  const own = parts.find((part) => part.startsWith('token='));
+  const rest = parts.filter((part) => part !== own).join('&');
+  const token = own ? decodeURIComponent(own.slice('token='.length)).trim() : undefined;
+  return { token: token || undefined, rest: rest ? `#${rest}` : '' };
+}
+
+/** Where the token is kept. */
+export class TokenStore {
+  readonly #session: Store;
+  readonly #device: Store;
+
+  constructor(session: Store, device: Store) {
+    this.#session = session;
+    this.#device = device;
+  }
+
+  get(): string | undefined {
+    return this.#session.getItem(NAME) ?? this.#device.getItem(NAME) ?? undefined;
+  }
+
+  isRemembered(): boolean {
+    return this.#device.getItem(NAME) !== null;
+  }
+
+  set(token: string, remember: boolean): void {
+    this.#session.setItem(NAME, token);
+    if (remember) this.#device.setItem(NAME, token);
+    else this.#device.removeItem(NAME);
+  }
+
+  forget(): void {
+    this.#session.removeItem(NAME);
+    this.#device.removeItem(NAME);
+  }
+}

@@ -1,0 +1,197 @@
+// What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
+import { spawn } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { createServer, request } from 'node:http';
+import { connect } from 'node:net';
+import { tmpdir } from 'node:os';
+import { extname, join, normalize } from 'node:path';
+import { createInterface } from 'node:readline';
+import { fileURLToPath } from 'node:url';
+
+import { chromium } from 'playwright-core';
+
+const DIST = fileURLToPath(new URL('../dist/', import.meta.url));
+const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/debug/jtc', import.meta.url));
+const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
+const CSP = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:";
+const TYPES = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml' };
+
+/** `jtc` with these arguments; resolves to what it printed. */
+export function jtc(args, options = {}) {
+  return new Promise((done, fail) => {
+    const child = spawn(JTC, args, options);
+    let out = '';
+    child.stdout.on('data', (data) => (out += data));
+    child.stderr.on('data', (data) => (out += data));
+    child.on('error', fail);
+    child.on('close', (code) => (code === 0 ? done(out) : fail(new Error(`jtc ${args.join(' ')}: ${code}: ${out}`))));
+  });
+}
+
+/** An agent with a simulated arm, in a directory of its own. */
+export async function startAgent(extra = [], listen = '127.0.0.1:0') {
+  const dir = mkdtempSync(join(tmpdir(), 'openjtc-web-'));
+  const tokenFile = join(dir, 'tokens.toml');
+  const env = { ...process.env, XDG_STATE_HOME: dir };
+  const child = spawn(JTC, ['serve', '--sim', '--listen', listen, '--token-file', tokenFile, '--json', ...extra], { cwd: dir, env });
+  let errors = '';
+  child.stderr.on('data', (data) => (errors += data));
+  const line = await new Promise((done, fail) => {
+    createInterface({ input: child.stdout }).once('line', done);
+    child.once('exit', (code) => fail(new Error(`jtc serve ended with ${code}: ${errors}`)));
+  });
+  const { url } = JSON.parse(line);
+  const tokens = readFileSync(tokenFile, 'utf8');
+  const token = (role) => new RegExp(`${role} = "([^"]+)"`).exec(tokens)[1];
+  const gone = new Promise((done) => child.once('exit', done));
+  return {
+    url,
+    dir,
+    operator: token('operator'),
+    viewer: token('viewer'),
+    /** As a computer that loses power: nothing is closed in order. */
+    kill: () => child.kill('SIGKILL'),
+    suspend: () => child.kill('SIGSTOP'),
+    wake: () => child.kill('SIGCONT'),
+    async end() {
+      child.kill('SIGCONT');
+      child.kill('SIGKILL');
+      await gone;
+      rmSync(dir, { recursive: true, force: true });
+    },
+    async ask(method, path, body, key) {
+      const headers = { Authorization: `Bearer ${token('operator')}`, 'Content-Type': 'application/json' };
+      if (key) headers['Lease-Key'] = key;
+      const response = await fetch(url + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+      const text = await response.text();
+      return { status: response.status, body: text ? JSON.parse(text) : undefined };
+    },
+  };
+}
+
+/**
+ * The built files in front of an agent, as the agent serves them itself: the same policy for contents, the API passed on under the agent's own
+ * address. `mock` answers requests itself where it returns something.
+ */
+export async function startPage(agent, mock = () => undefined) {
+  const target = new URL(agent.url);
+  const headersFor = (headers) => {
+    const out = { ...headers, host: target.host };
+    if (out.origin) out.origin = target.origin;
+    delete out.referer;
+    return out;
+  };
+  const sockets = new Set();
+  const server = createServer((ask, answer) => {
+    const mocked = mock(ask);
+    if (mocked) {
+      answer.writeHead(mocked.status ?? 200, { 'Content-Type': mocked.type ?? 'application/json' });
+      answer.end(typeof mocked.body === 'string' ? mocked.body : JSON.stringify(mocked.body));
+      return;
+    }
+    if (ask.url.startsWith('/api/') || ask.url.startsWith('/metrics')) {
+      const on = request({ host: target.hostname, port: target.port, method: ask.method, path: ask.url, headers: headersFor(ask.headers) }, (from) => {
+        answer.writeHead(from.statusCode, from.headers);
+        from.pipe(answer);
+      });
+      on.on('error', () => answer.destroy());
+      ask.pipe(on);
+      return;
+    }
+    const path = ask.url.split('?')[0];
+    const file = normalize(join(DIST, path === '/' ? 'index.html' : path));
+    try {
+      if (!file.startsWith(DIST)) throw new Error('outside');
+      const bytes = readFileSync(file);
+      answer.writeHead(200, { 'Content-Type': TYPES[extname(file)] ?? 'application/octet-stream', 'Content-Security-Policy': CSP });
+      answer.end(bytes);
+    } catch {
+      answer.writeHead(404).end();
+    }
+  });
+  server.on('connection', (socket) => {
+    sockets.add(socket);
+    socket.on('close', () => sockets.delete(socket));
+  });
+  server.on('upgrade', (ask, socket, head) => {
+    const on = connect(Number(target.port), target.hostname, () => {
+      const lines = Object.entries(headersFor(ask.headers)).map(([name, value]) => `${name}: ${value}`);
+      on.write(`GET ${ask.url} HTTP/1.1\r\n${lines.join('\r\n')}\r\n\r\n`);
+      on.write(head);
+      on.pipe(socket);
+      socket.pipe(on);
+    });
+    on.on('error', () => socket.destroy());
+    socket.on('error', () => on.destroy());
+    socket.on('close', () => on.destroy());
+    on.on('close', () => socket.destroy());
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  return {
+    url: `http://127.0.0.1:${server.address().port}`,
+    end: () => {
+      for (const socket of sockets) socket.destroy();
+      return new Promise((done) => server.close(done));
+    },
+  };
+}
+
+export function startBrowser() {
+  return chromium.launch({
+    executablePath: CHROMIUM,
+    args: [
+      '--headless=new', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking',
+      '--disable-component-update', '--disable-sync', '--disable-quic', '--no-first-run',
+    ],
+  });
+}
+
+/** A page that collects what a browser complains of. */
+export async function open(browser, url, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, ...options });
+  const page = await context.newPage();
+  page.complaints = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error') page.complaints.push(message.text());
+  });
+  page.on('pageerror', (error) => page.complaints.push(String(error)));
+  await page.goto(url);
+  return page;
+}
+
+/** Waits until a condition holds in this process. */
+export async function until(what, condition, within = 10_000) {
+  const end = Date.now() + within;
+  for (;;) {
+    const value = await condition();
+    if (value) return value;
+    if (Date.now() > end) throw new Error(`not within ${within} ms: ${what}`);
+    await new Promise((done) => setTimeout(done, 50));
+  }
+}
+
+/** Recovers the arm and runs what is given, as another client. */
+export async function commanding(agent, act, name = 'test') {
+  const grant = await agent.ask('POST', '/api/lease', { name, lasts_s: 60 });
+  if (grant.status !== 200) throw new Error(JSON.stringify(grant));
+  const key = grant.body.key;
+  try {
+    return await act(key);
+  } finally {
+    await agent.ask('DELETE', '/api/lease', undefined, key);
+  }
+}
+
+export async function ended(agent, number, within = 30_000) {
+  return until(`job ${number} ended`, async () => {
+    const { body } = await agent.ask('GET', `/api/jobs/${number}`);
+    return body.stage === 'running' ? undefined : body;
+  }, within);
+}
+
+export async function recover(agent) {
+  return commanding(agent, async (key) => {
+    const job = await agent.ask('POST', '/api/recover', { defaults: true }, key);
+    return ended(agent, job.body.number);
+  });
+}

@@ -1,0 +1,79 @@
+// Jogging with a dead man's switch: rates go out as long as a key is held, zeros when it is let go, by whatever.
+
+/** So often rates are sent, ms: they hold for 200 ms. */
+export const PERIOD_MS = 90;
+/** No request is waited for longer than this before the next one goes out, ms. */
+const LATE_MS = 160;
+
+export interface JogLine {
+  /** Sends rates; resolves when they were taken. `first`: the person has just touched. */
+  send(rates: number[], first: boolean): Promise<unknown>;
+  /** It was refused, and is not asked for on. */
+  refused(error: unknown): void;
+  every(act: () => void, ms: number): unknown;
+  never(handle: unknown): void;
+  now(): number;
+}
+
+export class Jogger {
+  #rates: number[] | undefined;
+  #timer: unknown;
+  #open = 0;
+  #sentAt = 0;
+  #turn = 0;
+  readonly #line: JogLine;
+
+  constructor(line: JogLine) {
+    this.#line = line;
+  }
+
+  get isHeld(): boolean {
+    return this.#rates !== undefined;
+  }
+
+  /** A key is pressed: one joint, rad/s. */
+  press(joint: number, rate: number): void {
+    this.release();
+    const rates = new Array<number>(6).fill(0);
+    rates[joint - 1] = rate;
+    this.#rates = rates;
+    this.#turn += 1;
+    this.#send(true);
+    this.#timer = this.#line.every(() => this.#send(false), PERIOD_MS);
+  }
+
+  /** The key is let go, the pointer lost, the window left, the connection gone. Without a pressed key nothing is sent. */
+  release(): void {
+    if (!this.#rates) return;
+    this.#end();
+    void this.#line.send(new Array<number>(6).fill(0), false).catch(() => {
+      // Rates hold for 200 ms only: without an answer the arm stops by itself.
+    });
+  }
+
+  #end(): void {
+    this.#rates = undefined;
+    this.#turn += 1;
+    this.#line.never(this.#timer);
+    this.#timer = undefined;
+  }
+
+  #send(first: boolean): void {
+    const rates = this.#rates;
+    if (!rates) return;
+    // One request at a time, so that a slow line does not fill with old ones.
+    if (this.#open > 0 && this.#line.now() - this.#sentAt < LATE_MS) return;
+    const turn = this.#turn;
+    this.#open += 1;
+    this.#sentAt = this.#line.now();
+    this.#line.send(rates, first).then(
+      () => (this.#open -= 1),
+      (error: unknown) => {
+        this.#open -= 1;
+        if (turn !== this.#turn) return;
+        this.#end();
+        this.#line.refused(error);
+      },
+    );
+  }
+}

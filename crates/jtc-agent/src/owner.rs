@@ -1,5 +1,5 @@
 //! The owner of a port: one thread that reads and writes it for all clients.
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use jtc_host::{Port, PortError};
 use jtc_wire::Status;
 use tokio::sync::watch;
 
-use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine};
+use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
 /// Longest that the owner waits for the device before it looks at what clients want: a Stop waits no longer for its turn.
@@ -34,6 +34,8 @@ struct Shared {
     changed: watch::Sender<()>,
     /// What the controller was given to follow.
     upload: Mutex<Upload>,
+    /// Frames that may have changed the arm.
+    arm_changes: AtomicU64,
     ended: AtomicBool,
     start: Instant,
     baud: Option<u32>,
@@ -122,6 +124,11 @@ impl Line {
         }
     }
 
+    /// Frames that may have changed the arm of the controller.
+    pub fn arm_changes(&self) -> u64 {
+        self.0.arm_changes.load(Ordering::Relaxed)
+    }
+
     /// Name of the client that commands now.
     pub fn commander(&self) -> Option<String> {
         self.with(|line, _| line.introduction(line.lease()?.holder).map(|client| client.name.clone()))
@@ -172,6 +179,7 @@ impl Owner {
             delivered: Condvar::new(),
             changed: watch::Sender::new(()),
             upload: Mutex::default(),
+            arm_changes: AtomicU64::new(0),
             ended: AtomicBool::new(false),
             start: Instant::now(),
             baud: port.baud(),
@@ -255,6 +263,8 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
     for event in events.iter().filter(|event| Upload::is_of(event)) {
         shared.upload.lock().unwrap_or_else(PoisonError::into_inner).see(event);
     }
+    let changes = |event: &&LineEvent| matches!(event, LineEvent::Sent { frame_type, .. } if may_change_the_arm(*frame_type));
+    shared.arm_changes.fetch_add(events.iter().filter(changes).count() as u64, Ordering::Relaxed);
     events.iter().for_each(|event| observer(now, event));
     Ok(())
 }

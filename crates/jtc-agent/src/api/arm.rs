@@ -81,7 +81,7 @@ impl From<Given> for GivenObject {
 }
 
 /// A hash as it is written everywhere.
-fn in_words(hash: u64) -> String {
+pub(super) fn in_words(hash: u64) -> String {
     format!("{hash:016x}")
 }
 

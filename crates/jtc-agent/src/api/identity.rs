@@ -25,27 +25,36 @@ pub(super) struct Identity {
     pub arm: Arc<Arm>,
     /// That of its arm.
     hash: Option<u64>,
+    /// Frames that may have changed the arm, as far as they had gone to the controller when it was asked.
+    changes: u64,
 }
 
 impl Identity {
     /// Before it was asked.
     pub fn of(arm: &Arm) -> Self {
-        Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash: arm.hash().ok().flatten() }
+        let hash = arm.hash().ok().flatten();
+        Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
+    }
+
+    /// What the controller says of itself, where the arm is the one that it has in use.
+    pub fn of_controller(&self) -> Option<&Info> {
+        self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }
 }
 
 impl Agent {
-    /// What is known of the controller: it is asked where that is not of the last seconds.
+    /// What is known of the controller: it is asked where that is not of the last seconds, or its arm may have changed since.
     pub(super) async fn identity(&self) -> Identity {
         // Whoever comes meanwhile waits for what the first one asks.
         let mut known = self.identity.lock().await;
-        let old = known.asked.is_none_or(|asked| asked.elapsed() >= FRESH);
+        let changes = self.line.arm_changes();
+        let old = known.asked.is_none_or(|asked| asked.elapsed() >= FRESH) || known.changes != changes;
         let there =
             self.line.with(|line, now| line.status().is_some_and(|(at, _)| now.saturating_sub(*at) < SILENT));
         if !old || !there {
             return known.clone();
         }
-        known.asked = Some(Instant::now());
+        (known.asked, known.changes) = (Some(Instant::now()), changes);
         let hash = known.hash;
         let asked = self.jobs.asker().call_in_turn(move |session| {
             let info = session.info().ok().flatten()?;

@@ -10,6 +10,7 @@ mod identity;
 mod lease;
 mod log;
 mod metrics;
+mod model;
 mod objects;
 mod plans;
 mod questions;
@@ -236,6 +237,7 @@ fn described() -> OpenApiRouter<Agent> {
     let others = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(status))
         .routes(routes!(metrics::metrics))
+        .routes(routes!(model::model))
         .routes(routes!(stop))
         .routes(routes!(pause))
         .routes(routes!(events::events))

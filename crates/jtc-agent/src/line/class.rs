@@ -64,6 +64,25 @@ impl HostFrame {
     }
 }
 
+/// The arm may be another one behind it (J-51 to J-55).
+pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
+    use FrameType::*;
+    matches!(
+        frame_type,
+        FrictionTable
+            | FrictionTableUseDefault
+            | FrictionPolynomial
+            | FrictionPolynomialUseDefault
+            | PidParam
+            | PidParamUseDefault
+            | ArmModel
+            | ArmModelUseDefault
+            | SetSettings
+            | SetName
+            | Disable
+    )
+}
+
 /// The frame that a device returns to a request of this type beside the record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {

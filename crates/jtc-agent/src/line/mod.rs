@@ -20,6 +20,7 @@ use jtc_wire::{ExecCommand, FrameType, Status, StatusCounters, StatusReceiver};
 
 pub use agent_kit::access::Role;
 pub use class::Class;
+pub(crate) use class::may_change_the_arm;
 pub use client::{ClientId, Delivery, Introduction, Policy, PutOut};
 pub use event::{Counts, LineEvent};
 pub use lease::{Denied, Lease};

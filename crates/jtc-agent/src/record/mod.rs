@@ -23,7 +23,7 @@ use jtc_host::session::StatusClock;
 use jtc_host::{Arm, Sample, Session, Trajectory};
 use jtc_wire::{ControllerState, FrameType, Status};
 
-use crate::line::{Introduction, LineEvent, Policy, Role};
+use crate::line::{Introduction, LineEvent, Policy, Role, may_change_the_arm};
 use crate::owner::{ClientPort, Line};
 use crate::upload::Upload;
 use disk::Disk;
@@ -57,25 +57,6 @@ enum Seen {
     Jog(Duration),
     /// Something that may change the arm, at this time of the line.
     Change(Duration),
-}
-
-/// The arm may be another one behind it (J-51 to J-55).
-fn may_change_the_arm(frame_type: FrameType) -> bool {
-    use FrameType::*;
-    matches!(
-        frame_type,
-        FrictionTable
-            | FrictionTableUseDefault
-            | FrictionPolynomial
-            | FrictionPolynomialUseDefault
-            | PidParam
-            | PidParamUseDefault
-            | ArmModel
-            | ArmModelUseDefault
-            | SetSettings
-            | SetName
-            | Disable
-    )
 }
 
 /// Sees what happens on the line, for the recorder. It never waits.

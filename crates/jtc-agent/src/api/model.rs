@@ -1,0 +1,144 @@
+//! The arm as numbers, for who draws it: frames, limits and masses, without a question on the line for each who looks.
+use agent_kit::api::Refusals;
+use axum::Json;
+use axum::extract::State;
+use jtc_host::Arm;
+use jtc_wire::Joint;
+use utoipa::ToSchema;
+
+use super::Agent;
+use super::arm::in_words;
+use super::identity::Identity;
+
+/// Whose arm it is.
+#[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelSource {
+    /// The controller has it in use.
+    Controller,
+    /// The agent was given it, and the controller cannot be asked for its own, or has not answered yet.
+    Agent,
+}
+
+/// The arm in use.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ModelObject {
+    /// Its name.
+    pub name: String,
+    /// Hash of all that decides how the arm moves; missing where the agent's arm lacks a part of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hash: Option<String>,
+    /// Whose it is.
+    pub source: ModelSource,
+    /// Acceleration of gravity in the frame of the base, m/s².
+    #[schema(min_items = 3, max_items = 3)]
+    pub gravity_m_s2: [f64; 3],
+    /// Joints, from the base. Each rotates about the z axis of its frame.
+    #[schema(min_items = 6, max_items = 6)]
+    pub joints: Vec<ModelJoint>,
+    /// The flange, which does not move, in the frame of joint 6.
+    pub flange: FrameObject,
+    /// Links: the base, and behind each joint the one that it moves, in whose frame its numbers are.
+    #[schema(min_items = 7, max_items = 7)]
+    pub links: Vec<ModelLink>,
+}
+
+/// A joint: where it is, and its limits.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ModelJoint {
+    /// Which, 1 to 6 from the base.
+    pub joint: u8,
+    /// Its name.
+    pub name: String,
+    /// Where its frame is in that of the joint before it, at position 0: x, y, z, m.
+    #[schema(min_items = 3, max_items = 3)]
+    pub origin_xyz_m: [f64; 3],
+    /// How it is turned there: roll, pitch, yaw about fixed axes, as in a URDF, rad.
+    #[schema(min_items = 3, max_items = 3)]
+    pub origin_rpy_rad: [f64; 3],
+    /// Lowest position, rad.
+    pub position_min_rad: f64,
+    /// Highest position, rad.
+    pub position_max_rad: f64,
+    /// Highest speed, rad/s.
+    pub velocity_max_rad_s: f64,
+    /// Highest acceleration, rad/s².
+    pub acceleration_max_rad_s2: f64,
+    /// Highest torque, N·m.
+    pub torque_max_nm: f64,
+}
+
+/// Where a frame is.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct FrameObject {
+    /// x, y, z, m.
+    #[schema(min_items = 3, max_items = 3)]
+    pub origin_xyz_m: [f64; 3],
+    /// Roll, pitch, yaw, rad.
+    #[schema(min_items = 3, max_items = 3)]
+    pub origin_rpy_rad: [f64; 3],
+}
+
+/// A link.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct ModelLink {
+    /// Its name.
+    pub name: String,
+    /// kg.
+    pub mass_kg: f64,
+    /// Centre of mass, m.
+    #[schema(min_items = 3, max_items = 3)]
+    pub com_xyz_m: [f64; 3],
+}
+
+impl From<&Identity> for ModelObject {
+    fn from(identity: &Identity) -> Self {
+        let arm: &Arm = &identity.arm;
+        // The same arm has another name where it was given one.
+        let (source, name) = match identity.of_controller() {
+            Some(info) => (ModelSource::Controller, info.arm.to_string()),
+            None => (ModelSource::Agent, arm.name.clone()),
+        };
+        let joint = |joint: Joint| {
+            let (j, limits) = (joint.index(), &arm.joints[joint.index()]);
+            let frame = arm.model.joints[j];
+            ModelJoint {
+                joint: joint.number(),
+                name: arm.joint_names[j].clone(),
+                origin_xyz_m: frame.xyz,
+                origin_rpy_rad: frame.rpy,
+                position_min_rad: limits.position_min,
+                position_max_rad: limits.position_max,
+                velocity_max_rad_s: limits.velocity_max,
+                acceleration_max_rad_s2: limits.acceleration_max,
+                torque_max_nm: limits.torque_max,
+            }
+        };
+        let links = arm.link_names.iter().zip(&arm.model.links).map(|(name, link)| ModelLink {
+            name: name.clone(),
+            mass_kg: link.mass,
+            com_xyz_m: link.origin.xyz,
+        });
+        let [.., flange] = arm.model.joints;
+        Self {
+            name,
+            hash: arm.hash().ok().flatten().map(in_words),
+            source,
+            gravity_m_s2: arm.config().gravity,
+            joints: Joint::ALL.into_iter().map(joint).collect(),
+            flange: FrameObject { origin_xyz_m: flange.xyz, origin_rpy_rad: flange.rpy },
+            links: links.collect(),
+        }
+    }
+}
+
+/// Frames, limits and masses of the arm in use. The controller is asked when its arm may have changed, and once in a while.
+#[utoipa::path(
+    get,
+    path = "/api/arm/model",
+    operation_id = "get_arm_model",
+    responses((status = 200, description = "The arm that the controller has, or the agent's", body = ModelObject), Refusals)
+)]
+pub(super) async fn model(State(agent): State<Agent>) -> Json<ModelObject> {
+    Json(ModelObject::from(&agent.identity().await))
+}

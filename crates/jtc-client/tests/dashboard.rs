@@ -1,0 +1,115 @@
+//! What a page shows that looks at an agent: the arm as numbers, trajectories to draw, what is commanded, what codes mean, reports.
+mod common;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use common::Served;
+use common::program::{Program, WAIT};
+use jtc_host::port::sim::LivePort;
+use jtc_host::{Arm, Port, PortError};
+use serde_json::{Value, json};
+
+fn look(served: &Served, request: &str) -> (u16, Value) {
+    served.api_as(Some(&served.tokens.viewer), request, None, None)
+}
+
+fn numbers<const N: usize>(value: &Value) -> [f64; N] {
+    serde_json::from_value::<Vec<f64>>(value.clone()).expect("numbers").try_into().expect("so many")
+}
+
+/// A line that counts the bytes which go to the controller.
+struct Counted(LivePort, Arc<AtomicU64>);
+
+impl Port for Counted {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        self.0.read(buffer, timeout)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.1.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.0.write_all(bytes)
+    }
+
+    fn now(&self) -> Duration {
+        self.0.now()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.0.baud()
+    }
+}
+
+/// The arm of the controller once it was asked.
+fn model(served: &Served) -> Value {
+    let end = Instant::now() + WAIT;
+    loop {
+        let (status, model) = look(served, "GET /api/arm/model");
+        assert_eq!(status, 200, "{model}");
+        if model["source"] == "controller" {
+            return model;
+        }
+        assert!(model["source"] == "agent" && Instant::now() < end, "{model}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn the_arm_is_shown_as_numbers_without_a_question_for_each_who_looks() {
+    let sent = Arc::new(AtomicU64::new(0));
+    let served = Served::start_on(Counted(common::simulated(921_600), sent.clone()), None, &[]);
+    let shown = model(&served);
+    let arm = Arm::avena();
+    assert_eq!(
+        (&shown["name"], &shown["hash"]),
+        (&json!("avena"), &look(&served, "GET /api/info").1["hash"])
+    );
+    let joints = shown["joints"].as_array().expect("joints");
+    assert_eq!((joints.len(), shown["links"].as_array().map(Vec::len)), (6, Some(7)));
+    for (j, joint) in joints.iter().enumerate() {
+        let (limits, frame) = (&arm.joints[j], &arm.model.joints[j]);
+        assert_eq!(
+            (joint["joint"].as_u64(), joint["name"].as_str()),
+            (Some(j as u64 + 1), Some(&*arm.joint_names[j]))
+        );
+        for (name, value) in [
+            ("position_min_rad", limits.position_min),
+            ("position_max_rad", limits.position_max),
+            ("velocity_max_rad_s", limits.velocity_max),
+            ("acceleration_max_rad_s2", limits.acceleration_max),
+            ("torque_max_nm", limits.torque_max),
+        ] {
+            assert!((joint[name].as_f64().expect(name) - value).abs() < 1e-6, "{name}: {joint}");
+        }
+        assert!((numbers::<3>(&joint["origin_xyz_m"])[2] - frame.xyz[2]).abs() < 1e-6);
+        assert!((numbers::<3>(&joint["origin_rpy_rad"])[0] - frame.rpy[0]).abs() < 1e-6);
+    }
+    let flange = numbers::<3>(&shown["flange"]["origin_xyz_m"]);
+    assert!((flange[2] - arm.model.joints[6].xyz[2]).abs() < 1e-6, "{flange:?}");
+    assert!((numbers::<3>(&shown["gravity_m_s2"])[2] + 9.81).abs() < 0.01, "{shown}");
+    let mass = |shown: &Value, n: usize| shown["links"][n]["mass_kg"].as_f64().expect("a mass");
+    assert!((0..7).all(|n| (mass(&shown, n) - arm.model.links[n].mass).abs() < 1e-6), "{shown}");
+    let com = numbers::<3>(&shown["links"][2]["com_xyz_m"]);
+    assert!(com.iter().zip(&arm.model.links[2].origin.xyz).all(|(a, b)| (a - b).abs() < 1e-6));
+
+    let before = sent.load(Ordering::Relaxed);
+    (0..100).for_each(|_| assert_eq!(model(&served), shown));
+    let asked = sent.load(Ordering::Relaxed) - before;
+    assert!(asked < 1000, "{asked} bytes for a hundred who look within some seconds");
+
+    // Another one is shown at once.
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    let slow = json!({ "settings": [{ "name": "velocity_max_rad_s", "joint": 2, "value": 0.25 }] });
+    assert_eq!(anna.ask("PUT /api/settings", Some(slow)).0, 204);
+    let end = Instant::now() + WAIT;
+    let now = loop {
+        let now = model(&served);
+        if now["hash"] != shown["hash"] {
+            break now;
+        }
+        assert!(Instant::now() < end, "it stays: {now}");
+    };
+    assert_eq!(now["joints"][1]["velocity_max_rad_s"], 0.25, "{now}");
+    assert_eq!(now["hash"], look(&served, "GET /api/info").1["hash"]);
+}

@@ -8,8 +8,20 @@ use std::time::{Duration, Instant};
 use common::Served;
 use common::program::{Program, WAIT};
 use jtc_host::port::sim::LivePort;
-use jtc_host::{Arm, Port, PortError};
+use jtc_host::{Arm, Port, PortError, plan};
 use serde_json::{Value, json};
+
+/// From the zero pose to another one at half of the limits, as a file.
+fn there() -> String {
+    let way = plan::joint_move(&[0.0; 6], &[0.4, -0.2, 0.3, 0.0, 0.2, 0.1], &Arm::avena().config(), 50.0);
+    way.expect("it is within the limits").to_exact_csv()
+}
+
+fn keep(served: &Served, number: u16) {
+    let body = json!({ "name": "there", "text": there() });
+    let (status, kept) = served.api(&format!("PUT /api/trajectories/{number}"), None, Some(body));
+    assert_eq!(status, 200, "{kept}");
+}
 
 fn look(served: &Served, request: &str) -> (u16, Value) {
     served.api_as(Some(&served.tokens.viewer), request, None, None)
@@ -112,4 +124,38 @@ fn the_arm_is_shown_as_numbers_without_a_question_for_each_who_looks() {
     };
     assert_eq!(now["joints"][1]["velocity_max_rad_s"], 0.25, "{now}");
     assert_eq!(now["hash"], look(&served, "GET /api/info").1["hash"]);
+}
+
+#[test]
+fn a_trajectory_is_thinned_evenly_and_its_ends_stay() {
+    let served = Served::start(921_600);
+    keep(&served, 7);
+    let whole = look(&served, "GET /api/trajectories/7/points?most=2000").1;
+    let all = whole["positions_rad"].as_array().expect("points");
+    let (count, duration) = (all.len(), whole["duration_s"].as_f64().expect("a number"));
+    assert!(count > 60 && whole["times_s"].as_array().map(Vec::len) == Some(count), "{count}");
+    assert_eq!(numbers::<6>(&all[count - 1]), [0.4, -0.2, 0.3, 0.0, 0.2, 0.1]);
+    for most in [2, 3, 50] {
+        let (status, few) = look(&served, &format!("GET /api/trajectories/7/points?most={most}"));
+        let (points, times) = (few["positions_rad"].as_array(), few["times_s"].as_array());
+        let (points, times) = (points.expect("points"), times.expect("times"));
+        assert_eq!(
+            (status, points.len(), times.len(), few["name"].as_str()),
+            (200, most, most, Some("there"))
+        );
+        assert_eq!((&points[0], &points[most - 1]), (&all[0], &all[count - 1]));
+        let times: Vec<f64> = times.iter().filter_map(Value::as_f64).collect();
+        assert_eq!((times[0], times[most - 1]), (0.0, duration));
+        let even = duration / (most - 1) as f64;
+        let step = duration / (count - 1) as f64;
+        assert!(times.windows(2).all(|two| (two[1] - two[0] - even).abs() <= step + 1e-9), "{times:?}");
+    }
+    let shown = look(&served, "GET /api/trajectories/7/points").1;
+    assert_eq!(shown["times_s"].as_array().map(Vec::len), Some(count.min(500)));
+    for (most, limit) in [(1, 2.0), (2001, 2000.0)] {
+        let (status, error) = look(&served, &format!("GET /api/trajectories/7/points?most={most}"));
+        assert_eq!((status, &error["value"], &error["limit"]), (422, &json!(f64::from(most)), &json!(limit)));
+    }
+    assert_eq!(look(&served, "GET /api/trajectories/7/points?most=x").0, 400);
+    assert_eq!(look(&served, "GET /api/trajectories/8/points").0, 404);
 }

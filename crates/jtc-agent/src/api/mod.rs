@@ -245,6 +245,7 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(lease::take, lease::renew, lease::release))
         .routes(routes!(trajectories::list))
         .routes(routes!(trajectories::check))
+        .routes(routes!(trajectories::points))
         .routes(routes!(runs::begin_run))
         .routes(routes!(runs::begin_move))
         .routes(routes!(runs::jobs))

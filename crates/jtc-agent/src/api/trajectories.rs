@@ -1,20 +1,26 @@
 //! Trajectories by number: kept, checked, listed.
-use agent_kit::api::{Number, Refusals};
+use std::sync::Arc;
+
+use agent_kit::api::{Asked, Number, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use axum::{Extension, Json};
 use jtc_host::check::Verdict;
-use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, Session};
+use jtc_host::error::Facts;
+use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session};
 use jtc_wire::Joint;
 use serde_json::json;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::{blocking, read};
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::Stored;
 use crate::owner::ClientPort;
+
+/// Most points that are shown at once.
+const POINTS_MAX: usize = 2000;
 
 /// A trajectory to keep.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -56,6 +62,59 @@ impl From<&Stored> for TrajectoryObject {
             step_ms: trajectory.step_ms,
             duration_s: trajectory.duration_s(),
             notes: notes.clone(),
+        }
+    }
+}
+
+/// How much of a trajectory is shown.
+#[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct PointsRequest {
+    /// Most points: of more of them some are left out, evenly, and never the first and the last.
+    #[serde(default = "some_points")]
+    #[param(minimum = 2, maximum = 2000, default = 500)]
+    most: usize,
+}
+
+fn some_points() -> usize {
+    500
+}
+
+/// A trajectory to draw.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct PointsObject {
+    /// Its number.
+    pub number: u16,
+    /// What people call it.
+    pub name: String,
+    /// s.
+    pub duration_s: f64,
+    /// Times of the points, s.
+    pub times_s: Vec<f64>,
+    /// Where the joints are at each of them, from the base, rad.
+    pub positions_rad: Vec<[f64; 6]>,
+}
+
+impl PointsObject {
+    /// So many points at most, which are two or more.
+    fn new(stored: &Stored, most: usize) -> Self {
+        let Stored { number, name, trajectory, .. } = stored;
+        let count = trajectory.points.len();
+        let (shown, steps) = (count.min(most), count.saturating_sub(1));
+        let places = (0..shown).map(|k| k * steps / shown.saturating_sub(1).max(1));
+        let (times_s, positions_rad) = places
+            .filter_map(|place| {
+                let point = trajectory.points.get(place)?;
+                Some((place as f64 * f64::from(trajectory.step_ms) / 1000.0, point.position))
+            })
+            .unzip();
+        Self {
+            number: *number,
+            name: name.clone(),
+            duration_s: trajectory.duration_s(),
+            times_s,
+            positions_rad,
         }
     }
 }
@@ -181,6 +240,42 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
+/// Points of a trajectory, to draw it.
+#[utoipa::path(
+    get,
+    path = "/api/trajectories/{number}/points",
+    operation_id = "get_points",
+    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99), PointsRequest),
+    responses(
+        (status = 200, description = "Times and joint positions", body = PointsObject),
+        (status = 404, description = "There is none", body = ErrorObject),
+        Refusals, Denials
+    )
+)]
+pub(super) async fn points(
+    State(agent): State<Agent>,
+    Number(number): Number<u16>,
+    Asked(PointsRequest { most }): Asked<PointsRequest>,
+) -> Result<Json<PointsObject>, ErrorObject> {
+    if !(2..=POINTS_MAX).contains(&most) {
+        let limit = if most < 2 { 2 } else { POINTS_MAX };
+        let facts = Facts { value: Some(most as f64), limit: Some(limit as f64), ..Facts::default() };
+        let message = format!("{most} points: 2 to {POINTS_MAX} are shown");
+        let error = ErrorObject::new("points", message, "ask for fewer, and draw lines between them");
+        return Err(error.kind(ErrorKind::Usage).with(&facts));
+    }
+    Ok(Json(PointsObject::new(&*kept(&agent, number)?, most)))
+}
+
+/// The trajectory that is kept under a number.
+fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, ErrorObject> {
+    agent
+        .jobs
+        .store
+        .get(number)
+        .ok_or_else(|| ErrorObject::nothing("trajectory", number, "/api/trajectories"))
+}
+
 /// Checks a trajectory with the limits, the model and the payload of the controller, from its own first point.
 #[utoipa::path(
     get,
@@ -197,11 +292,7 @@ pub(super) async fn check(
     State(agent): State<Agent>,
     Number(number): Number<u16>,
 ) -> Result<Json<CheckObject>, ErrorObject> {
-    let stored = agent
-        .jobs
-        .store
-        .get(number)
-        .ok_or_else(|| ErrorObject::nothing("trajectory", number, "/api/trajectories"))?;
+    let stored = kept(&agent, number)?;
     let (own, room) = (agent.jobs.arm().clone(), agent.checks.clone().acquire_owned().await);
     let asked = move |session: &mut Session<ClientPort>| -> Result<(Arm, CheckOptions), Error> {
         let device = session.device_config()?;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use common::Served;
 use common::program::{Program, WAIT};
 use jtc_host::port::sim::LivePort;
-use jtc_host::{Arm, Port, PortError, plan};
+use jtc_host::{Arm, Port, PortError, explain, plan};
 use serde_json::{Value, json};
 
 /// From the zero pose to another one at half of the limits, as a file.
@@ -158,4 +158,33 @@ fn a_trajectory_is_thinned_evenly_and_its_ends_stay() {
     }
     assert_eq!(look(&served, "GET /api/trajectories/7/points?most=x").0, 400);
     assert_eq!(look(&served, "GET /api/trajectories/8/points").0, 404);
+}
+
+#[test]
+fn codes_are_explained_by_name_number_and_words() {
+    let served = Served::start(921_600);
+    let all = look(&served, "GET /api/explain").1;
+    let all = all.as_array().expect("pages");
+    assert_eq!(all.len(), explain::pages().count());
+    for page in explain::pages() {
+        let (status, shown) = look(&served, &format!("GET /api/explain/{}", page.name));
+        assert_eq!((status, shown["code"].as_str()), (200, Some(page.name)), "{shown}");
+        assert_eq!(shown["text"], page.to_string());
+        assert!(shown["also"].is_null() && all.contains(&shown), "{shown}");
+    }
+    for (asked, in_plain) in [
+        ("HoldPos", "HoldPos"),
+        ("can:0x400", "can:0x400"),
+        ("joint%203%3A%20over-current", "joint 3: over-current"),
+    ] {
+        let shown = look(&served, &format!("GET /api/explain/{asked}")).1;
+        assert_eq!(shown["code"], explain::find(in_plain)[0].name, "{shown}");
+    }
+    let several = look(&served, "GET /api/explain/jtc:0x12").1;
+    assert_eq!(several["also"].as_array().map(Vec::len), Some(1), "{several}");
+    let (status, error) = look(&served, "GET /api/explain/no-such-thing");
+    assert!(
+        status == 404 && error["message"].as_str().is_some_and(|m| m.contains("no-such-thing")),
+        "{error}"
+    );
 }

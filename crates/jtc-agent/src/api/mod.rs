@@ -5,6 +5,7 @@ mod body;
 mod commands;
 mod error;
 mod events;
+mod explain;
 mod foxglove;
 mod identity;
 mod lease;
@@ -238,6 +239,8 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(status))
         .routes(routes!(metrics::metrics))
         .routes(routes!(model::model))
+        .routes(routes!(explain::list))
+        .routes(routes!(explain::explain))
         .routes(routes!(stop))
         .routes(routes!(pause))
         .routes(routes!(events::events))

@@ -1,4 +1,5 @@
 //! What the API sends: one type for each object, from which its description is made.
+use jtc_host::explain::{self, Family};
 use jtc_host::sample::is_measured;
 use jtc_host::session::Payload;
 use jtc_host::words;
@@ -49,6 +50,11 @@ pub struct ControllerObject {
     pub point: u32,
     /// Errors now.
     pub errors: Vec<String>,
+    /// Names of their pages, in the same order: `GET /api/explain/{code}`.
+    pub error_codes: Vec<String>,
+    /// What is wrong, the most particular first, with the joint of each: also what its drive reports. `GET /api/explain/{code}` takes them as
+    /// they are.
+    pub causes: Vec<String>,
     /// Errors since they were cleared last.
     pub errors_occurred: Vec<String>,
     /// Joints, from the base.
@@ -79,6 +85,8 @@ pub struct JointObject {
     pub temperature_c: Option<u8>,
     /// Errors that the controller has found at it.
     pub errors: Vec<String>,
+    /// Names of their pages, in the same order.
+    pub error_codes: Vec<String>,
 }
 
 /// Who commands.
@@ -136,6 +144,7 @@ pub struct SentObject {
 impl From<&Status> for ControllerObject {
     fn from(status: &Status) -> Self {
         let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
+        let codes = |family, word: u16| texts(explain::names(family, word.into()));
         let joints = Joint::ALL.into_iter().zip(&status.joints).map(|(joint, values)| {
             let measured = is_measured(status, joint.index());
             JointObject {
@@ -146,6 +155,7 @@ impl From<&Status> for ControllerObject {
                 torque_nm: measured.then_some(values.torque),
                 temperature_c: measured.then_some(values.temperature),
                 errors: texts(words::joint_errors(values.internal)),
+                error_codes: codes(Family::Joint, values.internal),
             }
         });
         Self {
@@ -153,6 +163,8 @@ impl From<&Status> for ControllerObject {
             trajectory: status.trajectory.name().to_owned(),
             point: status.point,
             errors: texts(words::errors(status.errors)),
+            error_codes: codes(Family::Jtc, status.errors),
+            causes: words::causes(status),
             errors_occurred: texts(words::errors(status.occurred)),
             joints: joints.collect(),
             next: words::next_step(status).replace('`', ""),

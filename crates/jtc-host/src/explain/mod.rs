@@ -110,6 +110,11 @@ impl Page {
     pub fn number(&self) -> u32 {
         if self.family.is_bits() { 1 << self.code } else { self.code }
     }
+
+    /// As it stands on a screen; its name where no screen shows it.
+    pub fn title(&self) -> String {
+        own_words(self).unwrap_or_else(|| self.name.replace('-', " "))
+    }
 }
 
 impl std::fmt::Display for Page {
@@ -145,6 +150,17 @@ const fn page(family: Family, code: u32, name: &'static str, texts: [&'static st
 pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
     let own = controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES);
     own.chain(check::MISSING).chain(check::FOUND)
+}
+
+/// The page with this name.
+pub fn named(name: &str) -> Option<&'static Page> {
+    pages().find(|page| page.name == name)
+}
+
+/// Names of the pages about the bits that are set in a word of a family.
+pub fn names(family: Family, word: u32) -> Vec<&'static str> {
+    let own = pages().filter(|page| page.family == family && word & page.number() != 0);
+    own.map(|page| page.name).collect()
 }
 
 /// The words that commands print for this code.
@@ -315,6 +331,21 @@ mod tests {
         has("does not answer", Family::Can, 8);
         has("not allowed in this state", Family::Data, 7);
         assert_eq!(find("HoldPos").len(), 1);
+    }
+
+    /// A bit has as many names as it has words, in the same order, and each leads to its page alone.
+    #[test]
+    fn the_bits_of_a_word_have_the_names_of_their_pages() {
+        for (family, word, words) in [
+            (Family::Jtc, 0x92, words::errors(0x92)),
+            (Family::Joint, 0x31, words::joint_errors(0x31)),
+            (Family::Jtc, 0, Vec::new()),
+        ] {
+            let found: Vec<&Page> = names(family, word).into_iter().filter_map(named).collect();
+            assert_eq!(found.iter().map(|page| page.title()).collect::<Vec<_>>(), words);
+        }
+        assert_eq!(named("position error over limit"), None);
+        assert!(pages().all(|page| !page.title().is_empty() && named(page.name) == Some(page)));
     }
 
     /// No bit and no code without a page, no page twice.

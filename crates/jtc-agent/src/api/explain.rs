@@ -1,0 +1,64 @@
+//! What a code means: the pages of `jtc explain`.
+use agent_kit::api::{Number, Refusals};
+use axum::Json;
+use jtc_host::explain::{Page, find, named, pages};
+use utoipa::ToSchema;
+
+use super::ErrorObject;
+
+/// A page about a code.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct PageObject {
+    /// Name of the code, unique: as in `error_codes` of the status.
+    pub code: String,
+    /// As it stands on a screen.
+    pub title: String,
+    /// What it means, what usually causes it, what to do, the next command: as `jtc explain` prints it.
+    pub text: String,
+    /// Other pages that fit what was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also: Vec<String>,
+}
+
+impl From<&Page> for PageObject {
+    fn from(page: &Page) -> Self {
+        Self { code: page.name.to_owned(), title: page.title(), text: page.to_string(), also: Vec::new() }
+    }
+}
+
+/// All pages.
+#[utoipa::path(
+    get,
+    path = "/api/explain",
+    operation_id = "list_codes",
+    responses((status = 200, description = "A page for each code", body = Vec<PageObject>), Refusals)
+)]
+pub(super) async fn list() -> Json<Vec<PageObject>> {
+    Json(pages().map(PageObject::from).collect())
+}
+
+/// The page about a code.
+#[utoipa::path(
+    get,
+    path = "/api/explain/{code}",
+    operation_id = "explain",
+    params((
+        "code" = String, Path,
+        description = "Name of a code, or what `jtc explain` takes: the words that a screen shows, a number as `can:0x100`, words of a name"
+    )),
+    responses(
+        (status = 200, description = "The page that fits best", body = PageObject),
+        (status = 404, description = "Nothing is known about that", body = ErrorObject),
+        Refusals
+    )
+)]
+pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, ErrorObject> {
+    // What has the name is meant, whatever else has the same words.
+    let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
+    let (first, others) = fitting.split_first().ok_or_else(|| {
+        let message = format!("nothing is known about \"{}\"", agent_kit::gate::plain(&code));
+        ErrorObject::nothing("code", "of that name", "/api/explain").message(message)
+    })?;
+    let also = others.iter().map(|page| page.name.to_owned()).collect();
+    Ok(Json(PageObject { also, ..PageObject::from(*first) }))
+}

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use jtc_host::sample::Sample;
 use jtc_host::{Port, PortError};
-use jtc_wire::Status;
+use jtc_wire::{JOINTS, Status};
 use tokio::sync::watch;
 
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
@@ -122,6 +122,12 @@ impl Line {
             Some(trajectory) => Sample::following(0.0, status, &trajectory, delay_ticks),
             None => Sample::from_status(0.0, status),
         }
+    }
+
+    /// Joint positions that are commanded, rad, where the arm follows a trajectory that was seen to be given to the controller.
+    pub fn commanded(&self, status: &Status) -> Option<[f64; JOINTS]> {
+        let positions = self.sample(status, 0).joints.map(|joint| joint.set_position);
+        positions.iter().all(|position| position.is_finite()).then_some(positions)
     }
 
     /// Frames that may have changed the arm of the controller.

@@ -199,7 +199,8 @@ impl Agent {
             port: self.port.to_string(),
             lost,
             age_ms: status.as_ref().map(|(age, _)| age.as_millis() as u64),
-            controller: status.as_ref().map(|(_, status)| status.into()),
+            controller: status
+                .map(|(_, status)| ControllerObject::new(&status, self.line.commanded(&status))),
             lease,
             clients,
             role: caller.role,

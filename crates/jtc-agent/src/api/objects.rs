@@ -57,6 +57,11 @@ pub struct ControllerObject {
     pub causes: Vec<String>,
     /// Errors since they were cleared last.
     pub errors_occurred: Vec<String>,
+    /// Where the joints are commanded to be, rad, from the base; missing where the agent does not know: no trajectory that was sent through
+    /// it is executed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 6, max_items = 6)]
+    pub commanded_rad: Option<[f64; 6]>,
     /// Joints, from the base.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<JointObject>,
@@ -141,8 +146,9 @@ pub struct SentObject {
     pub halt: u64,
 }
 
-impl From<&Status> for ControllerObject {
-    fn from(status: &Status) -> Self {
+impl ControllerObject {
+    /// What a status reports, with where the joints are commanded to be, as far as that is known.
+    pub(super) fn new(status: &Status, commanded_rad: Option<[f64; 6]>) -> Self {
         let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
         let codes = |family, word: u16| texts(explain::names(family, word.into()));
         let joints = Joint::ALL.into_iter().zip(&status.joints).map(|(joint, values)| {
@@ -166,6 +172,7 @@ impl From<&Status> for ControllerObject {
             error_codes: codes(Family::Jtc, status.errors),
             causes: words::causes(status),
             errors_occurred: texts(words::errors(status.occurred)),
+            commanded_rad,
             joints: joints.collect(),
             next: words::next_step(status).replace('`', ""),
         }

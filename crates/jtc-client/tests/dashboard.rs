@@ -6,10 +6,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use common::Served;
-use common::program::{Program, WAIT};
+use common::program::{Program, WAIT, event};
 use jtc_host::port::sim::LivePort;
 use jtc_host::{Arm, Port, PortError, explain, plan};
+use jtc_sim::{Fault, FaultKind, FaultPlan, SimConfig, Trigger, World};
+use jtc_wire::Joint;
 use serde_json::{Value, json};
+
+const ZERO: [f64; 6] = [0.0; 6];
 
 /// From the zero pose to another one at half of the limits, as a file.
 fn there() -> String {
@@ -187,4 +191,100 @@ fn codes_are_explained_by_name_number_and_words() {
         status == 404 && error["message"].as_str().is_some_and(|m| m.contains("no-such-thing")),
         "{error}"
     );
+}
+
+/// A run that fails in its midst: its errors have pages, what was commanded is shown, and its report leads with what broke.
+#[test]
+fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_goes_well() {
+    let arm = Arm::avena();
+    let stuck = FaultKind::Friction { joint: Joint::ALL[2], factor: 100.0 };
+    let fault = Fault { kind: stuck, trigger: Trigger::AtPoint(200), duration_ms: Some(500) };
+    let faults = FaultPlan { faults: vec![fault], ..FaultPlan::default() };
+    let config = SimConfig { baud: Some(921_600), faults, ..SimConfig::new(arm.config(), &arm.parameters()) };
+    let served = Served::start_on(LivePort::new(World::new(config)), None, &[]);
+    keep(&served, 7);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    let recovered = anna.begin("POST /api/recover", json!({ "defaults": true }));
+    assert!(anna.over(recovered)["report"].is_null());
+    let report = |job: u64| look(&served, &format!("GET /api/jobs/{job}/report"));
+    assert_eq!((report(recovered).0, report(99).0), (404, 404));
+    let controller = || look(&served, "GET /api/status").1["controller"].clone();
+    assert!(controller()["commanded_rad"].is_null() && controller()["error_codes"] == json!([]));
+
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
+    event(&served, 0, "executing");
+    let (status, error) = report(job);
+    assert_eq!((status, error["code"].as_str()), (409, Some("busy")), "{error}");
+    let failed = anna.over(job);
+    assert_eq!(failed["stage"], "failed", "{failed}");
+    let now = controller();
+    let (errors, codes) =
+        (now["errors"].as_array().expect("errors"), now["error_codes"].as_array().expect("codes"));
+    assert!(!errors.is_empty() && errors.len() == codes.len(), "{now}");
+    assert!(codes.contains(&json!("internal-joint-error")), "{now}");
+    let third = &now["joints"][2];
+    assert_eq!(third["error_codes"], json!(["joint-torque"]), "{now}");
+    assert!(now["causes"][0] == "joint 3: torque over limit", "{now}");
+    for (words, code) in errors.iter().zip(codes).chain([(&third["errors"][0], &third["error_codes"][0])]) {
+        let page = look(&served, &format!("GET /api/explain/{}", code.as_str().expect("a code"))).1;
+        assert_eq!(&page["title"], words, "{page}");
+    }
+    let page = |job: &Value| {
+        let path = job["report"].as_str().expect("a report");
+        assert_eq!(path, format!("/api/jobs/{}/report", job["number"]));
+        let (status, head, body) = served.bytes_as(Some(&served.tokens.viewer), &format!("GET {path}"));
+        let head = head.to_ascii_lowercase();
+        assert_eq!(status, 200, "{head}");
+        for line in ["content-type: text/html", "content-security-policy: sandbox", "nosniff"] {
+            assert!(head.contains(line), "{line} in {head}");
+        }
+        String::from_utf8(body).expect("text")
+    };
+    let broken = page(&failed);
+    assert!(
+        broken.contains("<title>FAILED: run of trajectory 7, there")
+            && broken.contains("joint 3: torque over limit")
+    );
+
+    // It goes on, and well.
+    anna.recover();
+    let (after, _) = event(&served, 0, "ended");
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true, "speed_percent": 50 }));
+    let end = Instant::now() + WAIT;
+    let followed = loop {
+        let now = controller();
+        if !now["commanded_rad"].is_null() {
+            break now;
+        }
+        assert!(Instant::now() < end, "{now}");
+    };
+    let commanded = numbers::<6>(&followed["commanded_rad"]);
+    for (joint, commanded) in followed["joints"].as_array().expect("joints").iter().zip(commanded) {
+        let measured = joint["position_rad"].as_f64().expect("a position");
+        assert!((measured - commanded).abs() < 0.03, "{followed}");
+    }
+    event(&served, after, "executing");
+    let done = anna.over(job);
+    assert_eq!(done["stage"], "finished", "{done}");
+    let good = page(&done);
+    assert!(
+        !good.contains("FAILED") && good.contains("anna") && good.contains("\"Number\""),
+        "{}",
+        good.len()
+    );
+    assert!(controller()["commanded_rad"].is_null());
+
+    // One that is stopped has one, too; what was before is kept.
+    let job = anna.begin("POST /api/moves", json!({ "to_rad": ZERO, "speed_percent": 20 }));
+    event(&served, event(&served, 0, "executing").0, "finished");
+    let end = Instant::now() + WAIT;
+    while controller()["state"] != "Operate" {
+        assert!(Instant::now() < end, "it does not move");
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(anna.ask("POST /api/stop", None).0, 200);
+    let stopped = anna.over(job);
+    assert_eq!(stopped["stage"], "stopped", "{stopped}");
+    assert!(page(&stopped).contains("\"stopped\""));
+    assert_eq!(page(&failed), broken);
 }

@@ -15,6 +15,7 @@ mod model;
 mod objects;
 mod plans;
 mod questions;
+mod report;
 mod runs;
 mod settings;
 mod socket;
@@ -88,6 +89,8 @@ pub struct Agent {
     checks: Arc<Semaphore>,
     /// Plans at once.
     plans: Arc<Semaphore>,
+    /// Reports that are made at once.
+    reports: Arc<Semaphore>,
     /// Logs of the flight recorder that are read at once.
     logs: Arc<Semaphore>,
     events: Arc<Events>,
@@ -123,6 +126,7 @@ impl Agent {
             bodies: room(TRAJECTORIES_AT_ONCE),
             checks: room(CHECKS_AT_ONCE),
             plans: room(1),
+            reports: room(1),
             logs: room(1),
             identity,
         })
@@ -254,6 +258,7 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(runs::begin_move))
         .routes(routes!(runs::jobs))
         .routes(routes!(runs::job))
+        .routes(routes!(report::report))
         .routes(routes!(commands::resume))
         .routes(routes!(commands::speed))
         .routes(routes!(commands::jog))

@@ -85,6 +85,9 @@ pub struct JobObject {
     /// Figures of its last motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<ResultObject>,
+    /// Where the report of its last motion is, a page; missing where it has moved nothing, or later ones have taken its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub report: Option<String>,
     /// What the controller was given of an arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub given: Option<GivenObject>,
@@ -143,8 +146,9 @@ impl From<Job> for JobObject {
                 })
                 .collect(),
         });
+        let report = done.report.map(|_| format!("/api/jobs/{number}/report"));
         let (stage, runs, given) = (stage.name().to_owned(), done.runs, done.given.map(GivenObject::from));
-        Self { number, what, client, stage, runs, result, given, error }
+        Self { number, what, client, stage, runs, result, report, given, error }
     }
 }
 
@@ -270,9 +274,9 @@ pub(super) async fn job(
     State(agent): State<Agent>,
     Number(number): Number<u64>,
 ) -> Result<Json<JobObject>, ErrorObject> {
-    agent
-        .jobs
-        .job(number)
-        .map(|job| Json(job.into()))
-        .ok_or_else(|| ErrorObject::nothing("job", number, "/api/jobs"))
+    Ok(Json(found(&agent, number)?.into()))
+}
+
+pub(super) fn found(agent: &Agent, number: u64) -> Result<Job, ErrorObject> {
+    agent.jobs.job(number).ok_or_else(|| ErrorObject::nothing("job", number, "/api/jobs"))
 }

@@ -4,6 +4,7 @@ mod commander;
 mod give;
 mod happening;
 mod recover;
+mod report;
 mod run;
 mod store;
 mod task;
@@ -19,6 +20,7 @@ pub use commander::{Commander, Turn, Unable, Wish};
 pub use give::{Given, give};
 pub use happening::{Happening, Journal};
 pub use recover::recover;
+pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
 
@@ -179,8 +181,11 @@ impl Jobs {
             let Some(commander) = whose.upgrade() else { return (Done::default(), None) };
             let Job { number, what, client, .. } = begun;
             let Self { line, journal, arm, .. } = &*own;
-            journal.write(Happening::Begun { job: number, what, client });
-            act(&Task { wishes, job: number, journal, line, commander: &commander, arm }, session)
+            journal.write(Happening::Begun { job: number, what: what.clone(), client });
+            act(
+                &Task { wishes, job: number, what: &what, journal, line, commander: &commander, arm },
+                session,
+            )
         };
         let accepted =
             commander.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));
@@ -232,6 +237,7 @@ impl Jobs {
             (job.stage, job.done) = (stage, done);
             job.error.clone_from(&error);
         }
+        report::make_room(&mut kept.jobs);
         drop(kept);
         self.journal.write(Happening::Ended { job: number, outcome, error });
     }

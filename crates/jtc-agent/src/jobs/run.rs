@@ -1,6 +1,7 @@
 //! A run: waits until the arm can be moved, checks, uploads, executes and follows, and reports each step.
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use jtc_host::check::ProblemKind;
@@ -9,9 +10,12 @@ use jtc_host::plan::{self, Planner};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Session, Trajectory};
+use jtc_host::{
+    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory,
+};
 use jtc_wire::Status;
 
+use super::report::{self, Made, MotionReport};
 use super::{Given, Happening, Task, Wish};
 use crate::api::ErrorObject;
 use crate::owner::ClientPort;
@@ -52,6 +56,8 @@ pub struct Done {
     pub runs: u32,
     /// Figures of the last motion.
     pub summary: Option<Summary>,
+    /// The report of the last motion, where there is room for it.
+    pub report: report::Kept,
     /// What the controller was given of an arm.
     pub given: Option<Given>,
 }
@@ -180,7 +186,7 @@ impl Run<'_> {
             points: checked.trajectory().points.len(),
             warnings: checked.verdict().warnings().map(ToString::to_string).collect(),
         });
-        let mut shown = 0;
+        let (mut shown, link) = (0, self.session.statistics());
         let uploaded = self.session.upload(checked, |progress| {
             let (segments_done, segments) = (progress.segments_done, progress.segments);
             // A tenth of it at a time.
@@ -190,8 +196,8 @@ impl Run<'_> {
             }
             if task.is_halted() { Flow::Cancel } else { Flow::Continue }
         });
-        let report = uploaded.map_err(|error| self.before_motion(&error))?;
-        let (time_s, bytes, retries) = (report.time_s, report.bytes, report.retries);
+        let upload = uploaded.map_err(|error| self.before_motion(&error))?;
+        let (time_s, bytes, retries) = (upload.time_s, upload.bytes, upload.retries);
         journal.write(Happening::Uploaded { job, phase: phase(), time_s, bytes, retries });
         // Somebody who stopped an arm that stood still meant that it is to stand.
         if task.is_halted() {
@@ -201,6 +207,7 @@ impl Run<'_> {
         journal.write(Happening::Executing { job, phase: phase(), duration_s });
         let digest = Rc::new(RefCell::new(Digest::new()));
         let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
+        let began = host_kit::unix_time();
         task.commander.motion_begins();
         let outcome = self.session.run_unkept(
             checked,
@@ -225,7 +232,19 @@ impl Run<'_> {
             },
         );
         task.commander.motion_ended(wishes);
-        done.summary = Some(digest.borrow().summary(&RecordingInfo::of(&site.arm)));
+        let digest = digest.take();
+        done.summary = Some(digest.summary(&RecordingInfo::of(&site.arm)));
+        let made = Made {
+            phase: &phase(),
+            before: done.runs,
+            outcome: &outcome,
+            upload: &upload,
+            link: self.session.statistics().since(&link),
+            began,
+            port: self.session.port().name(),
+            baud: self.session.port().baud(),
+        };
+        done.report = MotionReport::new(task, &site.arm, digest, &made).map(Arc::new);
         match outcome {
             Ok(Outcome::Finished(_)) => Ok(true),
             Ok(Outcome::Stopped(_)) => Ok(false),

@@ -15,6 +15,8 @@ pub const STOPPED: &str = "stopped";
 pub struct Task<'a> {
     /// Its number.
     pub job: u64,
+    /// What it does.
+    pub what: &'a str,
     /// What is wished on the way.
     pub wishes: &'a Receiver<Wish>,
     /// Where each step is reported.

@@ -58,7 +58,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     }
     let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), &progress, out)?;
     let facts = [
-        run_report::link_facts(&run.upload, &run.link, run.baud),
+        Facts::of_link(&run.upload, &run.link, run.baud),
         Facts {
             title: "Simulated arm".into(),
             rows: vec![

@@ -3,7 +3,7 @@
 use cli_kit::table;
 use jtc_host::arm::Arm;
 use jtc_host::recording::RecordingInfo;
-use jtc_host::report::{Facts, RunFailure, Summary};
+use jtc_host::report::{RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
@@ -62,29 +62,6 @@ fn figure(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| cli_kit::figure(v, digits))
 }
 
-/// Upload and link as facts for the report.
-pub fn link_facts(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Facts {
-    let share =
-        line_share(upload).map_or(String::new(), |s| format!(", {s:.1} % of what the line can carry"));
-    let row = |name: &str, value: String| (name.to_owned(), value);
-    Facts {
-        title: "Link".into(),
-        rows: vec![
-            row("Rate", baud.map_or("not limited".into(), |b| format!("{b} Bd"))),
-            row(
-                "Upload",
-                format!("{} points in {} segments, {} bytes", upload.points, upload.segments, upload.bytes),
-            ),
-            row("Upload time", format!("{:.2} s{share}", upload.time_s)),
-            row("Segments sent again", upload.retries.to_string()),
-            row("Statuses", format!("{}, {:.1} a second", link.statuses, link.status_rate())),
-            row("Frames sent", format!("{}, {} of them again", link.frames_sent, link.retries)),
-            row("Frames damaged on the way", link.bad_frames.to_string()),
-            row("Bytes received, in no frame", format!("{}, {}", link.bytes_received, link.bad_bytes)),
-        ],
-    }
-}
-
 /// The keys of an upload as an event.
 pub fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
     let mut value = serde_json::to_value(upload).unwrap_or_default();
@@ -94,16 +71,11 @@ pub fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
 
 /// The link in one line.
 pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
-    let share = line_share(upload).map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
+    let share = upload.line_share_percent().map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
     format!(
         "upload {} points in {:.2} s{share}; {} statuses, {} frames sent again, {} damaged",
         upload.points, upload.time_s, link.statuses, link.retries, link.bad_frames
     )
-}
-
-/// In percent; none behind a pseudo-terminal that is faster than its rate.
-fn line_share(upload: &UploadReport) -> Option<f64> {
-    upload.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
 }
 
 /// A motion in one line, for below its bar: what it does, and the joint that is nearest to what it can.

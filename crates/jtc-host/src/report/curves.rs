@@ -158,6 +158,11 @@ impl Curves {
         self.filled = self.width;
     }
 
+    /// Memory that they take.
+    pub(super) fn bytes(&self) -> usize {
+        self.buckets.capacity() * size_of::<Bucket>()
+    }
+
     /// One in how many samples a point stands for; 1 = nothing was left out.
     pub(super) fn bucket(&self) -> usize {
         self.width
@@ -259,6 +264,11 @@ impl Runs {
         }
         fewer.extend(last);
         self.runs = fewer;
+    }
+
+    /// Memory that they take.
+    pub(super) fn bytes(&self) -> usize {
+        self.runs.capacity() * size_of::<(f64, f64, u64)>()
     }
 
     pub(super) fn as_slice(&self) -> &[(f64, f64, u64)] {

@@ -70,6 +70,12 @@ impl Digest {
         self.samples
     }
 
+    /// Memory that it takes, more or less.
+    pub fn bytes(&self) -> usize {
+        let runs = [&self.states, &self.trajectory, &self.errors].map(Runs::bytes);
+        size_of::<Self>() + self.curves.bytes() + runs.iter().sum::<usize>()
+    }
+
     /// Times of the first and of the last sample, s.
     pub(super) fn span_s(&self) -> Option<(f64, f64)> {
         self.first_s.map(|first| (first, self.last_s))

@@ -7,6 +7,7 @@
 mod curves;
 mod digest;
 mod failure;
+mod link;
 mod pack;
 mod page;
 mod picture;

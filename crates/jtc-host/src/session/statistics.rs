@@ -17,11 +17,25 @@ pub struct LinkStatistics {
     pub bad_frames: u64,
     /// Frames sent again.
     pub retries: u64,
-    /// Since the session began, s.
+    /// Since the session began, or for how long was counted, s.
     pub time_s: f64,
 }
 
 impl LinkStatistics {
+    /// What passed since `before`, which is of the same session.
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            bytes_sent: self.bytes_sent.saturating_sub(before.bytes_sent),
+            bytes_received: self.bytes_received.saturating_sub(before.bytes_received),
+            frames_sent: self.frames_sent.saturating_sub(before.frames_sent),
+            statuses: self.statuses.saturating_sub(before.statuses),
+            bad_bytes: self.bad_bytes.saturating_sub(before.bad_bytes),
+            bad_frames: self.bad_frames.saturating_sub(before.bad_frames),
+            retries: self.retries.saturating_sub(before.retries),
+            time_s: self.time_s - before.time_s,
+        }
+    }
+
     /// Statuses per second.
     pub fn status_rate(&self) -> f64 {
         if self.time_s > 0.0 { self.statuses as f64 / self.time_s } else { 0.0 }

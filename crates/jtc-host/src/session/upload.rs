@@ -62,6 +62,13 @@ pub struct UploadReport {
     pub restarts: u32,
 }
 
+impl UploadReport {
+    /// Share of what the line can carry, %; none behind a pseudo-terminal that is faster than its rate.
+    pub fn line_share_percent(&self) -> Option<f64> {
+        self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
+    }
+}
+
 struct InFlight {
     /// When the line will have carried it.
     done: Duration,

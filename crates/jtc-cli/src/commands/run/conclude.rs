@@ -6,7 +6,7 @@ use cli_kit::{ErrorKind, Failure, Output, table};
 use jtc_host::check::Verdict;
 use jtc_host::port::Port;
 use jtc_host::recording::{Ending, RecordingInfo};
-use jtc_host::report::{Digest, ReportInput, RunFailure, Summary};
+use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, Summary};
 use jtc_host::session::Outcome;
 use jtc_host::{Error, MotionError, Session};
 use serde_json::{Value, json};
@@ -91,7 +91,7 @@ pub fn conclude(
     let Legs { done, last, verdict, cut } = legs;
     let Reel { mut info, tape, .. } = reel;
     let link = session.statistics();
-    let facts = [run_report::link_facts(&last.upload, &link, session.port().baud())];
+    let facts = [Facts::of_link(&last.upload, &link, session.port().baud())];
     let broken = what_broke(&info, &last);
     let word = if cut { "stopped" } else { word(&last.outcome) };
     let digest = Digest::of(&last.samples);

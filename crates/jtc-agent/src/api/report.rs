@@ -1,0 +1,65 @@
+//! Reports of motions, as pages.
+use agent_kit::api::{Number, Refusals};
+use axum::extract::State;
+use axum::http::{HeaderName, header};
+use utoipa::ToSchema;
+
+use super::body::blocking;
+use super::runs::found;
+use super::{Agent, ErrorObject};
+use crate::jobs::Stage;
+
+/// What a report may do: its own script and style, and nothing with this agent or anybody else.
+const PAGE_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors 'self'";
+
+/// A page that opens in a browser, and needs nothing else.
+#[derive(ToSchema)]
+#[schema(value_type = String)]
+#[expect(dead_code, reason = "describes a body")]
+pub struct ReportPage(String);
+
+/// The report of the last motion of a job that is over, as `jtc traj run` writes it: a page with figures and plots.
+///
+/// It is made of the statuses that came while the motion went on. The reports of the last 16 jobs are kept, within 64 MB.
+#[utoipa::path(
+    get,
+    path = "/api/jobs/{number}/report",
+    operation_id = "get_report",
+    params(("number" = u64, Path, description = "Number of the job")),
+    responses(
+        (status = 200, description = "A page", body = ReportPage, content_type = "text/html"),
+        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 409, description = "The job goes on", body = ErrorObject),
+        Refusals
+    )
+)]
+pub(super) async fn report(
+    State(agent): State<Agent>,
+    Number(number): Number<u64>,
+) -> Result<([(HeaderName, &'static str); 4], String), ErrorObject> {
+    let job = found(&agent, number)?;
+    if job.stage == Stage::Running {
+        let message = format!("job {number} goes on: its report is made when it is over");
+        return Err(ErrorObject::new("busy", message, "ask again behind its event `ended`"));
+    }
+    let report = job.done.report.ok_or_else(|| {
+        let message =
+            format!("job {number} has no report: it has moved nothing, or later ones have taken its place");
+        let next =
+            "`report` of GET /api/jobs shows those that there are; jtc serve --record keeps all motions";
+        ErrorObject::nothing("report", number, "/api/jobs").message(message).next(next)
+    })?;
+    let room = agent.reports.clone().acquire_owned().await;
+    let page = blocking(move || {
+        let page = report.html();
+        drop(room);
+        page
+    });
+    let headers = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (header::CONTENT_SECURITY_POLICY, PAGE_POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    Ok((headers, page.await?))
+}

@@ -1,0 +1,153 @@
+//! Reports of the last motions: what is kept of them, from which a page is made when somebody asks for it.
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use jtc_host::recording::{Ending, RecordingInfo};
+use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html};
+use jtc_host::session::{LinkStatistics, Outcome, UploadReport};
+use jtc_host::{Arm, Error, MotionError};
+
+use super::{Job, Task};
+
+/// Jobs whose report is kept, at most,
+const KEPT: usize = 16;
+/// and bytes that all of them take, at most: that of a motion of ten minutes or more takes some 20 MB.
+const BYTES_MAX: usize = 64 << 20;
+
+/// A motion, as a report shows it.
+#[derive(Clone, Debug)]
+pub struct MotionReport {
+    info: RecordingInfo,
+    digest: Digest,
+    facts: Vec<Facts>,
+    failure: Option<RunFailure>,
+}
+
+/// What is known of a motion beside its samples.
+pub(super) struct Made<'a> {
+    /// `approach` or `motion`.
+    pub phase: &'a str,
+    /// Motions of its job that were finished before it, approaches not counted.
+    pub before: u32,
+    /// How it ended.
+    pub outcome: &'a Result<Outcome, Error>,
+    /// Its upload.
+    pub upload: &'a UploadReport,
+    /// The link since its upload began.
+    pub link: LinkStatistics,
+    /// When it began, since 1970.
+    pub began: Duration,
+    /// Name of the port.
+    pub port: String,
+    /// Rate of the line, Bd.
+    pub baud: Option<u32>,
+}
+
+impl MotionReport {
+    /// Of a motion of a job; `None` where nothing was seen of it.
+    pub(super) fn new(task: &Task<'_>, arm: &Arm, digest: Digest, made: &Made<'_>) -> Option<Self> {
+        if digest.samples() == 0 {
+            return None;
+        }
+        let (outcome, reason) = match made.outcome {
+            Ok(Outcome::Finished(_)) => ("finished", String::new()),
+            Ok(Outcome::Stopped(_)) | Err(Error::Cancelled) => ("stopped", String::new()),
+            Err(error) => ("fault", error.to_string()),
+        };
+        let info = RecordingInfo {
+            source: made.port.clone(),
+            commanded_by: task.commander.name.clone(),
+            trajectory: task.what.to_owned(),
+            start_unix_ns: made.began.as_nanos() as u64,
+            ending: Ending { outcome: outcome.into(), reason, ..Ending::default() },
+            // No page shows it.
+            description: None,
+            ..RecordingInfo::of(arm)
+        };
+        let failure = if info.ending.is_fault() { digest.failure(&info, &info.ending) } else { None };
+        let failure = failure.map(|found| match made.outcome {
+            Err(Error::Motion(MotionError::RunFault { status, .. })) => found.with_status(status),
+            _ => found,
+        });
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let job = Facts {
+            title: "Job".into(),
+            rows: vec![
+                row("Number", task.job.to_string()),
+                row("This is its", made.phase.to_owned()),
+                row("Motions finished before", made.before.to_string()),
+                row("Ended", outcome.to_owned()),
+            ],
+        };
+        let facts = vec![job, Facts::of_link(made.upload, &made.link, made.baud)];
+        Some(Self { info, digest, facts, failure })
+    }
+
+    /// The page; it opens without a network.
+    pub fn html(&self) -> String {
+        let Self { info, digest, facts, failure } = self;
+        html(&ReportInput { facts, failure: failure.as_ref(), ..ReportInput::new(info, digest) })
+    }
+
+    /// Memory that it takes, more or less.
+    fn bytes(&self) -> usize {
+        self.digest.bytes()
+    }
+}
+
+/// Drops the reports of jobs for which there is no room beside later ones.
+pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
+    let (mut reports, mut bytes) = (0, 0);
+    for report in jobs.iter_mut().rev().map(|job| &mut job.done.report) {
+        let Some(own) = report.as_deref().map(MotionReport::bytes) else { continue };
+        (reports, bytes) = (reports + 1, bytes + own);
+        if reports > KEPT || bytes > BYTES_MAX {
+            *report = None;
+        }
+    }
+}
+
+/// What a job keeps of its last motion.
+pub type Kept = Option<Arc<MotionReport>>;
+
+#[cfg(test)]
+mod tests {
+    use jtc_host::Sample;
+
+    use super::super::{Done, Stage};
+    use super::*;
+
+    fn job(number: u64, samples: usize) -> Job {
+        let mut digest = Digest::new();
+        (0..samples).for_each(|k| digest.push(&Sample { time_s: k as f64 * 0.04, ..Sample::default() }));
+        let report =
+            MotionReport { info: RecordingInfo::default(), digest, facts: Vec::new(), failure: None };
+        let report = (samples > 0).then(|| Arc::new(report));
+        let done = Done { report, ..Done::default() };
+        Job { number, what: "".into(), client: "".into(), stage: Stage::Finished, done, error: None }
+    }
+
+    fn kept(jobs: &VecDeque<Job>) -> Vec<u64> {
+        jobs.iter().filter(|job| job.done.report.is_some()).map(|job| job.number).collect()
+    }
+
+    /// The last ones stay, as many as there is room for, and each is a page.
+    #[test]
+    fn reports_of_the_last_jobs_are_kept_within_their_memory() {
+        let mut jobs: VecDeque<Job> = (0..20).map(|n| job(n, usize::from(n % 10 != 9))).collect();
+        make_room(&mut jobs);
+        assert_eq!(kept(&jobs).len(), KEPT);
+        assert_eq!(kept(&jobs)[0], 2, "9 and 19 have none, and take no room");
+        let mut long: VecDeque<Job> = (0..6).map(|n| job(n, 16_000)).collect();
+        make_room(&mut long);
+        let left = kept(&long);
+        assert!(left.len() < 6 && left.last() == Some(&5), "{left:?}");
+        let bytes: usize =
+            long.iter().filter_map(|job| job.done.report.as_deref().map(MotionReport::bytes)).sum();
+        assert!(bytes > BYTES_MAX / 2 && bytes <= BYTES_MAX, "{bytes}");
+        let page = jobs[0].done.report.is_none()
+            && jobs[3].done.report.as_ref().is_some_and(|r| r.html().contains("</html>"));
+        assert!(page);
+    }
+}

@@ -1,11 +1,26 @@
 //! Bodies that are long, or take a while to be understood: read some at once, beside the threads that serve.
+use agent_kit::api::Problem;
+use axum::Json;
 use axum::body::Bytes;
-use axum::extract::{FromRequest as _, Request};
+use axum::extract::{FromRequest, OptionalFromRequest, Request};
 use axum::http::StatusCode;
 use jtc_host::ErrorKind;
 use serde::de::DeserializeOwned;
 
 use super::{Agent, ErrorObject};
+
+/// A body of JSON that may be missing.
+pub(super) struct Perhaps<T>(pub Option<T>);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let body = <Json<Option<T>> as OptionalFromRequest<S>>::from_request(request, state).await;
+        let body = body.map_err(|e| Problem::rejected(e.status(), e.body_text()))?;
+        Ok(Self(body.and_then(|Json(body)| body)))
+    }
+}
 
 /// Reads a body of JSON and what `understand` makes of it; both whether or not somebody waits for it.
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(

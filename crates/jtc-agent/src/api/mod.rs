@@ -14,6 +14,7 @@ mod metrics;
 mod model;
 mod objects;
 mod plans;
+mod poses;
 mod questions;
 mod report;
 mod runs;
@@ -259,6 +260,8 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(runs::jobs))
         .routes(routes!(runs::job))
         .routes(routes!(report::report))
+        .routes(routes!(poses::list))
+        .routes(routes!(poses::put, poses::delete))
         .routes(routes!(commands::resume))
         .routes(routes!(commands::speed))
         .routes(routes!(commands::jog))

@@ -186,12 +186,12 @@ pub(super) async fn plan(
         let next = "ask again when it is ready: one plan is made at a time";
         ErrorObject::new("busy", "another plan is being made", next)
     })?;
-    let own = agent.jobs.arm().clone();
+    let (own, poses) = (agent.jobs.arm().clone(), agent.poses());
     let asked = move |session: &mut Session<ClientPort>| {
         let device = session.device_config()?;
-        let mut arm = if session.has_extensions() { session.device_arm()? } else { own.clone() };
+        let mut arm = if session.has_extensions() { session.device_arm()? } else { own };
         // No controller has them.
-        arm.poses = own.poses;
+        arm.poses = poses;
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;

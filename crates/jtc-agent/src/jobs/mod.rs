@@ -3,6 +3,7 @@
 mod commander;
 mod give;
 mod happening;
+mod poses;
 mod recover;
 mod report;
 mod run;
@@ -19,6 +20,7 @@ use jtc_host::{Arm, Session};
 pub use commander::{Commander, Turn, Unable, Wish};
 pub use give::{Given, give};
 pub use happening::{Happening, Journal};
+pub use poses::{POSES_MAX, PoseStore, PoseStoreError};
 pub use recover::recover;
 pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};

@@ -9,6 +9,8 @@ use jtc_host::Trajectory;
 use jtc_host::file::FileError;
 use jtc_host::trajectory::{Loaded, POINTS_MAX};
 
+use super::{PoseStore, PoseStoreError};
+
 /// The numbers that there are: 1 to this.
 pub const NUMBER_MAX: u16 = 99;
 
@@ -48,6 +50,9 @@ pub enum StoreError {
     /// No trajectory, or none that can be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The poses beside them.
+    #[error(transparent)]
+    Poses(#[from] PoseStoreError),
     /// The directory cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
     Io {
@@ -67,6 +72,7 @@ impl host_kit::Diagnose for StoreError {
             }
             Self::TooMany { .. } => ("too-long", "send it in parts, or with a longer step".into()),
             Self::File(error) => return error.diagnosis(),
+            Self::Poses(error) => return error.diagnosis(),
             Self::Io { .. } => {
                 ("store", "make room, or name another directory with `jtc serve --trajectories DIR`".into())
             }
@@ -79,6 +85,8 @@ impl host_kit::Diagnose for StoreError {
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
+    /// Named poses.
+    pub poses: PoseStore,
     /// Of who writes to the directory: whoever reads what is kept waits for no disk.
     writing: Mutex<()>,
 }
@@ -86,7 +94,12 @@ pub struct Store {
 impl Store {
     /// In memory alone.
     pub fn in_memory() -> Self {
-        Self { directory: None, kept: Mutex::default(), writing: Mutex::default() }
+        Self {
+            directory: None,
+            kept: Mutex::default(),
+            poses: PoseStore::default(),
+            writing: Mutex::default(),
+        }
     }
 
     /// In a directory: files with names like `7-pick.csv`. What is no such file is left alone.
@@ -98,7 +111,8 @@ impl Store {
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let io = |source| StoreError::Io { path: directory.to_owned(), source };
         fs::create_dir_all(directory).map_err(io)?;
-        let store = Self { directory: Some(directory.to_owned()), ..Self::in_memory() };
+        let poses = PoseStore::open(directory)?;
+        let store = Self { directory: Some(directory.to_owned()), poses, ..Self::in_memory() };
         for entry in fs::read_dir(directory).map_err(io)? {
             let path = entry.map_err(io)?.path();
             let Some((number, name)) = numbered(&path) else { continue };

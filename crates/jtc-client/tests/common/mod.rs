@@ -84,8 +84,18 @@ impl Served {
         tls: Option<Arc<rustls::ServerConfig>>,
         origins: &[String],
     ) -> Self {
+        Self::start_with_store(port, tls, origins, Store::in_memory(), Arm::avena())
+    }
+
+    /// The same with what it keeps, and the arm that it was given.
+    pub fn start_with_store(
+        port: impl Port + Send + 'static,
+        tls: Option<Arc<rustls::ServerConfig>>,
+        origins: &[String],
+        store: Store,
+        arm: Arm,
+    ) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
-        let arm = Arm::avena();
         let log_path = dir.path().join("commands.jsonl");
         let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
         let owner = Owner::new(port, observer(log.clone()));
@@ -94,7 +104,7 @@ impl Served {
         let address = listener.local_addr().expect("it listens");
         let access = Access::new(tokens.clone(), address, &[]).allowing(origins);
         let line = owner.line();
-        let jobs = Jobs::new(line.clone(), Store::in_memory(), arm);
+        let jobs = Jobs::new(line.clone(), store, arm);
         let agent = Agent::new(line.clone(), jobs, access, log, "simulated", true).expect("random numbers");
         let ended = Arc::new(AtomicBool::new(false));
         let end = ended.clone();

@@ -33,7 +33,7 @@ pub use device::{Difference, NOT_CARRIED};
 pub(crate) use export::frame_name;
 pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
-pub use poses::{PoseError, Poses, remove_pose, save_pose};
+pub use poses::{PoseError, Poses, is_pose_name, remove_pose, save_pose};
 pub use propose::{RULES, Rule};
 pub use source::{Key, Source, Sources};
 pub use values::ArmValue;

@@ -44,8 +44,17 @@ impl Arm {
                 known,
             });
         };
+        self.at_pose(name, position).map(|()| *position)
+    }
+
+    /// Whether the limits let the arm be at a position (rad) of this name.
+    ///
+    /// # Errors
+    ///
+    /// [`PoseError::Outside`], of the first joint that cannot be there.
+    pub fn at_pose(&self, name: &str, position: &[f64; JOINTS]) -> Result<(), PoseError> {
         match self.outside(position) {
-            None => Ok(*position),
+            None => Ok(()),
             Some((joint, min, max)) => {
                 Err(PoseError::Outside { name: name.into(), joint, value: position[joint.index()], min, max })
             }
@@ -63,7 +72,7 @@ impl Arm {
 }
 
 /// Whether a pose may have this name: it fits into an option beside lists of numbers, and into a cell of a waypoint file.
-fn is_name(name: &str) -> bool {
+pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
         && name.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c))
@@ -74,7 +83,7 @@ fn is_name(name: &str) -> bool {
 pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileError> {
     let pose = |(name, values): (&String, &Vec<f64>)| {
         let wrong = |problem: String| FileError::at(Place::name(format!("poses, {}", short(name))), problem);
-        if !is_name(name) {
+        if !is_pose_name(name) {
             return Err(wrong(PoseError::Name { name: short(name) }.to_string()));
         }
         let count = values.len();
@@ -100,7 +109,7 @@ pub(super) fn key(name: &str) -> String {
 /// A name that is none, one that is there already unless `force` is set, a robot description, a file that is no arm file or cannot be
 /// written. The file is as it was then.
 pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool) -> Result<(), PoseError> {
-    if !is_name(name) {
+    if !is_pose_name(name) {
         return Err(PoseError::Name { name: short(name) });
     }
     let rounded = position.map(|v| (v * DECIMALS).round() / DECIMALS + 0.0);

@@ -171,6 +171,9 @@ impl Error {
             Self::State(StateError::Absent { joints }) => {
                 Facts { joint: joints.first().copied(), ..Facts::default() }
             }
+            Self::State(StateError::NotMeasured { joint }) => {
+                Facts { joint: Some(*joint), ..Facts::default() }
+            }
             Self::Motion(
                 MotionError::RunFault { point, status }
                 | MotionError::PausedByController { point, status, .. },

@@ -31,6 +31,18 @@ pub enum StateError {
         /// The status of then.
         status: Box<Status>,
     },
+    /// The arm moves, and a pose is where it stands.
+    #[error("{what}, and a pose is where the arm stands; nothing was saved")]
+    Moving {
+        /// What moves.
+        what: String,
+    },
+    /// It is not known where a joint is.
+    #[error("{joint}: its position is not known; nothing was saved")]
+    NotMeasured {
+        /// Which.
+        joint: Joint,
+    },
     /// Joints are set absent, and the controller executes no motion.
     #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
     Absent {
@@ -53,6 +65,14 @@ impl Diagnose for StateError {
             Self::NotReady { status } => {
                 Diagnosis::new(ErrorKind::Device, "not-ready", words::next_step(status))
             }
+            Self::Moving { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "moving", "wait until it stands, or `jtc traj pause`")
+            }
+            Self::NotMeasured { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "not-measured",
+                "`jtc status` shows the joints, `jtc recover` brings them up",
+            ),
             Self::Absent { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "absent-joints",

@@ -15,6 +15,7 @@ mod ready;
 mod recover;
 mod run;
 mod settings;
+mod standing;
 mod statistics;
 mod upload;
 

@@ -1,0 +1,88 @@
+//! Where the arm stands, for a pose.
+
+use std::time::Duration;
+
+use jtc_wire::{Joint, Status};
+
+use super::Session;
+use crate::error::{Error, StateError};
+use crate::port::Port;
+use crate::{sample, words};
+
+/// What moves by less than this within [`WATCHED`] stands, rad: the slowest jog moves twice as far.
+const STILL: f64 = 1.2e-3;
+/// So long the arm is watched: a slow jog is in no status.
+const WATCHED: Duration = Duration::from_millis(250);
+
+impl<P: Port> Session<P> {
+    /// The status of an arm that stands, for as long as it is watched: its positions are those of a pose.
+    ///
+    /// # Errors
+    ///
+    /// [`StateError::Moving`] where it moves, [`StateError::NotMeasured`] where it is not known where a joint is; those of
+    /// [`Session::next_status`].
+    pub fn standing(&mut self) -> Result<Status, Error> {
+        let begin = self.fresh_status()?;
+        let (start, mut now) = (self.now(), begin);
+        loop {
+            stands(&begin, &now)?;
+            if self.now() - start >= WATCHED {
+                return Ok(now);
+            }
+            now = self.next_status()?;
+        }
+    }
+}
+
+fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
+    let moving = |what: String| Err(StateError::Moving { what });
+    // Also where it begins, turns round or ends, and has no speed for a moment.
+    if now.is_executing() {
+        return moving("the arm is on the path of a trajectory".into());
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
+        if !sample::is_measured(now, j) || words::is_absent(now, j) {
+            return Err(StateError::NotMeasured { joint });
+        }
+    }
+    if let Some((joint, speed)) = words::moving_joint(now) {
+        return moving(format!("{joint} moves at {speed:.2} rad/s"));
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
+        let way = now.positions()[j] - begin.positions()[j];
+        if way.abs() > STILL {
+            return moving(format!("{joint} moves slowly, by {:.1} mrad since a moment ago", way * 1e3));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use host_kit::{Diagnose as _, ErrorKind};
+    use jtc_wire::TrajectoryState;
+
+    use super::*;
+
+    /// A slow jog is in no field of the status: places that differ show it.
+    #[test]
+    fn an_arm_that_is_jogged_slowly_does_not_stand() {
+        let at = |q: f32| {
+            let mut status = Status::default();
+            status.joints[3].position = q;
+            status.joints.iter_mut().for_each(|joint| joint.velocity = 0.01);
+            status
+        };
+        stands(&at(0.5), &at(0.5005)).unwrap();
+        for (begin, now) in [(0.5, 0.5025), (0.5025, 0.5)] {
+            let error = stands(&at(begin), &at(now)).unwrap_err();
+            assert!(error.to_string().starts_with("joint 4 moves slowly"), "{error}");
+        }
+        let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
+        assert_eq!(stands(&executing, &executing).unwrap_err().diagnosis().kind, ErrorKind::Refused);
+        // Led by hand, or paused, it may stand.
+        stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
+    }
+}

@@ -127,6 +127,9 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
+    // What stands in the value of an attribute ends no tag.
+    assert!(error_of(&"<a x='/>'>".repeat(60_000)).contains("nested"));
+    assert!(error_of(&"<a x=\"'/>\">".repeat(60_000)).contains("nested"));
     assert!(
         error_of(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))
             .contains("arm model")

@@ -31,7 +31,7 @@ fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
                 at = rest.find(end).map_or(text.len(), |e| begin + e + 3);
                 continue;
             }
-            at = rest.find('>').map_or(text.len(), |e| begin + e + 1);
+            at = end_of_tag(rest).map_or(text.len(), |e| begin + e + 1);
             if rest.starts_with("<!") || rest.starts_with("<?") {
                 continue;
             }
@@ -46,6 +46,22 @@ fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
             }
             return Some(Tag { text: tag, begin, end: at, depth: own, closes, empty });
         }
+    })
+}
+
+/// Where a tag at the front of `rest` ends: a `>` in the value of an attribute does not end it. One that closes an element has none.
+fn end_of_tag(rest: &str) -> Option<usize> {
+    if rest.starts_with("</") {
+        return rest.find('>');
+    }
+    let mut quote = None;
+    rest.bytes().position(|byte| {
+        match (quote, byte) {
+            (None, b'\'' | b'"') => quote = Some(byte),
+            (Some(open), _) if open == byte => quote = None,
+            _ => {}
+        }
+        quote.is_none() && byte == b'>'
     })
 }
 

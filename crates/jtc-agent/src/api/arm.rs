@@ -1,5 +1,5 @@
 //! The arm of the controller as one thing: read as an arm file, and given whole.
-use agent_kit::api::{Asked, Refusals};
+use agent_kit::api::Refusals;
 use agent_kit::gate::{Asker, plain};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use super::body::read;
 use super::error::Denials;
-use super::lease::AskedAfter;
+use super::lease::{AskedAfter, KnownHalt};
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Given, Task, give};
@@ -45,6 +45,10 @@ pub struct ArmRequest {
 /// What the controller was given.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct GivenObject {
+    /// So many settings have changed.
+    pub settings: usize,
+    /// The controller has the arm's name.
+    pub named: bool,
     /// Friction, gains and model, as far as they were confirmed.
     pub parts: Vec<PartObject>,
     /// Hash of the arm, where all of it was read back and nothing differs.
@@ -69,14 +73,14 @@ pub struct PartObject {
 }
 
 impl From<Given> for GivenObject {
-    fn from(Given { parts, hash, stored }: Given) -> Self {
+    fn from(Given { settings, named, parts, hash, stored }: Given) -> Self {
         let parts = parts.into_iter().map(|part| PartObject {
             parameter: part.parameter.name().to_owned(),
             bytes: part.bytes,
             times: part.times,
             time_s: part.time_s,
         });
-        Self { parts: parts.collect(), hash: hash.map(in_words), stored_number: stored }
+        Self { settings, named, parts: parts.collect(), hash: hash.map(in_words), stored_number: stored }
     }
 }
 
@@ -106,14 +110,14 @@ pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, E
     put,
     path = "/api/arm",
     operation_id = "put_arm",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = ArmRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn put_arm(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     // Nobody else's text is read.

@@ -2,7 +2,7 @@
 use std::borrow::Cow;
 use std::time::Duration;
 
-use agent_kit::api::{Asked, Body, Refusals};
+use agent_kit::api::{Body, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -15,7 +15,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
-use super::lease::AskedAfter;
+use super::lease::{AskedAfter, KnownHalt};
 use super::objects::PayloadObject;
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
@@ -133,13 +133,13 @@ impl Agent {
 #[utoipa::path(
     post,
     path = "/api/resume",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     responses((status = 204, description = "The motion goes on, or will in a moment"), Refusals, Denials)
 )]
 pub(super) async fn resume(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
 ) -> Result<StatusCode, ErrorObject> {
     let commander = agent.commander(&asker)?;
     if commander.is_moving() {
@@ -148,7 +148,7 @@ pub(super) async fn resume(
             line.could_ask(commander.client, now)?;
             match line.status() {
                 Some((_, status)) if status.trajectory != TrajectoryState::Pause => Err(not_paused(status)),
-                _ => Ok(line.ask_to_move(commander.client, after.halt(line), now)?),
+                _ => Ok(line.ask_to_move(commander.client, after.0, now)?),
             }
         })?;
         if let Some(done) = commander.wish(Flow::Resume).await {
@@ -197,19 +197,19 @@ pub(super) async fn speed(
 #[utoipa::path(
     post,
     path = "/api/jog",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = JogRequest,
     responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
 )]
 pub(super) async fn jog(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
 ) -> Result<StatusCode, ErrorObject> {
     let commander = agent.commander(&asker)?;
     let turn = commander.turn()?;
-    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.halt(line), now))?;
+    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.0, now))?;
     agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -218,14 +218,14 @@ pub(super) async fn jog(
 #[utoipa::path(
     post,
     path = "/api/teach",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = Switch,
     responses((status = 204, description = "Teaching has begun, or ended"), Refusals, Denials)
 )]
 pub(super) async fn teach(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
     if on {
@@ -312,14 +312,14 @@ pub(super) fn body(payload: PayloadObject) -> Result<Payload, ErrorObject> {
     post,
     path = "/api/recover",
     operation_id = "recover",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = RecoverRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_recover(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     Body(RecoverRequest { defaults }): Body<RecoverRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let (commander, turn) = agent.mover(&asker, after)?;

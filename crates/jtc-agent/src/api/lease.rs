@@ -3,19 +3,21 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use agent_kit::access::random;
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Asked, Body, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::{self, LeaseKey, LeaseState, default_lasts_s, lasts};
-use axum::extract::State;
+use axum::extract::{FromRequestParts, State};
 use axum::http::StatusCode;
+use axum::http::request::Parts;
 use axum::{Extension, Json};
+use jtc_host::error::Facts;
 use serde_json::json;
 use utoipa::{IntoParams, ToSchema};
 
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::{Commander, Turn, Unable};
-use crate::line::{Denied, Introduction, Policy, SharedLine};
+use crate::line::{Denied, Introduction, Policy};
 
 /// Who wants to command.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
@@ -52,16 +54,34 @@ pub struct LeaseGrant {
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub(super) struct AskedAfter {
+pub(super) struct KnownHalt {
     /// `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
     /// request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
     asked_after: Option<u64>,
 }
 
-impl AskedAfter {
-    /// The last halt that whoever asks knows of.
-    pub fn halt(self, line: &SharedLine) -> u64 {
-        self.asked_after.unwrap_or_else(|| line.last_halt())
+/// The last halt behind which something was asked for: the one that the client names, else the last when its request arrived. That is taken
+/// before its body, which may be long on its way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AskedAfter(pub u64);
+
+impl FromRequestParts<Agent> for AskedAfter {
+    type Rejection = ErrorObject;
+
+    async fn from_request_parts(parts: &mut Parts, agent: &Agent) -> Result<Self, ErrorObject> {
+        let last = agent.line.with(|line, _| line.last_halt());
+        let Asked(KnownHalt { asked_after }) = Asked::from_request_parts(parts, agent).await?;
+        match asked_after {
+            Some(known) if known > last => {
+                let message = format!(
+                    "asked_after {known}: this agent has counted {last} Stops and Pauses; it may have been started again"
+                );
+                let object = ErrorObject::new("request", message, "GET /api/status has last_halt");
+                let facts = Facts { value: Some(known as f64), limit: Some(last as f64), ..Facts::default() };
+                Err(object.with(&facts).unreadable())
+            }
+            known => Ok(Self(known.unwrap_or(last))),
+        }
     }
 }
 
@@ -79,11 +99,11 @@ impl Agent {
     pub(super) fn mover(
         &self,
         asker: &Asker,
-        after: AskedAfter,
+        AskedAfter(after): AskedAfter,
     ) -> Result<(Arc<Commander>, Turn), ErrorObject> {
         let commander = self.commander(asker)?;
         let turn = commander.turn()?;
-        self.line.with(|line, now| line.ask_to_move(commander.client, after.halt(line), now))?;
+        self.line.with(|line, now| line.ask_to_move(commander.client, after, now))?;
         Ok((commander, turn))
     }
 

@@ -1,5 +1,6 @@
 //! Trajectories that are made here: through waypoints, as fast as the limits allow.
 use std::path::Path;
+use std::sync::Arc;
 
 use agent_kit::api::Refusals;
 use agent_kit::gate::plain;
@@ -195,8 +196,15 @@ pub(super) async fn plan(
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;
+    // It goes with whoever waits for the plan.
+    let waits = Arc::new(());
+    let waited_for = Arc::downgrade(&waits);
     let plan = blocking(move || {
         let planned = planned(&request, &file, &arm, &device);
+        let planned = planned.and_then(|planned| match waited_for.upgrade() {
+            Some(_) => Ok(planned),
+            None => Err(abandoned()),
+        });
         let planned = planned.and_then(|planned| kept(&agent, &request, &file, &planned));
         if let Some(KeepRequest { number, .. }) = request.keep {
             let (from, why) = (caller.peer.to_string(), planned.as_ref().err().map(|e| e.message.clone()));
@@ -208,7 +216,14 @@ pub(super) async fn plan(
         drop(room);
         planned
     });
-    Ok(Json(plan.await??))
+    let plan = plan.await??;
+    drop(waits);
+    Ok(Json(plan))
+}
+
+/// Nobody waits for it any more: whoever asked may have put something else under its number since.
+fn abandoned() -> ErrorObject {
+    ErrorObject::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
 }
 
 /// The waypoints of a request that can be planned.

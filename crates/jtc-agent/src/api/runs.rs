@@ -1,5 +1,5 @@
 //! Runs and moves: jobs, and what becomes of them.
-use agent_kit::api::{Asked, Body, Number, Refusals};
+use agent_kit::api::{Body, Number, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use super::arm::GivenObject;
 use super::error::Denials;
-use super::lease::AskedAfter;
+use super::lease::{AskedAfter, KnownHalt};
 use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
 use crate::line::Policy;
@@ -157,14 +157,14 @@ impl From<Job> for JobObject {
     post,
     path = "/api/runs",
     operation_id = "run",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_run(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     Body(request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let RunRequest { trajectory: number, approach, speed_percent, repeat, policy, accept_device_limits } =
@@ -197,14 +197,14 @@ pub(super) async fn begin_run(
     post,
     path = "/api/moves",
     operation_id = "move_to",
-    params(LeaseKey, AskedAfter),
+    params(LeaseKey, KnownHalt),
     request_body = MoveRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_move(
     State(agent): State<Agent>,
     asker: Asker,
-    Asked(after): Asked<AskedAfter>,
+    after: AskedAfter,
     Body(request): Body<MoveRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let MoveRequest { to_rad, speed_percent, policy, accept_device_limits } = request;
@@ -236,9 +236,14 @@ fn begin(
     let (client, own) = (commander.client, commander.policy);
     agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
     let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {
-        let done = run(task, session, &order);
-        task.line.with(|line, _| line.set_policy(client, own));
-        done
+        let (done, error) = run(task, session, &order);
+        task.line.with(|line, now| {
+            // Where its end is not certain, what may still move has the policy that it was begun with.
+            if error.is_none() || !line.may_move(now) {
+                line.set_policy(client, own);
+            }
+        });
+        (done, error)
     })?;
     agent.note(
         "job",

@@ -1,7 +1,8 @@
 //! The whole arm for a controller, as a job.
-use jtc_host::session::PushReport;
-use jtc_host::{Arm, Session};
+use jtc_host::session::{ArmPart, PushReport};
+use jtc_host::{Arm, Error, LinkError, Session};
 
+use super::task::STOPPED;
 use super::{Done, Happening, Task};
 use crate::api::ErrorObject;
 use crate::owner::ClientPort;
@@ -9,6 +10,10 @@ use crate::owner::ClientPort;
 /// What a controller was given of an arm.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
+    /// So many settings have changed.
+    pub settings: usize,
+    /// It has its name.
+    pub named: bool,
     /// Friction, gains and model, as far as they were confirmed.
     pub parts: Vec<PushReport>,
     /// Hash of the arm, where all of it was read back and does not differ.
@@ -17,7 +22,23 @@ pub struct Given {
     pub stored: Option<u32>,
 }
 
-/// Gives the controller the whole arm, reads it back and compares; `store`: has it kept over a loss of power.
+impl Given {
+    /// What is in use of an arm that was not given whole, in words.
+    fn in_use(&self) -> Option<String> {
+        let mut parts = Vec::new();
+        if self.settings > 0 {
+            parts.push(format!("{} settings", self.settings));
+        }
+        if self.named {
+            parts.push("its name".to_owned());
+        }
+        parts.extend(self.parts.iter().map(|part| part.parameter.name().to_owned()));
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+}
+
+/// Gives the controller the whole arm, reads it back and compares; `store`: has it kept over a loss of power. It ends where somebody stops or
+/// pauses the arm: an arm that was given whole has torque.
 pub fn give(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,
@@ -28,23 +49,51 @@ pub fn give(
         task.note(warning.to_string());
     }
     let mut given = Given::default();
-    let each = |report: &PushReport| {
-        let PushReport { parameter, bytes, time_s, .. } = *report;
-        let parameter = parameter.name().to_owned();
-        task.journal.write(Happening::Given { job: task.job, parameter, bytes, time_s });
-        given.parts.push(*report);
+    let each = |part: ArmPart<'_>| match part {
+        ArmPart::Settings(count) => given.settings = count,
+        ArmPart::Name => given.named = true,
+        ArmPart::Parameter(report) => {
+            let PushReport { parameter, bytes, time_s, .. } = *report;
+            let parameter = parameter.name().to_owned();
+            task.journal.write(Happening::Given { job: task.job, parameter, bytes, time_s });
+            given.parts.push(*report);
+        }
     };
+    let halted = || task.is_halted();
     let done = if store {
-        session.push_and_store_arm(arm, each).map(|(_, number)| Some(number))
+        session.push_and_store_arm_until(arm, halted, each).map(|(_, number)| Some(number))
     } else {
-        session.push_arm(arm, each).map(|_| None)
+        session.push_arm_until(arm, halted, each).map(|_| None)
     };
     let error = match done {
         Ok(stored) => {
             (given.stored, given.hash) = (stored, arm.hash().ok().flatten());
             None
         }
-        Err(error) => Some(ErrorObject::of(&error)),
+        Err(error) => Some(not_given(task, &error, &given)),
     };
     (Done { finished: error.is_none(), given: Some(given), ..Done::default() }, error)
+}
+
+/// Why the controller does not have the whole of it, and what of it is in use.
+fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> ErrorObject {
+    let halted = match error {
+        Error::Cancelled => true,
+        Error::Link(LinkError::Denied { .. }) => task.is_halted(),
+        _ => false,
+    };
+    let object = if halted {
+        let by = task.halted_by();
+        let message = format!("{by} stopped or paused the arm before the controller had all of it");
+        ErrorObject::new(STOPPED, message, "give it again when the arm may have torque")
+    } else {
+        ErrorObject::of(error)
+    };
+    match given.in_use() {
+        Some(parts) => {
+            let message = format!("{}; in use already: {parts}", object.message);
+            object.message(message).next("give the whole of it again, or the arm that was in use before")
+        }
+        None => object,
+    }
 }

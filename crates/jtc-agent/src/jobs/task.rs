@@ -40,6 +40,11 @@ impl Task<'_> {
         self.line.with(|line, _| line.is_halted(self.commander.client))
     }
 
+    /// Who stopped or paused it.
+    pub fn halted_by(&self) -> String {
+        self.line.with(|line, _| line.halted_by(self.commander.client).to_owned())
+    }
+
     /// Somebody stopped the arm before this moved it.
     pub fn stopped(&self) -> ErrorObject {
         stopped(self.line, self.commander.client)

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use jtc_core::{Config, settings};
 use jtc_wire::{
-    Answer, ControllerState, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, SET_VALUES_MAX,
-    SettingValue, StoreState, fixed, floats, set_settings,
+    Answer, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, SET_VALUES_MAX, SettingValue, StoreState,
+    fixed, floats, set_settings,
 };
 
-use super::{PushReport, Session, frame_type, type_byte};
-use crate::arm::{Arm, ParameterSet};
+use super::{Session, frame_type, type_byte};
+use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
@@ -181,80 +181,6 @@ impl<P: Port> Session<P> {
         Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// Gives the device the whole arm: settings and name where they differ, then friction, gains and model; reads it back and
-    /// compares. The device has to be in Init or Error where settings differ.
-    ///
-    /// # Errors
-    ///
-    /// [`ExtensionError::Incomplete`] for an arm without gains or friction, [`ExtensionError::Differs`] when what is read back is
-    /// another one; those of [`Session::set_settings`] and [`Session::push`].
-    pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(&PushReport)) -> Result<Vec<PushReport>, Error> {
-        let (set, hash) = whole(arm)?;
-        self.push_settings(arm)?;
-        let pushed = self.push(&set, done)?;
-        self.has_arm(arm, hash)?;
-        Ok(pushed)
-    }
-
-    /// Gives the device the whole arm like [`Session::push_arm`], and has it stored (J-54); returns the number that the stored arm
-    /// has. The arm has no torque meanwhile: with friction, gains and model the controller would leave Init and hold it, so what it
-    /// has got is withdrawn before the last of the three comes.
-    ///
-    /// # Errors
-    ///
-    /// [`ExtensionError::Powered`] outside Init and Error, before anything is sent; those of [`Session::push_arm`] and
-    /// [`Session::store_arm`].
-    pub fn push_and_store_arm(
-        &mut self,
-        arm: &Arm,
-        mut done: impl FnMut(&PushReport),
-    ) -> Result<(Vec<PushReport>, u32), Error> {
-        let (set, hash) = whole(arm)?;
-        let state = self.fresh_status()?.state;
-        if !state.is_in(&[ControllerState::Init, ControllerState::Error]) {
-            return Err(ExtensionError::Powered { state }.into());
-        }
-        // In Error nothing that is given powers the arm.
-        let withdraw =
-            |session: &mut Self| if state == ControllerState::Init { session.disable() } else { Ok(()) };
-        let last = ParameterSet { pid: set.pid, ..ParameterSet::default() };
-        let first = ParameterSet { pid: None, ..set };
-        withdraw(self)?;
-        self.push_settings(arm)?;
-        let mut pushed = self.push(&first, &mut done)?;
-        withdraw(self)?;
-        pushed.extend(self.push(&last, &mut done)?);
-        self.has_arm(arm, hash)?;
-        let number = self.store_arm()?;
-        // As after a start: what is stored is in use when a host asks for it, all of it.
-        withdraw(self)?;
-        Ok((pushed, number))
-    }
-
-    /// Settings and name, where they differ.
-    fn push_settings(&mut self, arm: &Arm) -> Result<(), Error> {
-        let now = self.settings()?;
-        let settings: Vec<SettingValue> =
-            arm.settings().into_iter().filter(|own| !now.contains(own)).collect();
-        if !settings.is_empty() {
-            self.set_settings(&settings)?;
-        }
-        let name = Name::cut(&arm.name);
-        if self.info()?.is_some_and(|info| info.arm != name) {
-            self.set_name(&name)?;
-        }
-        Ok(())
-    }
-
-    /// The device has this arm, read back.
-    fn has_arm(&mut self, arm: &Arm, hash: u64) -> Result<(), Error> {
-        if self.info()?.is_some_and(|info| info.hash == hash) {
-            return Ok(());
-        }
-        let differences = arm.differences(&self.device_arm()?);
-        Err(ExtensionError::Differs { arm: arm.name.clone(), differences }.into())
-    }
-
     /// Changes settings, all of them or none.
     ///
     /// # Errors
@@ -374,13 +300,4 @@ impl<P: Port> Session<P> {
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         Ok(self.extension(&frame)?)
     }
-}
-
-/// All that a device takes of an arm by parameter frames, and the arm's hash.
-fn whole(arm: &Arm) -> Result<(ParameterSet, u64), Error> {
-    let set = arm.parameter_set();
-    let Some(hash) = arm.hash()? else {
-        return Err(ExtensionError::Incomplete { arm: arm.name.clone(), missing: set.missing() }.into());
-    };
-    Ok((set, hash))
 }

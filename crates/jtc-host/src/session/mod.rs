@@ -8,6 +8,7 @@ mod clock;
 mod commands;
 mod extension;
 mod follow;
+mod give;
 mod log;
 mod params;
 mod payload;
@@ -31,6 +32,7 @@ use jtc_wire::{
 pub use clock::StatusClock;
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
+pub use give::ArmPart;
 pub use log::LogStatus;
 pub use params::PushReport;
 pub use ready::BRING_UP;

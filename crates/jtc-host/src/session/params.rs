@@ -33,6 +33,20 @@ impl<P: Port> Session<P> {
     pub fn push(
         &mut self,
         set: &ParameterSet,
+        done: impl FnMut(&PushReport),
+    ) -> Result<Vec<PushReport>, Error> {
+        self.push_until(set, || false, done)
+    }
+
+    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::push`]; [`Error::Cancelled`].
+    pub(super) fn push_until(
+        &mut self,
+        set: &ParameterSet,
+        ended: impl Fn() -> bool,
         mut done: impl FnMut(&PushReport),
     ) -> Result<Vec<PushReport>, Error> {
         set.check()?;
@@ -55,6 +69,9 @@ impl<P: Port> Session<P> {
         for (parameter, frame, times) in frames {
             let start = self.port.now();
             for _ in 0..times {
+                if ended() {
+                    return Err(Error::Cancelled);
+                }
                 self.command(&frame).map_err(|e| explained(e, set))?;
             }
             let time_s = (self.port.now() - start).as_secs_f64();

@@ -5,7 +5,7 @@ use std::path::Path;
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, table};
 use jtc_core::Config;
 use jtc_host::arm::{Arm, Difference};
-use jtc_host::session::PushReport;
+use jtc_host::session::{ArmPart, PushReport};
 use jtc_host::{Error, LinkError, Session};
 use serde_json::json;
 
@@ -37,7 +37,11 @@ pub(super) fn push(
     if session.info()?.is_none() {
         return without_extensions(&mut session, &arm, store, accept, out);
     }
-    let report = |p: &PushReport| out.note(sent(p));
+    let report = |part: ArmPart<'_>| match part {
+        ArmPart::Settings(count) => out.note(format!("{count} settings")),
+        ArmPart::Name => out.note("the name of the arm"),
+        ArmPart::Parameter(report) => out.note(sent(report)),
+    };
     let (pushed, stored) = if store {
         session.push_and_store_arm(&arm, report).map(|(pushed, number)| (pushed, Some(number)))
     } else {

@@ -79,10 +79,10 @@ impl Upload {
         if (number, step, segment.segments) != (assembly.number, assembly.step_ms, assembly.segments) {
             return;
         }
-        if segment.segment + 1 == assembly.taken {
+        if segment.segment.checked_add(1) == Some(assembly.taken) {
             // Its record did not come: it was sent again.
             assembly.points.truncate(assembly.before_last);
-        } else if segment.segment == assembly.taken {
+        } else if segment.segment == assembly.taken && assembly.taken < assembly.segments {
             assembly.taken += 1;
             assembly.before_last = assembly.points.len();
         } else {
@@ -182,6 +182,16 @@ mod tests {
         upload.answered(false);
         upload.answered(false);
         assert_eq!(positions(&mut upload).unwrap(), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn numbers_at_the_end_of_their_range_are_no_segments() {
+        let mut upload = Upload::default();
+        let point = [RawPoint::default(); 2];
+        for i in [0, u16::MAX, 1, u16::MAX] {
+            upload.sent(&jtc_host::frame::segment(0, i, 2, 1, &point).expect("it fits"));
+        }
+        assert_eq!(upload.next.as_ref().map(|assembly| assembly.taken), Some(2));
     }
 
     #[test]

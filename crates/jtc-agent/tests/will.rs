@@ -138,3 +138,35 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
         assert_eq!(wills(&mut board).last().cloned(), left, "{policy:?} {state:?} {trajectory:?}");
     }
 }
+
+/// Where nothing is received, nobody knows that nothing moves: what was left stays in force for an agent that comes after this one.
+#[test]
+fn what_was_left_stays_in_force_while_the_controller_is_silent() {
+    for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
+        let mut board = Board::new(115_200);
+        board.status.trajectory = TrajectoryState::Execute.into();
+        board.deaf_until = board.now() + Duration::from_secs(4);
+        let now = board.now();
+        board.line.apply_left("anna", policy, now);
+        board.run_ms(3_000);
+        assert_eq!(board.line.will().cloned(), will("anna", policy, Moves::Motion), "{policy:?}");
+        assert_eq!(wills(&mut board), [], "{policy:?}: it is as it was");
+        // It reports again, and rests.
+        board.status.trajectory = TrajectoryState::Finish.into();
+        board.status.state = ControllerState::HoldPos.into();
+        board.run_ms(3_000);
+        assert_eq!(wills(&mut board).last(), Some(&None), "{policy:?}");
+    }
+}
+
+/// What a controller does not let be taught is not taught.
+#[test]
+fn teaching_that_is_refused_leaves_no_will() {
+    let mut board = Board::new(115_200);
+    board.status.state = ControllerState::Init.into();
+    board.refuses = Some(FrameType::TeachingModeEnable);
+    let anna = board.join("anna", Role::Operator, Policy::Stop);
+    board.send(anna, &fixed::TEACHING_MODE_ENABLE);
+    board.run_ms(2_500);
+    assert_eq!(wills(&mut board).last(), Some(&None));
+}

@@ -10,13 +10,14 @@ use axum::http::{HeaderName, StatusCode, header};
 use axum::{Extension, Json};
 use jtc_host::log::Account;
 use jtc_host::{ErrorKind, LinkError, Session};
+use serde_json::json;
 use utoipa::ToSchema;
 
 use super::body::blocking;
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::Commander;
-use crate::line::{Introduction, Policy, Role};
+use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
 
 /// What the file is called.
@@ -66,13 +67,16 @@ pub(super) async fn fetch(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
 ) -> Result<([(HeaderName, String); 2], Vec<u8>), ErrorObject> {
+    // Reading it holds up what it records.
+    caller.operator()?;
+    agent.note("log", json!({ "from": caller.peer.to_string() }));
     let room = agent.logs.clone().try_acquire_owned().map_err(|_| {
         let next = "ask again in some seconds: a log is read by one at a time";
         ErrorObject::new("busy", "somebody reads the log of the flight recorder", next)
     })?;
     // A client of its own: whoever asks something else meanwhile does not wait for it.
     let name = format!("{}: log", caller.peer);
-    let introduction = Introduction { name, role: Role::Viewer, policy: Policy::Continue };
+    let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = Commander::new(&agent.line, introduction);
     let fetched = reader.call_in_turn(move |session| {
         let log = session.fetch_log(|_, _| {});

@@ -10,6 +10,8 @@ use super::class::HostFrame;
 
 /// Bytes of frames that a client may have waiting: a trajectory in flight and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
+/// As many frames, of whatever length: as many as it may send at once.
+const FRAMES_WAITING: usize = 500;
 /// Bytes that wait for a client that does not take them: two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
 
@@ -99,7 +101,7 @@ pub enum PutOut {
     NoFrame,
     /// It sent more than the line and the others bear.
     #[error(
-        "it sent more than {FRAMES_PER_S} frames a second, or more than {WAITING_MAX} bytes wait for the line"
+        "it sent more than {FRAMES_PER_S} frames a second, or more than {FRAMES_WAITING} frames or {WAITING_MAX} bytes wait for the line"
     )]
     TooMuch,
     /// It commanded, and nothing was received from it for seconds.
@@ -118,6 +120,8 @@ pub(super) struct Client {
     /// Frames that wait for the line.
     pub waiting: VecDeque<HostFrame>,
     waiting_bytes: usize,
+    /// How many of them are those of one who commands.
+    commands: usize,
     /// Records of frames that were not passed on.
     refusals: VecDeque<Response>,
     deliveries: VecDeque<Delivery>,
@@ -144,6 +148,7 @@ impl Client {
             partial: Vec::new(),
             waiting: VecDeque::new(),
             waiting_bytes: 0,
+            commands: 0,
             refusals: VecDeque::new(),
             deliveries: VecDeque::new(),
             unread: 0,
@@ -203,15 +208,33 @@ impl Client {
     /// A frame waits for its turn.
     pub fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
         self.waiting_bytes += frame.bytes.len();
+        self.commands += usize::from(frame.class.needs_lease());
         self.waiting.push_back(frame);
-        if self.waiting_bytes > WAITING_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
+        if self.waiting_bytes > WAITING_MAX || self.waiting.len() > FRAMES_WAITING {
+            Err(PutOut::TooMuch)
+        } else {
+            Ok(())
+        }
     }
 
     /// The next frame in its turn.
     pub fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
         self.waiting_bytes -= frame.bytes.len();
+        self.commands -= usize::from(frame.class.needs_lease());
         Some(frame)
+    }
+
+    /// Takes the frames out that only one who commands sends; the others keep their order. It costs nothing where there are none, whatever
+    /// else waits: a Stop does it with every client.
+    pub fn take_commands(&mut self) -> Vec<HostFrame> {
+        if self.commands == 0 {
+            return Vec::new();
+        }
+        let (taken, kept) = self.waiting.drain(..).partition(|frame| frame.class.needs_lease());
+        (self.waiting, self.commands) = (kept, 0);
+        self.waiting_bytes = self.waiting.iter().map(|frame| frame.bytes.len()).sum();
+        VecDeque::into(taken)
     }
 
     /// Gives it something, if it reads.
@@ -225,5 +248,34 @@ impl Client {
     pub fn take_deliveries(&mut self) -> Vec<Delivery> {
         self.unread = 0;
         self.deliveries.drain(..).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_wire::fixed;
+
+    use super::*;
+
+    #[test]
+    fn a_stop_takes_out_what_commands_and_leaves_the_rest_in_its_order() {
+        let mut client =
+            Client::new(Introduction { name: "anna".into(), role: Role::Operator, policy: Policy::Continue });
+        let frame = |bytes: &[u8]| HostFrame::parse(bytes.to_vec()).expect("a frame");
+        for bytes in [
+            &fixed::GET_INFO[..],
+            &fixed::exec(ExecCommand::Execute),
+            &fixed::get_settings(0),
+            &fixed::gripper_control(true),
+        ] {
+            client.wait(frame(bytes)).expect("there is room");
+        }
+        assert_eq!(client.take_commands().len(), 2);
+        assert!(client.take_commands().is_empty());
+        assert_eq!(client.take_waiting(), Some(frame(&fixed::GET_INFO)));
+        assert_eq!(client.take_waiting(), Some(frame(&fixed::get_settings(0))));
+        assert_eq!((client.take_waiting(), client.waiting_bytes, client.commands), (None, 0, 0));
+        let mut room = (0..).take_while(|_| client.wait(frame(&fixed::GET_INFO)).is_ok());
+        assert_eq!(room.by_ref().count(), FRAMES_WAITING, "short frames have a bound of their own");
     }
 }

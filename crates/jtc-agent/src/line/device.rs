@@ -1,7 +1,7 @@
 //! The device's side of the line: what is written next, and whose its records are.
 use std::time::Duration;
 
-use jtc_wire::{FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
+use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
 
 use super::class::{Class, HostFrame, returned_by};
 use super::client::Client;
@@ -160,6 +160,13 @@ impl SharedLine {
         let answered = status.response().map_or_else(Vec::new, |response| self.whose(response, now));
         for (client, response) in &answered {
             let taken = response.status == FrameStatus::NoError;
+            if taken
+                && response.data != DataStatus::NoError
+                && response.frame_type == FrameType::TeachingModeEnable as u8
+            {
+                // It was refused.
+                self.moving.taught();
+            }
             if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
                 self.moving.answered();
             }

@@ -197,14 +197,7 @@ impl SharedLine {
         let clients: Vec<ClientId> = self.clients.keys().copied().collect();
         for id in clients {
             let Some(client) = self.clients.get_mut(&id) else { continue };
-            let frames: Vec<HostFrame> = std::iter::from_fn(|| client.take_waiting()).collect();
-            let (dropped, kept): (Vec<_>, Vec<_>) =
-                frames.into_iter().partition(|frame| frame.class.needs_lease());
-            // There was room for them before.
-            for frame in kept {
-                let _ = client.wait(frame);
-            }
-            for frame in dropped {
+            for frame in client.take_commands() {
                 self.refuse(id, &frame, denied.clone());
             }
         }
@@ -246,6 +239,11 @@ impl SharedLine {
             && let Err(denied) = self.may_send(id, &frame, now)
         {
             return self.refuse(id, &frame, denied);
+        }
+        // Reading the log holds up what it records: not for everyone who may look.
+        let viewer = self.introduction(id).is_some_and(|client| client.role == Role::Viewer);
+        if frame.frame_type == FrameType::GetLog && viewer {
+            return self.refuse(id, &frame, Denied::Viewer);
         }
         if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.wait(frame)) {
             self.put_out(id, reason, now);
@@ -348,9 +346,10 @@ impl SharedLine {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Brings the arm to rest for the end of the owner.
+    /// Brings the arm to rest for the end of the owner. What somebody still prepares moves it no more.
     pub fn end(&mut self, now: Duration) {
-        self.hold("the end of the agent", ExecCommand::Stop, now);
+        self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
+        self.moving.end_teaching(now);
     }
 
     /// Ends whatever moves the arm, for the owner. Where nothing seems to move it is sent as well, as a status is older than the last
@@ -364,6 +363,11 @@ impl SharedLine {
         }
         self.moving.end_teaching(now);
         moved
+    }
+
+    /// The arm may be moving, or may begin to. In doubt it may.
+    pub fn may_move(&self, now: Duration) -> bool {
+        self.moving.may_move(self.status.as_ref(), now)
     }
 
     /// Nothing waits for the line, nor for a record of a Stop.

@@ -62,6 +62,10 @@ impl SharedLine {
     /// is older than the last command.
     pub fn apply_left(&mut self, client: &str, policy: Policy, now: Duration) -> Applied {
         self.bequeath(client.to_owned(), policy);
+        if self.status.is_none() {
+            // Nobody knows what moves: what was left is in force until the device reports that nothing does.
+            self.will = Some(self.will_of(Moves::Motion));
+        }
         let moves = self.moving.may_move(self.status.as_ref(), now);
         let stands = self.status.as_ref().is_some_and(|(_, status)| {
             status.trajectory == TrajectoryState::Pause && status.state == ControllerState::HoldPos
@@ -73,6 +77,11 @@ impl SharedLine {
             None if moves => Applied::GoesOn,
             None | Some(_) => Applied::Rests,
         }
+    }
+
+    /// What is in force now, should the agent be killed.
+    pub fn will(&self) -> Option<&Will> {
+        self.will.as_ref()
     }
 
     /// Reports another will when it has changed.

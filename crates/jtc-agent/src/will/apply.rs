@@ -21,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(10);
 pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     let (client, policy) = match found {
         Found::Nothing => {
-            keeper.settle(None);
+            keeper.settle(None, None);
             return None;
         }
         Found::Left(stored) => (stored.client.as_str(), stored.policy),
@@ -31,10 +31,11 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     let reports = line.with(|line, _| line.status().is_some());
     let applied = line.with(|line, now| line.apply_left(client, policy, now));
     let taken = until(line, TAKES, SharedLine::is_idle);
-    keeper.settle(match found {
+    let since = match found {
         Found::Left(stored) => Some(stored.since_unix_s),
         _ => None,
-    });
+    };
+    keeper.settle(line.with(|line, _| line.will().cloned()), since);
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 

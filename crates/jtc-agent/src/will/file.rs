@@ -60,7 +60,7 @@ pub(super) fn read(path: &Path, port: &str) -> Found {
     if !metadata.is_file() || metadata.len() > LEN_MAX {
         return Found::Doubtful("it is no such file".into());
     }
-    if is_open(&metadata) {
+    if is_open(&metadata) || path.parent().is_some_and(|folder| is_others(folder, &metadata)) {
         return Found::Doubtful("other users can write it".into());
     }
     let text = match fs::read(path) {
@@ -90,6 +90,18 @@ fn is_open(_: &fs::Metadata) -> bool {
     false
 }
 
+/// The file is that of another user than its folder, or others can put files into the folder.
+#[cfg(unix)]
+fn is_others(folder: &Path, file: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    fs::metadata(folder).is_ok_and(|folder| folder.uid() != file.uid() || is_open(&folder))
+}
+
+#[cfg(not(unix))]
+fn is_others(_: &Path, _: &fs::Metadata) -> bool {
+    false
+}
+
 /// Puts it there, in one step. It counts for a killed agent from then on; it outlasts a loss of power as soon as the disk has it.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
@@ -104,6 +116,12 @@ pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> 
     }
     written?;
     file.sync_all()
+}
+
+/// Makes it one that cannot be read, where it can be neither written nor taken away: a full disk lets files become shorter.
+pub(super) fn spoil(path: &Path) {
+    // Where not even that goes, nothing does.
+    let _ = OpenOptions::new().write(true).truncate(true).open(path);
 }
 
 /// Takes it away.

@@ -84,10 +84,14 @@ impl Keeper {
         Witness(self.0.clone())
     }
 
-    /// What lay there was acted on: from now on the file is as the line has it. `since`: what still moves has done so since then.
-    pub fn settle(&self, since: Option<f64>) {
+    /// What lay there was acted on: from now on the file is as the line has it, which has `will` now. `since`: what still moves has done so
+    /// since then.
+    pub fn settle(&self, will: Option<Will>, since: Option<f64>) {
         let mut slot = self.0.lock();
         slot.held = false;
+        if slot.wanted.is_none() {
+            slot.wanted = will.map(|will| (will, since.unwrap_or_else(now)));
+        }
         if let (Some((_, moves_since)), Some(since)) = (&mut slot.wanted, since) {
             *moves_since = since;
         }
@@ -144,6 +148,10 @@ impl Writer {
                 Some((will, since)) => file::write(&self.path, &self.port, will, *since),
                 None => file::remove(&self.path),
             };
+            if done.is_err() {
+                // What lies there is not what counts: in doubt the arm is stopped.
+                file::spoil(&self.path);
+            }
             self.there = done.is_ok().then_some(wanted);
             self.report(done);
         }
@@ -234,7 +242,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a directory");
         let (keeper, found, _notices) = begin(dir.path());
         assert_eq!(found, Found::Nothing);
-        keeper.settle(None);
+        keeper.settle(None, None);
         let witness = keeper.witness();
         witness.see(&moves(Policy::Pause));
         until(dir.path(), "pause", left(Policy::Pause));
@@ -251,12 +259,12 @@ mod tests {
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
         keeper.witness().see(&moves(Policy::Stop));
-        keeper.settle(Some(stored.since_unix_s));
+        keeper.settle(None, Some(stored.since_unix_s));
         drop(keeper);
         let (keeper, again, _notices) = begin(dir.path());
         assert_eq!(again, found);
         // At rest it goes.
-        keeper.settle(Some(stored.since_unix_s));
+        keeper.settle(None, Some(stored.since_unix_s));
         until(dir.path(), "nothing moves", |found| *found == Found::Nothing);
         keeper.witness().see(&moves(Policy::Continue));
         keeper.forget();
@@ -272,7 +280,7 @@ mod tests {
         let (keeper, _, notices) = begin(&folder);
         let first = notices.recv().expect("a notice");
         assert!(first.what == "policy-not-kept" && first.warning.is_some_and(|w| w.contains("all the same")));
-        keeper.settle(None);
+        keeper.settle(None, None);
         let witness = keeper.witness();
         for policy in [Policy::Pause, Policy::Stop, Policy::Pause] {
             witness.see(&moves(policy));
@@ -284,5 +292,23 @@ mod tests {
         witness.see(&moves(Policy::Stop));
         until(&folder, "there is room again", left(Policy::Stop));
         assert_eq!(notices.recv().expect("a notice").what, "policy-kept");
+    }
+
+    #[test]
+    fn what_cannot_be_replaced_is_spoilt_and_in_doubt_the_arm_is_stopped() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let (keeper, _, notices) = begin(dir.path());
+        keeper.settle(None, None);
+        keeper.witness().see(&moves(Policy::Continue));
+        until(dir.path(), "continue", left(Policy::Continue));
+        // From now on no file can be begun there, as on a full disk.
+        let part = file::path(dir.path(), PORT).with_extension("part");
+        std::fs::create_dir(&part).expect("a folder");
+        keeper.witness().see(&moves(Policy::Stop));
+        until(dir.path(), "doubtful", |found| matches!(found, Found::Doubtful(_)));
+        assert_eq!(notices.recv().expect("a notice").what, "policy-not-kept");
+        std::fs::remove_dir(&part).expect("a folder");
+        keeper.witness().see(&moves(Policy::Pause));
+        until(dir.path(), "there is room again", left(Policy::Pause));
     }
 }

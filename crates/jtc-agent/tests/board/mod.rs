@@ -37,6 +37,8 @@ pub struct Board {
     pub damaged: usize,
     /// No status comes before.
     pub deaf_until: Duration,
+    /// Frames of this type are not carried out.
+    pub refuses: Option<FrameType>,
 }
 
 impl Board {
@@ -56,6 +58,7 @@ impl Board {
             written: Vec::new(),
             damaged: 0,
             deaf_until: Duration::ZERO,
+            refuses: None,
             status: Status { gripper: Some(Default::default()), ..Status::default() },
         }
     }
@@ -111,7 +114,9 @@ impl Board {
             let (frame_type, response, bytes) = match self.receiver.event().expect("there is one") {
                 LinkEvent::Frame(frame) => {
                     let n = frame.bytes.len();
-                    let good = Response::good(frame.frame_type, DataStatus::NoError, n as u16);
+                    let refused = self.refuses == Some(frame.frame_type);
+                    let data = if refused { DataStatus::NotAllowed } else { DataStatus::NoError };
+                    let good = Response::good(frame.frame_type, data, n as u16);
                     (Some(frame.frame_type), good, frame.bytes[..n.min(40)].to_vec())
                 }
                 LinkEvent::Bad(response) | LinkEvent::Noise(response) => (None, response, Vec::new()),

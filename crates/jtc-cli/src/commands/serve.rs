@@ -16,6 +16,7 @@ use jtc_agent::will::{self, Found, Keeper};
 use jtc_agent::{Line, Owner, serve as service, tls};
 use jtc_client::agents::{Registered, register};
 use jtc_host::Arm;
+use jtc_host::example::demo_motion;
 use jtc_host::port::Port;
 use jtc_host::port::sim::LivePort;
 use jtc_sim::{SimConfig, World};
@@ -41,6 +42,10 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
     let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
+    if args.sim && args.arm.is_none() && args.trajectories.is_none() {
+        // A motion to try: whoever has only just met the arm has none.
+        store.put(1, "example motion", &demo_motion().to_exact_csv(), false)?;
+    }
     let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
@@ -93,6 +98,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
+    out.note(tokens.dashboard(&url, are_new || args.link_with_token));
     let access = Access::new(tokens, listen, &args.names).allowing(&args.allow_origins);
     let jobs = Jobs::new(owner.line(), store, arm);
     let agent = Agent::new(owner.line(), jobs.clone(), access, log.clone(), &name, args.sim)?;
@@ -115,6 +121,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let gone = line.lost();
     let rests = gone.is_none() && come_to_rest(&line, out);
     drop(recorder);
+    // The recorder's disk may have taken seconds.
+    let rests = rests && line.with(|line, _| line.status().is_some_and(|(_, status)| !moves(status)));
     owner.end();
     if let Some(keeper) = keeper.filter(|_| rests) {
         keeper.forget();
@@ -143,11 +151,15 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     Ok(Some(listener))
 }
 
+/// The arm moves by this status, or can be led by hand.
+fn moves(status: &Status) -> bool {
+    status.is_executing() || status.state == ControllerState::Teaching
+}
+
 /// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held. Whether the controller reports that.
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
-    let moves = |status: &Status| status.is_executing() || status.state == ControllerState::Teaching;
     // By what the controller reports from then on.
     let rests = || {
         line.with(|line, _| {

@@ -1,6 +1,6 @@
 // What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
 import { spawn } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer, request } from 'node:http';
 import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -28,12 +28,21 @@ export function jtc(args, options = {}) {
   });
 }
 
-/** An agent with a simulated arm, in a directory of its own. */
-export async function startAgent(extra = [], listen = '127.0.0.1:0') {
+/** An agent in a directory of its own: with a simulated arm, or at a simulated controller's port, in which what `faults` says goes wrong. */
+export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = undefined } = {}) {
   const dir = mkdtempSync(join(tmpdir(), 'openjtc-web-'));
   const tokenFile = join(dir, 'tokens.toml');
   const env = { ...process.env, XDG_STATE_HOME: dir };
-  const child = spawn(JTC, ['serve', '--sim', '--listen', listen, '--token-file', tokenFile, '--json', ...extra], { cwd: dir, env });
+  let link = ['--sim'];
+  let sim;
+  if (faults) {
+    const [port, file] = [join(dir, 'port'), join(dir, 'faults.toml')];
+    writeFileSync(file, faults);
+    sim = spawn(JTC, ['sim', '--serial', port, '--faults', file], { cwd: dir, env });
+    await until('the simulated controller is there', () => existsSync(port));
+    link = ['--port', port];
+  }
+  const child = spawn(JTC, ['serve', ...link, '--listen', listen, '--token-file', tokenFile, '--json', ...extra], { cwd: dir, env });
   let errors = '';
   child.stderr.on('data', (data) => (errors += data));
   const line = await new Promise((done, fail) => {
@@ -54,6 +63,7 @@ export async function startAgent(extra = [], listen = '127.0.0.1:0') {
     suspend: () => child.kill('SIGSTOP'),
     wake: () => child.kill('SIGCONT'),
     async end() {
+      sim?.kill('SIGKILL');
       child.kill('SIGCONT');
       child.kill('SIGKILL');
       await gone;
@@ -144,6 +154,33 @@ export function startBrowser() {
       '--disable-component-update', '--disable-sync', '--disable-quic', '--no-first-run',
     ],
   });
+}
+
+/** An agent with its page, for one test; `look` opens it in a browser of its own. */
+export async function stage(browser, options = {}) {
+  const agent = await startAgent(options);
+  const site = options.direct ? { url: agent.url, end: async () => {} } : await startPage(agent, options.mock);
+  const contexts = [];
+  return {
+    agent,
+    site,
+    async look({ token = 'operator', ...rest } = {}) {
+      const word = token === 'none' ? '' : `#token=${agent[token] ?? token}`;
+      const page = await open(browser, `${site.url}/${word}`, rest);
+      contexts.push(page.context());
+      return page;
+    },
+    async end() {
+      for (const context of contexts) await context.close();
+      await site.end();
+      await agent.end();
+    },
+  };
+}
+
+/** What the page says of the state. */
+export function state(page) {
+  return page.locator('section[aria-label="State"]');
 }
 
 /** A page that collects what a browser complains of. */

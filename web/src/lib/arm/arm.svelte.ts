@@ -255,7 +255,8 @@ export class ArmPage {
   readPoses(): Promise<void> {
     return this.#quietly(async () => {
       try {
-        this.poses = (await this.session.api.get<{ poses: Pose[] }>('/api/poses')).poses;
+        const answer = await this.session.api.get<{ poses: Pose[] } | Pose[]>('/api/poses');
+        this.poses = Array.isArray(answer) ? answer : answer.poses;
         this.posesMissing = false;
       } catch (error) {
         this.posesMissing = error instanceof ApiError && error.isMissingPath;

@@ -46,6 +46,10 @@ export class Jogger {
   release(): void {
     if (!this.#rates) return;
     this.#end();
+    this.#zeros();
+  }
+
+  #zeros(): void {
     void this.#line.send(new Array<number>(6).fill(0), false).catch(() => {
       // Rates hold for 200 ms only: without an answer the arm stops by itself.
     });
@@ -67,7 +71,11 @@ export class Jogger {
     this.#open += 1;
     this.#sentAt = this.#line.now();
     this.#line.send(rates, first).then(
-      () => (this.#open -= 1),
+      () => {
+        this.#open -= 1;
+        // Let go while these rates were on their way: zeros may have overtaken them, or were refused because of them.
+        if (turn !== this.#turn && !this.#rates) this.#zeros();
+      },
       (error: unknown) => {
         this.#open -= 1;
         if (turn !== this.#turn) return;

@@ -1,6 +1,6 @@
 // The picture of the arm. Drawn only when something has changed; loaded only when it is looked at.
 import {
-  AmbientLight, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
+  AmbientLight, ArrowHelper, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
   LineBasicMaterial, LineDashedMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D, PCFShadowMap, PerspectiveCamera, RingGeometry, Scene,
   ShadowMaterial, SphereGeometry, Vector3, WebGLRenderer,
 } from 'three';
@@ -20,6 +20,7 @@ export interface Palette {
   ghost: string;
   body: string;
   link: string;
+  cap: string;
   dark: boolean;
 }
 
@@ -27,6 +28,8 @@ export interface Shown {
   limits: boolean;
   trail: boolean;
   path: boolean;
+  /** The limits of all joints, and where down is. */
+  all: boolean;
 }
 
 const TRAIL = 400;
@@ -58,7 +61,8 @@ export class ArmScene {
   #trailPoints: Vector[] = [];
   #q: number[] = [];
   #palette: Palette;
-  #shown: Shown = { limits: true, trail: true, path: true };
+  #shown: Shown = { limits: true, trail: true, path: true, all: false };
+  #gravity: ArrowHelper | undefined;
   #pointed: number | undefined;
   #asked = false;
   #lost = false;
@@ -110,8 +114,8 @@ export class ArmScene {
 
   view(which: 'home' | 'front' | 'side' | 'top'): void {
     const r = this.#model ? reach(this.#model) : 1.6;
-    const height = r * 0.36;
-    const far = r * 1.62;
+    const height = r * 0.45;
+    const far = r * 1.95;
     const from = { home: [0.92, -1, 0.55], front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0.001, 0, 1] }[which] as Vector;
     const way = new Vector3(...from).normalize().multiplyScalar(far);
     this.#controls.target.set(0, 0, which === 'top' ? 0 : height);
@@ -155,10 +159,11 @@ export class ArmScene {
     this.#materials = {
       housing: new MeshStandardMaterial({ color: colors.body, roughness: 0.42, metalness: 0.08 }),
       link: new MeshStandardMaterial({ color: colors.link, roughness: 0.5, metalness: 0.05 }),
+      cap: new MeshStandardMaterial({ color: colors.cap, roughness: 0.55, metalness: 0.1 }),
       metal: new MeshStandardMaterial({ color: colors.dark ? '#8d99a6' : '#6b7783', roughness: 0.35, metalness: 0.5 }),
       ring: (joint) => this.#rings[joint] as MeshStandardMaterial,
     };
-    const ghost = { housing: this.#ghostMaterial, link: this.#ghostMaterial, metal: this.#ghostMaterial, ring: () => this.#ghostMaterial };
+    const ghost = { housing: this.#ghostMaterial, link: this.#ghostMaterial, metal: this.#ghostMaterial, cap: this.#ghostMaterial, ring: () => this.#ghostMaterial };
     this.#body = bodyOf(model, this.#materials);
     this.#ghost = bodyOf(model, ghost, true);
     this.#ghost.root.visible = false;
@@ -168,6 +173,12 @@ export class ArmScene {
     this.#shadeLimits(model);
     this.#layFloor(model);
     const r = reach(model);
+    if (this.#gravity) this.#scene.remove(this.#gravity);
+    const down = new Vector3(...model.gravity_m_s2);
+    if (down.length() > 0.1) {
+      this.#gravity = new ArrowHelper(down.normalize(), new Vector3(-r * 0.3, -r * 0.3, r * 0.5), r * 0.24, colors.accent, r * 0.06, r * 0.035);
+      this.#scene.add(this.#gravity);
+    }
     this.#sun.position.set(r * 0.9, -r * 0.7, r * 2.2);
     const shadow = this.#sun.shadow.camera;
     Object.assign(shadow, { left: -r * 1.1, right: r * 1.1, top: r * 1.1, bottom: -r * 1.1, near: r * 0.4, far: r * 4.5 });
@@ -330,10 +341,11 @@ export class ArmScene {
   #dress(): void {
     const model = this.#model;
     if (!model) return;
+    if (this.#gravity) this.#gravity.visible = this.#shown.all;
     this.#trail.visible = this.#shown.trail;
     this.#path.visible = this.#marks.visible = this.#shown.path;
     const bright = this.#materials;
-    for (const material of [bright?.housing, bright?.link, bright?.metal]) {
+    for (const material of [bright?.housing, bright?.link, bright?.metal, bright?.cap]) {
       if (!material) continue;
       material.transparent = this.#lost;
       material.opacity = this.#lost ? 0.25 : 1;
@@ -347,7 +359,7 @@ export class ArmScene {
       ring?.color.set(new Color(this.#lost ? this.#palette.line : share < 0.02 ? this.#palette.error : near ? this.#palette.warn : this.#palette.accent));
       if (ring) ring.emissive.set(this.#pointed === i + 1 ? this.#palette.accent : '#000000');
       const group = this.#limits[i];
-      if (group) group.visible = this.#shown.limits && !this.#lost && (near || this.#pointed === i + 1);
+      if (group) group.visible = this.#shown.limits && !this.#lost && (near || this.#shown.all || this.#pointed === i + 1);
       const needle = this.#needles[i];
       if (needle) needle.rotation.z = q;
     });

@@ -11,6 +11,8 @@ export interface Materials {
   link: Material;
   ring: (joint: number) => Material;
   metal: Material;
+  /** Covers of the housings' ends. */
+  cap: Material;
 }
 
 export function matrix(frame: Frame): Matrix4 {
@@ -101,6 +103,11 @@ export function bodyOf(model: ArmModel, materials: Materials, plain = false): Bo
     const [low, high] = [Math.min(0, aside) - radius * 0.85, Math.max(0, aside) + radius * 0.85];
     turned.add(new Mesh(rounded(radius, low, high), materials.housing));
     if (!plain) {
+      for (const [end, way] of [[high, 1], [low, -1]] as const) {
+        const cover = new Mesh(rounded(radius * 0.74, -0.004, 0.004), materials.cap);
+        cover.position.z = end + way * 0.0005;
+        turned.add(cover);
+      }
       const ring = new Mesh(new TorusGeometry(radius * 0.985, radius * 0.12, 12, 56), materials.ring(i));
       ring.position.z = aside >= 0 ? low + radius * 0.5 : high - radius * 0.5;
       ring.name = 'ring';

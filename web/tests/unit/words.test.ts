@@ -1,0 +1,87 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { explained } from '../../src/lib/arm/explain.ts';
+import type { Controller } from '../../src/lib/arm/types.ts';
+import { causesOf, codeOf, eventWords, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
+import { angle, duration, number, parse } from '../../src/lib/format.ts';
+import { deviceKind, takesText } from '../../src/lib/keys.ts';
+
+function controller(change: Partial<Controller> = {}): Controller {
+  const joints = Array.from({ length: 6 }, (_, i) => ({ joint: i + 1, state: 'OperationEnable', errors: [] as string[], velocity_rad_s: 0, position_rad: 0 }));
+  return { state: 'HoldPos', trajectory: 'Null', point: 0, errors: [], errors_occurred: [], next: '', joints, ...change };
+}
+
+test('each state has a word, and says what leads on', () => {
+  const cases: [Partial<Controller>, string, string][] = [
+    [{}, 'Holding', 'hold'],
+    [{ state: 'Operate', trajectory: 'Execute' }, 'Moving', 'move'],
+    [{ state: 'HoldPos', trajectory: 'Pause' }, 'Paused', 'pause'],
+    [{ state: 'Teaching' }, 'Teaching', 'teach'],
+    [{ state: 'Init' }, 'No torque', 'off'],
+    [{ state: 'Error' }, 'Error', 'error'],
+    [{ errors: ['emergency input'] }, 'Error', 'error'],
+  ];
+  for (const [change, word, tone] of cases) {
+    const words = stateWords(controller(change), undefined, []);
+    assert.deepEqual([words.word, words.tone], [word, tone]);
+    assert.ok(words.detail !== '');
+  }
+  assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'defaults');
+  assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);
+});
+
+test('the most particular cause stands first, sums last; codes go to explain', () => {
+  const wrong = controller({ errors: ['external error', 'emergency input'] });
+  const [third] = wrong.joints.slice(2);
+  if (third) third.errors = ['torque'];
+  const causes = causesOf(wrong);
+  assert.deepEqual(causes.map((cause) => cause.words), ['Joint 3: torque', 'emergency input', 'external error']);
+  assert.equal(causes[1]?.code, 'emergency-input');
+  assert.equal(codeOf('internal CAN error'), 'internal-can-error');
+  const named = controller({ errors: ['x'], error_codes: ['joint-torque'] });
+  assert.equal(causesOf(named)[0]?.code, 'joint-torque');
+});
+
+test('what Stop did is said in words', () => {
+  assert.match(whatStopDid('HoldPos', false, controller(), 200), /Nothing was moving; the arm is held/);
+  assert.match(whatStopDid('Operate', true, controller({ state: 'Operate', trajectory: 'Execute' }), 200), /decelerates/);
+  assert.match(whatStopDid('Operate', true, controller({ trajectory: 'Stop' }), 640), /Stopped on the path in 0\.6 s; the arm is held/);
+  assert.match(whatStopDid('Teaching', false, controller(), 200), /Teaching ended; the arm is held/);
+  assert.match(whatStopDid('Operate', true, undefined, 200), /No status has come/);
+});
+
+test('events in words; progress is no line', () => {
+  assert.equal(eventWords({ kind: 'moving', job: 1, phase: 'motion', point: 3 }), undefined);
+  assert.deepEqual(eventWords({ kind: 'halt', by: 'anna', command: 'stop' }), { text: 'Stop by anna', tone: 'warn', of: 'halt' });
+  assert.equal(eventWords({ kind: 'ended', job: 2, outcome: 'failed', error: { code: 'x', message: 'too fast', next: '' } })?.text, 'Ended: too fast');
+});
+
+test('numbers: dash where not known, no negative zero, a true minus', () => {
+  assert.equal(number(undefined, 2), '–');
+  assert.equal(number(NaN, 2), '–');
+  assert.equal(number(-0.001, 2), '0.00');
+  assert.equal(number(-1.5, 1), '\u22121.5');
+  assert.equal(angle(Math.PI, 'deg'), '180.0');
+  assert.equal(parse('\u22120,5'), -0.5);
+  assert.ok(Number.isNaN(parse('')));
+  assert.deepEqual([4.21, 61, 7390, undefined].map(duration), ['4.2 s', '1:01 min', '2:03:10 h', '–']);
+});
+
+test('the space bar is text in fields alone', () => {
+  assert.ok(takesText({ tagName: 'INPUT', type: 'text' }) && takesText({ tagName: 'TEXTAREA' }) && takesText({ tagName: 'DIV', isContentEditable: true }));
+  assert.ok(!takesText({ tagName: 'BUTTON' }) && !takesText({ tagName: 'INPUT', type: 'range' }) && !takesText(null));
+});
+
+test('who commands has a name by the kind of device', () => {
+  assert.equal(deviceKind('Mozilla/5.0 (Linux; Android 14; Pixel) Mobile', 5, 400), 'Phone');
+  assert.equal(deviceKind('Mozilla/5.0 (Macintosh; Intel Mac OS X)', 5, 1000), 'Tablet');
+  assert.equal(deviceKind('Mozilla/5.0 (X11; Linux x86_64)', 0, 1920), 'Computer');
+});
+
+test('an explanation is terms and texts', () => {
+  const page = explained('emergency-input - bit 0\n  meaning: The safety input\n           is low.\n  cause:   Pressed.\n  do:      Release.\n  next:    jtc recover');
+  assert.equal(page.head, 'emergency-input - bit 0');
+  assert.deepEqual(page.rows.map((row) => row.term), ['Meaning', 'Cause', 'What to do', 'Command']);
+  assert.equal(page.rows[0]?.text, 'The safety input is low.');
+});

@@ -159,20 +159,31 @@ impl Access {
     ///
     /// [`Refusal::Host`], [`Refusal::Origin`].
     pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
-        let host = request.host.unwrap_or_default().to_lowercase();
+        match self.is_own(request.host, request.origin) {
+            Err(Refusal::Origin(site)) if request.looks && self.origins.contains(&site.to_lowercase()) => {
+                Ok(true)
+            }
+            own => own.map(|()| false),
+        }
+    }
+
+    /// Whether it asks for this agent by one of its names, and was not made by a page of another site.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::Host`], [`Refusal::Origin`].
+    pub fn is_own(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
+        let host = host.unwrap_or_default().to_lowercase();
         if !self.hosts.contains(&host) {
             return Err(Refusal::Host(if host.is_empty() { "named".into() } else { host }));
         }
-        let Some(origin) = request.origin else { return Ok(false) };
+        let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
         // Its own page, not one of another agent on this computer.
-        if site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) == Some(host.as_str()) {
-            return Ok(false);
+        match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
+            Some(own) if own == host => Ok(()),
+            _ => Err(Refusal::Origin(origin.to_owned())),
         }
-        if request.looks && self.origins.contains(&site) {
-            return Ok(true);
-        }
-        Err(Refusal::Origin(origin.to_owned()))
     }
 
     fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {

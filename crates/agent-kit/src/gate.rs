@@ -18,6 +18,8 @@ use crate::lease::key_of;
 use crate::log::CommandLog;
 use crate::problem::Denial;
 
+/// What stands before the token among the protocols of a socket.
+const BEARER: &str = "bearer.";
 /// Longest name of a client.
 const NAME_MAX: usize = 64;
 
@@ -32,6 +34,16 @@ impl Gate {
     /// One that lets in whom `access` does.
     pub fn new(access: Access, log: Arc<Mutex<CommandLog>>) -> Self {
         Self { access: Arc::new(access), log }
+    }
+
+    /// A request by one of the agent's own names, and not by a page of another site, whatever else it may do.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::Host`], [`Refusal::Origin`].
+    pub fn is_own(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+        let (host, origin) = (text_of(headers, header::HOST), text_of(headers, header::ORIGIN));
+        self.access.is_own(host, origin)
     }
 
     /// Writes a line to the log of commands.
@@ -134,7 +146,8 @@ pub async fn let_in(
         host: text_of(headers, header::HOST),
         origin: text_of(headers, header::ORIGIN),
         token: text_of(headers, header::AUTHORIZATION)
-            .map(|value| value.strip_prefix("Bearer ").unwrap_or("")),
+            .map(|value| value.strip_prefix("Bearer ").unwrap_or(""))
+            .or_else(|| protocol_token(headers)),
         address_token: address_token.as_deref(),
         looks: looks(method, request.uri().path()),
     };
@@ -199,6 +212,12 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     let looks = ["/", "/api/foxglove", "/api/stream"].contains(&uri.path());
     let asked = Query::<InAddress>::try_from_uri(uri).ok().filter(|_| socket && looks);
     asked.and_then(|Query(asked)| asked.token)
+}
+
+/// The token that a page names beside the protocol of its socket: a browser sends no other header of its choice there, and no history has this one.
+fn protocol_token(headers: &HeaderMap) -> Option<&str> {
+    let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
+    protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {

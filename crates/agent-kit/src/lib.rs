@@ -9,6 +9,7 @@ pub mod journal;
 pub mod lease;
 pub mod log;
 pub mod openapi;
+pub mod pages;
 mod problem;
 pub mod serve;
 pub mod socket;

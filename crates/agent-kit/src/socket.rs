@@ -13,6 +13,8 @@ use crate::access::Role;
 /// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
+/// The protocol that a page names for its socket, beside `bearer.` and its token.
+pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client that only looks, bytes.
 pub const MESSAGE_MAX: usize = 1024;
 /// Pings of a client between two messages to it.

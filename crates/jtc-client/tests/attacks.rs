@@ -82,6 +82,13 @@ fn a_token_in_an_address_is_the_viewers_for_sockets_that_look_and_is_written_now
 }
 
 #[test]
+fn pages_are_shown_by_the_agents_names_alone_and_their_sockets_have_tokens_of_their_own() {
+    let served = Served::start(921_600);
+    http::pages_are_the_agents_own(&served);
+    http::sockets_take_a_token_beside_their_protocol(&served);
+}
+
+#[test]
 fn a_socket_of_another_site_gets_no_end_of_the_line() {
     let served = Served::start(921_600);
     http::a_socket_of_another_site_is_refused(&served, "/api/line");

@@ -165,6 +165,44 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
     assert_eq!(http.get("GET /api/stop").0, 405);
 }
 
+/// The pages of the dashboard are shown to whoever asks by one of the agent's names, and to no page of another site.
+pub fn pages_are_the_agents_own(http: &Http) {
+    let own = format!("Host: {}", http.address);
+    // A wrong token is none of a page's business: it asks for one itself.
+    for lines in [&[own.as_str()][..], &[&own, "Authorization: Bearer 0123456789abcdefghij"]] {
+        let (status, page) = http.ask("GET /", lines);
+        assert!(status == 200 && page.to_lowercase().starts_with("<!doctype html"), "{status} {page}");
+        assert!(!page.contains(&http.operator), "nothing in it is secret");
+    }
+    let site = format!("Origin: http://{}", http.address);
+    assert_eq!(http.ask("GET /", &[&own, &site]).0, 200);
+    let rebound = format!("Host: evil.example:{}", http.address.port());
+    assert_eq!(http.ask("GET /", &[&rebound]).0, 403, "a name that points here");
+    assert_eq!(http.ask("GET /", &[&own, "Origin: https://evil.example"]).0, 403, "a page of another site");
+    let (_, head, _) = http.bytes_as(None, "GET /");
+    for part in ["default-src 'self'", "frame-ancestors 'none'", "same-origin", "nosniff"] {
+        assert!(head.contains(part), "{part} is missing: {head}");
+    }
+    assert_ne!(http.get("POST /").0, 200);
+}
+
+/// A page that needs a token for its socket names it beside the protocol; no other site's page gets anything by that.
+pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
+    let host = format!("Host: {}", http.address);
+    let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    let protocols = |token: &str| format!("Sec-WebSocket-Protocol: openjtc, bearer.{token}");
+    let evil = "Origin: https://evil.example";
+    let asked = |token: &str, more: &[&str]| {
+        let protocols = protocols(token);
+        let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key, &protocols];
+        http.ask("GET /api/stream", &[&upgrade[..], more].concat()).0
+    };
+    // It is let in, and then misses what makes a socket of it.
+    assert!(![401, 403].contains(&asked(&http.operator, &[])));
+    assert_eq!(asked("0123456789abcdefghij", &[]), 401);
+    assert_eq!(asked(&http.operator, &[evil]), 403);
+}
+
 /// A page of another site gets no socket.
 pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";

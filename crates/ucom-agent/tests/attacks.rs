@@ -17,6 +17,13 @@ fn requests_of_other_sites_are_refused_whatever_they_ask() {
 }
 
 #[test]
+fn pages_are_shown_by_the_agents_names_alone_and_their_sockets_have_tokens_of_their_own() {
+    let served = Served::start(1);
+    http::pages_are_the_agents_own(&served);
+    http::sockets_take_a_token_beside_their_protocol(&served);
+}
+
+#[test]
 fn a_socket_of_another_site_gets_no_stream() {
     http::a_socket_of_another_site_is_refused(&Served::start(1), "/api/stream");
 }

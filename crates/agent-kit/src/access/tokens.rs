@@ -121,6 +121,18 @@ impl Tokens {
     }
 }
 
+impl Tokens {
+    /// The dashboard of the agent at `url`, as people open it: with the operator's token where they may see it. What stands behind `#` is not
+    /// sent to any server, and the page takes it out of the address at once.
+    pub fn dashboard(&self, url: &str, with_token: bool) -> String {
+        if with_token {
+            format!("dashboard: {url}/#token={}", self.operator)
+        } else {
+            format!("dashboard: {url}")
+        }
+    }
+}
+
 /// The token file of this user, where none is named.
 pub fn default_token_file() -> Option<PathBuf> {
     token_file("tokens.toml")

@@ -4,7 +4,7 @@ use std::time::Duration;
 use agent_kit::api::{Asked, Refusals};
 use agent_kit::events::{self, EventsRequest, StreamRequest};
 use agent_kit::journal::Entry;
-use agent_kit::socket::MESSAGE_MAX;
+use agent_kit::socket::{MESSAGE_MAX, PROTOCOL};
 use axum::Extension;
 use axum::Json;
 use axum::extract::State;
@@ -53,18 +53,22 @@ pub(super) async fn stream(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let sockets = agent.sockets.clone();
-    sockets.serve(caller.role, upgrade.max_message_size(MESSAGE_MAX), async move |socket| {
-        let (mut last, mut due) = (None, Instant::now());
-        let show = || {
-            let mut messages = Vec::new();
-            let at = agent.line.with(|line, _| line.status().map(|(at, _)| *at));
-            if at != last || Instant::now() >= due {
-                (last, due) = (at, Instant::now() + QUIET);
-                messages.push(StreamMessage::Status(Box::new(agent.status(&caller))));
-            }
-            (messages, due)
-        };
-        let (journal, statuses) = (&agent.jobs.journal, agent.line.changes());
-        agent.events.stream((journal, request), socket, statuses, show).await;
-    })
+    sockets.serve(
+        caller.role,
+        upgrade.max_message_size(MESSAGE_MAX).protocols([PROTOCOL]),
+        async move |socket| {
+            let (mut last, mut due) = (None, Instant::now());
+            let show = || {
+                let mut messages = Vec::new();
+                let at = agent.line.with(|line, _| line.status().map(|(at, _)| *at));
+                if at != last || Instant::now() >= due {
+                    (last, due) = (at, Instant::now() + QUIET);
+                    messages.push(StreamMessage::Status(Box::new(agent.status(&caller))));
+                }
+                (messages, due)
+            };
+            let (journal, statuses) = (&agent.jobs.journal, agent.line.changes());
+            agent.events.stream((journal, request), socket, statuses, show).await;
+        },
+    )
 }

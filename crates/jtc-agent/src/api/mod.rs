@@ -3,6 +3,7 @@ mod absent;
 mod arm;
 mod body;
 mod commands;
+mod doctor;
 mod error;
 mod events;
 mod explain;
@@ -10,12 +11,14 @@ mod foxglove;
 mod identity;
 mod lease;
 mod log;
+mod maintain;
 mod metrics;
 mod model;
 mod objects;
 mod plans;
 mod poses;
 mod questions;
+mod recover;
 mod report;
 mod runs;
 mod settings;
@@ -31,6 +34,7 @@ use agent_kit::events::Events;
 use agent_kit::gate::{Asker, Caller, Gate, let_in};
 use agent_kit::log::CommandLog;
 use agent_kit::openapi::{Bearer, served, text};
+use agent_kit::pages::{Pages, show};
 use agent_kit::socket::Sockets;
 use axum::body::Body;
 use axum::extract::{DefaultBodyLimit, Request, State};
@@ -148,6 +152,7 @@ impl Agent {
             .merge(slow.layer(in_time(LONG_TIME)))
             .layer(from_fn_with_state(self.clone(), at_root))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
+            .layer(from_fn_with_state(Pages::new(self.gate.clone(), "index.html"), show))
             .with_state(self)
     }
 
@@ -239,8 +244,10 @@ fn described() -> OpenApiRouter<Agent> {
     let trajectories = OpenApiRouter::new()
         .routes(routes!(trajectories::put, trajectories::delete))
         .layer(DefaultBodyLimit::max(TRAJECTORY_MAX));
-    let arms =
-        OpenApiRouter::new().routes(routes!(arm::arm, arm::put_arm)).layer(DefaultBodyLimit::max(ARM_MAX));
+    let arms = OpenApiRouter::new()
+        .routes(routes!(arm::arm, arm::put_arm))
+        .routes(routes!(recover::begin))
+        .layer(DefaultBodyLimit::max(ARM_MAX));
     let others = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(status))
         .routes(routes!(metrics::metrics))
@@ -263,13 +270,15 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(poses::list))
         .routes(routes!(poses::put, poses::delete))
         .routes(routes!(commands::resume))
-        .routes(routes!(commands::speed))
+        .routes(routes!(maintain::speed, commands::speed))
         .routes(routes!(commands::jog))
         .routes(routes!(commands::teach))
         .routes(routes!(commands::gripper))
-        .routes(routes!(commands::clear))
+        .routes(routes!(maintain::clear))
+        .routes(routes!(maintain::reset))
+        .routes(routes!(maintain::defaults))
+        .routes(routes!(doctor::doctor))
         .routes(routes!(commands::disable))
-        .routes(routes!(commands::begin_recover))
         .routes(routes!(questions::payload, commands::set_payload))
         .routes(routes!(settings::list, settings::change))
         .routes(routes!(absent::absent, absent::set_absent))

@@ -5,7 +5,7 @@ use agent_kit::api::{Asked, Problem, Refusals};
 use agent_kit::events::{self, EventsRequest, StreamRequest};
 use agent_kit::gate::Caller;
 use agent_kit::journal::Entry;
-use agent_kit::socket::MESSAGE_MAX;
+use agent_kit::socket::{MESSAGE_MAX, PROTOCOL};
 use axum::Extension;
 use axum::Json;
 use axum::extract::State;
@@ -60,24 +60,29 @@ pub(super) async fn stream(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let sockets = agent.sockets.clone();
-    sockets.serve(caller.role, upgrade.max_message_size(MESSAGE_MAX), async move |socket| {
-        let (mut shown_us, mut due) = (0, Instant::now());
-        let show = || {
-            let mut messages = Vec::new();
-            if Instant::now() >= due {
-                due = Instant::now() + SLOWLY;
-                messages.push(StreamMessage::Status(Box::new(agent.status(&caller))));
-                messages.push(StreamMessage::Boards { boards: BoardObject::all(&agent.shared.picture()) });
-            }
-            if let Some((values, newest_us)) = new_values(&agent, shown_us) {
-                shown_us = newest_us;
-                messages.push(StreamMessage::Values { values });
-            }
-            (messages, due)
-        };
-        let (journal, pictures) = (&agent.shared.journal, agent.shared.changes());
-        agent.events.stream((journal, request), socket, pictures, show).await;
-    })
+    sockets.serve(
+        caller.role,
+        upgrade.max_message_size(MESSAGE_MAX).protocols([PROTOCOL]),
+        async move |socket| {
+            let (mut shown_us, mut due) = (0, Instant::now());
+            let show = || {
+                let mut messages = Vec::new();
+                if Instant::now() >= due {
+                    due = Instant::now() + SLOWLY;
+                    messages.push(StreamMessage::Status(Box::new(agent.status(&caller))));
+                    messages
+                        .push(StreamMessage::Boards { boards: BoardObject::all(&agent.shared.picture()) });
+                }
+                if let Some((values, newest_us)) = new_values(&agent, shown_us) {
+                    shown_us = newest_us;
+                    messages.push(StreamMessage::Values { values });
+                }
+                (messages, due)
+            };
+            let (journal, pictures) = (&agent.shared.journal, agent.shared.changes());
+            agent.events.stream((journal, request), socket, pictures, show).await;
+        },
+    )
 }
 
 /// The values that have come behind this time, and that of the newest, µs.

@@ -18,6 +18,7 @@ use agent_kit::events::Events;
 use agent_kit::gate::{Asker, Caller, Gate, let_in};
 use agent_kit::log::CommandLog;
 use agent_kit::openapi::{Bearer, denials, served, text};
+use agent_kit::pages::{Pages, show};
 use agent_kit::socket::Sockets;
 use axum::extract::{DefaultBodyLimit, State};
 use axum::http::StatusCode;
@@ -103,6 +104,7 @@ impl Agent {
             .route("/openapi.json", served(&description))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
+            .layer(from_fn_with_state(Pages::new(self.gate.clone(), "chain.html"), show))
             .with_state(self)
     }
 

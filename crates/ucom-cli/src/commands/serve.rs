@@ -65,9 +65,10 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if are_new {
         out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
     }
+    let url = format!("{}://{address}", if tls.is_some() { "https" } else { "http" });
+    out.note(tokens.dashboard(&url, are_new || args.link_with_token));
     let access = Access::new(tokens, address, &args.names);
     let agent = Agent::new(&owner, access, Arc::new(Mutex::new(log)), &bus, args.sim)?;
-    let url = format!("{}://{address}", if tls.is_some() { "https" } else { "http" });
     let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim, "bus": bus });
     out.result(&value, || format!("ready: {url}{}", if args.sim { " (SIMULATED)" } else { "" }));
     let lost = owner.lost();

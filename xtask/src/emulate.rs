@@ -80,11 +80,25 @@ fn build_jtc() -> Result<PathBuf> {
     Ok(shell::target().join("release/jtc"))
 }
 
+/// Builds what the emulated sessions run.
+pub fn programs() -> Result<()> {
+    install_tools()?;
+    build_jtc()?;
+    firmware::build_fast()?;
+    lints()?;
+    run(&mut cargo(&["test", "--release", "--no-run"]))?;
+    run(&mut cargo(&["build", "--release", "--bins", "--examples"]))
+}
+
+fn lints() -> Result<()> {
+    run(&mut cargo(&["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))
+}
+
 fn tests() -> Result<Outcome> {
     install_tools()?;
     let jtc = build_jtc()?;
     firmware::build_fast()?;
-    run(&mut cargo(&["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))?;
+    lints()?;
     let mut counts = Counts::default();
     let mut test = cargo(&["test", "--release", "--no-fail-fast"]);
     let result = run_lines(test.env("OPENJTC_JTC", jtc), |line| count_results(line, &mut counts));

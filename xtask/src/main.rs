@@ -1,7 +1,9 @@
 //! Every chore of the workspace behind one command: `cargo xtask help`.
 #![forbid(unsafe_code)]
 
+mod ahead;
 mod bench;
+mod beside;
 mod dependencies;
 mod docs;
 mod emulate;

@@ -2,8 +2,9 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
+use crate::beside::{self, Ended};
 use crate::shell::{self, apt_install, cargo, command, root, run, works};
 use crate::tally::{Outcome, Tally};
 
@@ -87,6 +88,26 @@ const CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
+/// Builds what the references run.
+pub fn programs() -> Result<()> {
+    // What the demo runs comes first.
+    for package in ["jtc-cli", "ucom-cli"] {
+        run(&mut cargo(&["build", "--release", "--package", package]))?;
+    }
+    for (package, example) in [
+        ("jtc-dynamics", "reference"),
+        ("jtc-sim", "free_fall"),
+        ("jtc-plan", "plans"),
+        ("jtc-plan", "poses"),
+        ("can-link", "echo"),
+        ("can-link", "socketcand_server"),
+        ("can-link", "slcan_adapter"),
+    ] {
+        run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
+    }
+    Ok(())
+}
+
 /// A step for each reference; `demo` is where the demo left its files.
 pub fn checks(tally: &mut Tally, demo: &Path) {
     let mut python = None;
@@ -96,20 +117,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     });
     let mut built = false;
     tally.step("programs for the references", || {
-        for (package, example) in [
-            ("jtc-dynamics", "reference"),
-            ("jtc-sim", "free_fall"),
-            ("jtc-plan", "plans"),
-            ("jtc-plan", "poses"),
-            ("can-link", "echo"),
-            ("can-link", "socketcand_server"),
-            ("can-link", "slcan_adapter"),
-        ] {
-            run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
-        }
-        for package in ["jtc-cli", "ucom-cli"] {
-            run(&mut cargo(&["build", "--release", "--package", package]))?;
-        }
+        programs()?;
         built = true;
         Ok(Outcome::Passed)
     });
@@ -124,20 +132,47 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         }
         Ok(Outcome::Passed)
     });
-    let release = shell::target().join("release");
-    for check in &CHECKS {
-        tally.step(&format!("references/{}", check.script), || {
-            let python = python.as_ref().context("there is no Python environment")?;
-            ensure!(built, "the programs it needs were not built");
-            if let Some(name) = check.demo_files.iter().find(|name| !demo.join(name).exists()) {
-                return Ok(Outcome::Skipped(format!("the demo left no {name}")));
-            }
-            let mut script = command(python);
-            script.arg(Path::new("references").join(check.script));
-            script.args(check.program.map(|name| release.join(name)));
-            script.args(check.demo_files.iter().map(|name| demo.join(name)));
-            script.env("JTC_EXAMPLES", release.join("examples")).env("PYTHONDONTWRITEBYTECODE", "1");
-            run(&mut script).map(|()| Outcome::Passed)
-        });
+    let Some(python) = python.filter(|_| built) else {
+        tally.step("references", || bail!("there is no Python environment, or the programs were not built"));
+        return;
+    };
+    let wanted: Vec<&Check> = CHECKS.iter().filter(|check| tally.wants(&check.title())).collect();
+    let ran = beside::beside(
+        wanted,
+        |check, log| check.run((&python, demo), log),
+        |check, ended| {
+            tally.step(&check.title(), || match ended {
+                Ok(None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
+                Ok(Some(Ended { output, passed, seconds })) => {
+                    println!("{}\n({seconds:.1} s, beside others)", output.trim_end());
+                    ensure!(passed, "it ended with an error");
+                    Ok(Outcome::Passed)
+                }
+                Err(error) => Err(error),
+            });
+        },
+    );
+    if let Err(error) = ran {
+        tally.step("references", || Err(error));
+    }
+}
+
+impl Check {
+    fn title(&self) -> String {
+        format!("references/{}", self.script)
+    }
+
+    /// `None` where the demo did not leave its files at `demo`.
+    fn run(&self, (python, demo): (&Path, &Path), log: &Path) -> Result<Option<Ended>> {
+        if !self.demo_files.iter().all(|name| demo.join(name).exists()) {
+            return Ok(None);
+        }
+        let release = shell::target().join("release");
+        let mut script = command(python);
+        script.arg(Path::new("references").join(self.script));
+        script.args(self.program.map(|name| release.join(name)));
+        script.args(self.demo_files.iter().map(|name| demo.join(name)));
+        script.env("JTC_EXAMPLES", release.join("examples")).env("PYTHONDONTWRITEBYTECODE", "1");
+        beside::run(&mut script, log).map(Some)
     }
 }

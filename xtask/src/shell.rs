@@ -1,4 +1,5 @@
 //! Running other programs: commands printed before they run, failures named with the command that failed.
+use std::cell::Cell;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -48,10 +49,44 @@ fn announce(command: &Command) {
     let _ = std::io::stdout().flush();
 }
 
+thread_local! {
+    /// What this thread runs is in nobody's way, and prints nothing.
+    static IN_BACKGROUND: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whatever `body` runs with [`run`] or [`read`] runs at the lowest priority, and prints nothing.
+pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
+    IN_BACKGROUND.set(true);
+    let done = body();
+    IN_BACKGROUND.set(false);
+    done
+}
+
+/// The same command at the lowest priority.
+fn nice(command: &Command) -> Command {
+    let mut nice = Command::new("nice");
+    nice.args(["-n", "19"]).arg(command.get_program()).args(command.get_args());
+    if let Some(directory) = command.get_current_dir() {
+        nice.current_dir(directory);
+    }
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => nice.env(name, value),
+            None => nice.env_remove(name),
+        };
+    }
+    nice.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    nice
+}
+
 /// Run with the output going to the terminal; an exit code other than 0 is an error.
 pub fn run(command: &mut Command) -> Result<()> {
-    announce(command);
-    let status = command.status().with_context(|| format!("cannot start `{}`", shown(command)))?;
+    let background = IN_BACKGROUND.get();
+    if !background {
+        announce(command);
+    }
+    let status = if background { nice(command).status() } else { command.status() };
+    let status = status.with_context(|| format!("cannot start `{}`", shown(command)))?;
     if !status.success() {
         bail!("`{}` ended with {status}", shown(command));
     }
@@ -81,8 +116,9 @@ pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()
 
 /// Run and return its standard output; progress and errors go to the terminal.
 pub fn read(command: &mut Command) -> Result<String> {
+    let background = IN_BACKGROUND.get();
     let output = command
-        .stderr(Stdio::inherit())
+        .stderr(if background { Stdio::null() } else { Stdio::inherit() })
         .output()
         .with_context(|| format!("cannot start `{}`", shown(command)))?;
     if !output.status.success() {

@@ -2,31 +2,20 @@
 //!
 //! Cargo runs one test program after the other, and many of ours wait for what takes its time on a real line: leases that lapse, boards
 //! that are silent. They use little of a processor, so several run at once.
-use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{Read, Seek, Write};
-use std::num::NonZero;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
-use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::shell::{self, Scratch, cargo, run_lines};
+use crate::beside::{self, Ended};
+use crate::shell::{self, cargo, run_lines};
 use crate::tally::{Counts, Outcome};
 
 /// A test program that cargo has built.
 struct Program {
     package: PathBuf,
     executable: PathBuf,
-}
-
-/// What a program printed, and how it ended.
-struct Ended {
-    output: String,
-    passed: bool,
 }
 
 /// Every test of the workspace, and those in its documentation; their own counts are summed up.
@@ -68,58 +57,30 @@ fn build() -> Result<Vec<Program>> {
 
 /// Runs all of them, and prints of each what it printed once it has ended. Names those that failed.
 fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
-    let scratch = Scratch::new("tests")?;
-    let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
-    let waiting = Mutex::new(VecDeque::from(programs));
-    let summed = Mutex::new((Counts::default(), Vec::new()));
-    let worker = |number: usize| -> Result<()> {
-        let log = scratch.path().join(number.to_string());
-        loop {
-            let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-            let Some(program) = next else { return Ok(()) };
-            let name = program.executable.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let start = Instant::now();
-            let ended = run_one(&program, &log).with_context(|| format!("the test program {name}"))?;
-            let mut summed = summed.lock().unwrap_or_else(PoisonError::into_inner);
-            let seconds = start.elapsed().as_secs_f64();
-            println!("\n$ {name} in {} ({seconds:.1} s)\n{}", program.package.display(), ended.output.trim());
-            ended.output.lines().for_each(|line| count_results(line, &mut summed.0));
-            if !ended.passed {
-                summed.1.push(name);
+    let mut failures = Vec::new();
+    let ended = |program: Program, ended: Result<Ended>| {
+        let name = program.executable.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match ended {
+            Ok(Ended { output, passed, seconds }) => {
+                println!("\n$ {name} in {} ({seconds:.1} s)\n{}", program.package.display(), output.trim());
+                output.lines().for_each(|line| count_results(line, counts));
+                if !passed {
+                    failures.push(name);
+                }
             }
-            // Whoever reads this through a pipe sees how far it is.
-            std::io::stdout().flush().ok();
+            Err(error) => failures.push(format!("{name}, which cannot be run: {error:#}")),
         }
+        // Whoever reads this through a pipe sees how far it is.
+        std::io::stdout().flush().ok();
     };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..at_once).map(|number| scope.spawn(move || worker(number))).collect();
-        workers
-            .into_iter()
-            .try_for_each(|worker| worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
-    })?;
-    let (sum, failures) = summed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    *counts = sum;
+    // In the directory of its package, as cargo does.
+    let run = |program: &Program, log: &Path| {
+        let mut command = shell::command(&program.executable);
+        command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
+        beside::run(&mut command, log)
+    };
+    beside::beside(programs, run, ended)?;
     Ok(failures)
-}
-
-/// Runs one, in the directory of its package as cargo does; `log` is for what it prints.
-fn run_one(program: &Program, log: &Path) -> Result<Ended> {
-    let mut file = File::options().create(true).truncate(true).read(true).write(true).open(log)?;
-    let status = shell::command(&program.executable)
-        .current_dir(&program.package)
-        .env("CARGO_MANIFEST_DIR", &program.package)
-        .stdin(Stdio::null())
-        .stdout(file.try_clone()?)
-        .stderr(file.try_clone()?)
-        .status()?;
-    let mut output = Vec::new();
-    file.rewind()?;
-    file.read_to_end(&mut output)?;
-    let mut output = String::from_utf8_lossy(&output).into_owned();
-    if !status.success() {
-        output.push_str(&format!("\n{status}"));
-    }
-    Ok(Ended { output, passed: status.success() })
 }
 
 /// Adds the numbers of a line of results, if it is one.

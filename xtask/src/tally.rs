@@ -40,9 +40,14 @@ impl Tally {
         Self { only, ..Self::default() }
     }
 
+    /// A step with this title is run.
+    pub fn wants(&self, title: &str) -> bool {
+        self.only.as_ref().is_none_or(|only| title.contains(only))
+    }
+
     /// Run a step under its heading; an error is reported and counted, and the next step runs all the same.
     pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
-        if self.only.as_ref().is_some_and(|only| !title.contains(only)) {
+        if !self.wants(title) {
             return;
         }
         println!("\n== {title}");

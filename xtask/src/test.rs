@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
+use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{dependencies, emulate, firmware, links, python, rules, size, suite, worked_bytes};
@@ -22,6 +23,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(&arguments)?;
 
     let before = tree();
+    let ahead = (!quick && only.is_none()).then(Ahead::begin);
     let mut tally = Tally::new(only);
     tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
     tally.step("every rule has a test that names it", || passed(rules::check()));
@@ -42,6 +44,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             let mut doc = cargo(&["doc", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
+        // From here on they are run.
+        drop(ahead);
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         python::checks(&mut tally, scratch.path());

@@ -80,7 +80,7 @@ impl Agent {
     }
 
     /// The same for what may move the arm.
-    async fn motion<T, E>(
+    pub(super) async fn motion<T, E>(
         &self,
         asker: &Asker,
         after: AskedAfter,
@@ -253,18 +253,6 @@ pub(super) async fn gripper(
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, ErrorObject> {
     agent.command(&asker, "gripper", move |session| session.gripper(on)).await?;
-    Ok(StatusCode::NO_CONTENT)
-}
-
-/// Clears the errors of the controller and of all drives.
-#[utoipa::path(
-    post,
-    path = "/api/clear",
-    params(LeaseKey),
-    responses((status = 204, description = "They are cleared; those that last come again"), Refusals, Denials)
-)]
-pub(super) async fn clear(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
-    agent.command(&asker, "clear", Session::clear_all).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

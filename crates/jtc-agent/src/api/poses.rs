@@ -139,8 +139,9 @@ async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6
         Some(position) => position,
         None => agent.ask(Session::standing).await?.positions(),
     };
-    if let Some(joint) =
-        jtc_wire::Joint::ALL.into_iter().find(|joint| !(position[joint.index()].abs() <= FARTHEST))
+    if let Some(joint) = jtc_wire::Joint::ALL
+        .into_iter()
+        .find(|joint| !(-FARTHEST..=FARTHEST).contains(&position[joint.index()]))
     {
         let value = position[joint.index()];
         let facts =

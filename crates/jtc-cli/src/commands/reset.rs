@@ -1,8 +1,9 @@
 //! `jtc reset`: restarts nodes of the joint bus, named as people count them.
 
-use cli_kit::{ErrorKind, Failure, Output};
+use cli_kit::{Failure, Output};
+use jtc_host::session::reset_takes_torque;
 use jtc_host::words;
-use jtc_wire::{ControllerState, Joint};
+use jtc_wire::Joint;
 use serde_json::json;
 
 use crate::args::ResetArgs;
@@ -19,13 +20,7 @@ pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let names = reset.join(", ");
     let mut session = args.link.session()?;
     let state = session.fresh_status()?.state;
-    if state.is_in(&[ControllerState::Operate, ControllerState::Teaching]) && nodes & !GRIPPER != 0 {
-        let message = format!("{names} cannot be reset in {}: the arm would fall", state);
-        let next =
-            if state == ControllerState::Operate { "`jtc traj stop` first" } else { "`jtc teach off` first" };
-        return Err(Failure::new(ErrorKind::Refused, "powered", message).hint(next));
-    }
-    if state.known().is_some_and(ControllerState::has_torque) && !args.yes {
+    if reset_takes_torque(nodes, state)? && !args.yes {
         let question = format!(
             "the arm has torque ({}), and a reset of {names} can take it away: the arm may fall",
             state
@@ -84,6 +79,8 @@ fn of_mask(text: &str) -> Failure {
 
 #[cfg(test)]
 mod tests {
+    use cli_kit::ErrorKind;
+
     use super::*;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Errors of waiting for a state.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::{Joint, Status};
+use jtc_wire::{Code, ControllerState, Joint, Status};
 
 use crate::words;
 
@@ -43,6 +43,24 @@ pub enum StateError {
         /// Which.
         joint: Joint,
     },
+    /// The arm moves, and would fall without the torque of these nodes.
+    #[error("{nodes} cannot be reset in {state}: the arm would fall")]
+    WouldFall {
+        /// Which, in words.
+        nodes: String,
+        /// State of the controller.
+        state: Code<ControllerState>,
+    },
+    /// The arm has torque, which a reset of these nodes can take away.
+    #[error(
+        "the arm has torque ({state}), and a reset of {nodes} can take it away: the arm may fall; nothing was sent"
+    )]
+    MayFall {
+        /// Which, in words.
+        nodes: String,
+        /// State of the controller.
+        state: Code<ControllerState>,
+    },
     /// Joints are set absent, and the controller executes no motion.
     #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
     Absent {
@@ -72,6 +90,19 @@ impl Diagnose for StateError {
                 ErrorKind::Device,
                 "not-measured",
                 "`jtc status` shows the joints, `jtc recover` brings them up",
+            ),
+            Self::WouldFall { state, .. } => {
+                let next = if *state == ControllerState::Operate {
+                    "`jtc traj stop` first"
+                } else {
+                    "`jtc teach off` first"
+                };
+                Diagnosis::new(ErrorKind::Refused, "powered", next)
+            }
+            Self::MayFall { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "powered",
+                "support the arm, then `jtc reset` with --yes, or by HTTP with arm_may_fall: true",
             ),
             Self::Absent { .. } => Diagnosis::new(
                 ErrorKind::Refused,

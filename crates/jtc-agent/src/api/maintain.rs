@@ -1,0 +1,152 @@
+//! What brings a controller back: single nodes cleared and reset, the arm that is built into it.
+use agent_kit::api::{Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::lease::LeaseKey;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use jtc_host::error::Facts;
+use jtc_host::{Error, ErrorKind, LinkError, Session, words};
+use jtc_wire::{ALL_NODES, Joint};
+use utoipa::ToSchema;
+
+use super::body::Perhaps;
+use super::commands::SpeedObject;
+use super::error::Denials;
+use super::lease::{AskedAfter, KnownHalt};
+use super::{Agent, ErrorObject};
+use crate::owner::ClientPort;
+
+/// Nodes whose errors are cleared.
+#[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClearRequest {
+    /// Joints, 1 to 6 from the base.
+    #[serde(default)]
+    #[schema(max_items = 6)]
+    pub joints: Vec<u8>,
+    /// The gripper.
+    #[serde(default)]
+    pub gripper: bool,
+}
+
+/// Nodes that start anew.
+#[derive(Clone, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResetRequest {
+    /// Joints, 1 to 6 from the base.
+    #[serde(default)]
+    #[schema(max_items = 6)]
+    pub joints: Vec<u8>,
+    /// The gripper.
+    #[serde(default)]
+    pub gripper: bool,
+    /// All joints and the gripper.
+    #[serde(default)]
+    pub all: bool,
+    /// Also where the arm has torque: somebody supports it, or it may fall.
+    #[serde(default)]
+    pub arm_may_fall: bool,
+}
+
+/// Bits 0 to 5 of joints 1 to 6 and bit 6 of the gripper.
+fn nodes(joints: &[u8], gripper: bool) -> Result<u8, ErrorObject> {
+    let mut mask = if gripper { 1 << words::GRIPPER } else { 0 };
+    for number in joints {
+        let Some(joint) = Joint::from_number((*number).into()) else {
+            let facts = Facts { value: Some((*number).into()), limit: Some(6.0), ..Facts::default() };
+            let message = format!("there is no joint {number}; nothing was sent");
+            let error = ErrorObject::new("joint", message, "joints are 1 to 6 from the base");
+            return Err(error.kind(ErrorKind::Usage).with(&facts));
+        };
+        mask |= 1 << joint.index();
+    }
+    Ok(mask)
+}
+
+/// Clears the errors of the controller and of all drives, or of those that are named.
+///
+/// Of all drives also those that have occurred; where some are named their current ones, and those of the controller itself.
+#[utoipa::path(
+    post,
+    path = "/api/clear",
+    operation_id = "clear",
+    params(LeaseKey),
+    request_body = Option<ClearRequest>,
+    responses((status = 204, description = "They are cleared; those that last come again"), Refusals, Denials)
+)]
+pub(super) async fn clear(
+    State(agent): State<Agent>,
+    asker: Asker,
+    Perhaps(request): Perhaps<ClearRequest>,
+) -> Result<StatusCode, ErrorObject> {
+    let ClearRequest { joints, gripper } = request.unwrap_or_default();
+    let named = nodes(&joints, gripper)?;
+    if named == 0 {
+        agent.command(&asker, "clear", Session::clear_all).await?;
+        return Ok(StatusCode::NO_CONTENT);
+    }
+    let what = format!("clear {}", words::node_names(named).join(", "));
+    let clear =
+        move |session: &mut Session<ClientPort>| -> Result<(), LinkError> { session.clear(true, named) };
+    agent.command(&asker, what, clear).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Has nodes of the joint bus start anew. Where the arm moves no joint does.
+#[utoipa::path(
+    post,
+    path = "/api/reset",
+    operation_id = "reset",
+    params(LeaseKey),
+    request_body = ResetRequest,
+    responses((status = 204, description = "They start anew, and are brought up again"), Refusals, Denials)
+)]
+pub(super) async fn reset(
+    State(agent): State<Agent>,
+    asker: Asker,
+    Body(request): Body<ResetRequest>,
+) -> Result<StatusCode, ErrorObject> {
+    let ResetRequest { joints, gripper, all, arm_may_fall } = request;
+    let named = nodes(&joints, gripper)? | if all { ALL_NODES } else { 0 };
+    if named == 0 {
+        let next = "name joints, the gripper, or all";
+        return Err(ErrorObject::new("request", "which nodes? Nothing was sent", next).kind(ErrorKind::Usage));
+    }
+    let what = format!("reset {}", words::node_names(named).join(", "));
+    let reset = move |session: &mut Session<ClientPort>| -> Result<(), Error> {
+        session.reset_held(named, arm_may_fall)
+    };
+    agent.command(&asker, what, reset).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Has the controller use the arm that is built into it, or stored: friction, gains and model. In Init it holds the arm then.
+#[utoipa::path(
+    post,
+    path = "/api/arm/defaults",
+    operation_id = "use_default_arm",
+    params(LeaseKey, KnownHalt),
+    responses((status = 204, description = "It uses them"), Refusals, Denials)
+)]
+pub(super) async fn defaults(
+    State(agent): State<Agent>,
+    asker: Asker,
+    after: AskedAfter,
+) -> Result<StatusCode, ErrorObject> {
+    agent.motion(&asker, after, "default arm", Session::use_defaults).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// The speed on the path, as the controller has it.
+#[utoipa::path(
+    get,
+    path = "/api/speed",
+    operation_id = "get_speed",
+    responses((status = 200, description = "100: that of the trajectory; also where the controller knows no other", body = SpeedObject), Refusals, Denials)
+)]
+pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, ErrorObject> {
+    let speed = agent.ask(|session| Ok(session.speed()?)).await?;
+    // As it was set: in whole percent.
+    Ok(Json(SpeedObject { percent: (speed * 100.0).round().clamp(0.0, 100.0) as u8 }))
+}

@@ -1,0 +1,106 @@
+//! What brings a controller back by HTTP: clearing and resetting nodes, its own arm, a given one, and what a doctor finds.
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::Served;
+use common::program::{Program, WAIT, event, is_for_the_one_who_commands, logged};
+use jtc_host::Arm;
+use jtc_host::arm::AVENA_TOML;
+use jtc_host::port::sim::LivePort;
+use jtc_sim::{Fault, FaultKind, FaultPlan, SimConfig, Trigger, World};
+use jtc_wire::Joint;
+use serde_json::{Value, json};
+
+fn look(served: &Served, request: &str) -> (u16, Value) {
+    served.api_as(Some(&served.tokens.viewer), request, None, None)
+}
+
+fn until(served: &Served, is: impl Fn(&Value) -> bool) -> Value {
+    let end = Instant::now() + WAIT;
+    loop {
+        let controller = look(served, "GET /api/status").1["controller"].clone();
+        if is(&controller) {
+            return controller;
+        }
+        assert!(Instant::now() < end, "{controller}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn findings(served: &Served) -> (bool, Vec<Value>) {
+    let (status, found) = look(served, "GET /api/doctor");
+    assert_eq!(status, 200, "{found}");
+    assert!(found["statuses"].as_u64().is_some_and(|n| n > 30), "{found}");
+    (found["healthy"] == true, found["findings"].as_array().expect("findings").clone())
+}
+
+#[test]
+fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    let (healthy, found) = findings(&served);
+    assert!(!healthy && found[0]["what"].as_str().is_some_and(|w| w.contains("not given yet")), "{found:?}");
+    anna.recover();
+    let (healthy, found) = findings(&served);
+    assert!(healthy && found.iter().all(|f| f["severity"] == "good"), "{found:?}");
+
+    is_for_the_one_who_commands(&served, "POST /api/reset", &json!({ "all": true }));
+    for (wrong, status) in [
+        (json!({}), 422),
+        (json!({ "joints": [7] }), 422),
+        (json!({ "joints": [0] }), 422),
+        (json!({ "joint": 1 }), 422),
+        (json!({ "joints": [3] }), 409),
+        (json!({ "all": true }), 409),
+    ] {
+        let (is, error) = anna.ask("POST /api/reset", Some(wrong.clone()));
+        assert!(is == status || is == 400, "{wrong}: {is} {error}");
+        assert!(error["next"].as_str().is_some_and(|next| !next.is_empty()), "{error}");
+    }
+    assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "HoldPos");
+    assert_eq!(anna.ask("POST /api/reset", Some(json!({ "joints": [3], "arm_may_fall": true }))).0, 204);
+    until(&served, |controller| controller["state"] != "HoldPos");
+    assert_eq!(logged(&served, "reset joint 3").len(), 2, "what was refused is written down, too");
+    anna.recover();
+    // In motion no joint does, whatever may fall.
+    let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.4, 0, 0, 0, 0, 0], "speed_percent": 20 }));
+    until(&served, |controller| controller["state"] == "Operate");
+    assert_eq!(anna.ask("POST /api/reset", Some(json!({ "all": true }))).0, 409);
+    assert_eq!(anna.over(job)["stage"], "finished");
+}
+
+/// A drive that fails while the arm is held: it is cleared alone, or with all others.
+#[test]
+fn single_nodes_are_cleared_and_a_doctor_names_them() {
+    let arm = Arm::avena();
+    let kind = FaultKind::MotorFault { joint: Joint::ALL[1], bits: 0x40 };
+    let held = Trigger::InState(jtc_wire::ControllerState::HoldPos, 300);
+    let faults = vec![Fault { kind, trigger: held, duration_ms: Some(200) }];
+    let faults = FaultPlan { faults, ..FaultPlan::default() };
+    let config = SimConfig { baud: Some(921_600), faults, ..SimConfig::new(arm.config(), &arm.parameters()) };
+    let served = Served::start_on(LivePort::new(World::new(config)), None, &[]);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    anna.recover();
+    let failed = until(&served, |controller| controller["state"] == "Error");
+    assert_eq!(failed["causes"][0], "joint 2: motor-control fault", "{failed}");
+    let (healthy, found) = findings(&served);
+    assert!(!healthy && found.iter().any(|f| f["what"] == "joint 2: motor-control fault"), "{found:?}");
+
+    // Another one alone does not help.
+    is_for_the_one_who_commands(&served, "POST /api/clear", &json!({ "joints": [2] }));
+    assert_eq!(anna.ask("POST /api/clear", Some(json!({ "joints": [5], "gripper": true }))).0, 204);
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "Error");
+    assert_eq!(anna.ask("POST /api/clear", Some(json!({ "joints": [9] }))).0, 422);
+    assert_eq!(anna.ask("POST /api/clear", Some(json!({ "joints": [2] }))).0, 204);
+    let cleared = until(&served, |controller| controller["state"] != "Error");
+    assert_eq!(cleared["errors"], json!([]), "{cleared}");
+    assert_ne!(cleared["errors_occurred"], json!([]), "those that have occurred stay");
+    // Without a body, and with one that names none: all, and what has occurred.
+    for body in [None, Some(json!({}))] {
+        assert_eq!(anna.ask("POST /api/clear", body).0, 204);
+    }
+    until(&served, |controller| controller["errors_occurred"] == json!([]));
+    assert_eq!(logged(&served, "clear joint 2").len(), 1);
+}

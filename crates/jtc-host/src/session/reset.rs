@@ -1,0 +1,37 @@
+//! Resets of nodes, which can take the torque away that holds the arm.
+
+use jtc_bus::GRIPPER;
+use jtc_wire::{Code, ControllerState};
+
+use super::Session;
+use crate::error::{Error, StateError};
+use crate::port::Port;
+use crate::words;
+
+/// Whether a reset of these nodes (bits 0..6) can take the torque away that the arm has in a state.
+///
+/// # Errors
+///
+/// [`StateError::WouldFall`] where it moves, and a joint is among them.
+pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<bool, StateError> {
+    let moves = state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
+    if moves && nodes & !(1 << GRIPPER) != 0 {
+        return Err(StateError::WouldFall { nodes: words::node_names(nodes).join(", "), state });
+    }
+    Ok(state.known().is_some_and(ControllerState::has_torque))
+}
+
+impl<P: Port> Session<P> {
+    /// Resets nodes (bits 0..6); where the arm has torque only if it `may_fall`.
+    ///
+    /// # Errors
+    ///
+    /// [`StateError::WouldFall`] and [`StateError::MayFall`], before anything is sent; those of [`Session::reset`].
+    pub fn reset_held(&mut self, nodes: u8, may_fall: bool) -> Result<(), Error> {
+        let state = self.fresh_status()?.state;
+        if reset_takes_torque(nodes, state)? && !may_fall {
+            return Err(StateError::MayFall { nodes: words::node_names(nodes).join(", "), state }.into());
+        }
+        Ok(self.reset(nodes)?)
+    }
+}

@@ -5,13 +5,15 @@ use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use jtc_host::ErrorKind;
+use jtc_host::plan::kinematics::{Orientation, Target};
+use jtc_host::{Arm, ErrorKind};
 use serde_json::json;
 use utoipa::ToSchema;
 
 use super::arm::GivenObject;
 use super::error::Denials;
 use super::lease::{AskedAfter, KnownHalt};
+use super::poses::pose_error;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
 use crate::line::Policy;
@@ -42,13 +44,23 @@ pub struct RunRequest {
     pub accept_device_limits: bool,
 }
 
-/// A move from where the arm stands.
+/// A move from where the arm stands, to one of the three places.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoveRequest {
-    /// rad, base to wrist.
+    /// Joint positions, rad, base to wrist.
+    #[serde(default)]
     #[schema(min_items = 6, max_items = 6)]
-    pub to_rad: [f64; 6],
+    pub to_rad: Option<[f64; 6]>,
+    /// A named pose, of those that `GET /api/poses` lists.
+    #[serde(default)]
+    pub to_pose: Option<String>,
+    /// A pose of the flange.
+    #[serde(default)]
+    pub to_flange: Option<FlangeObject>,
+    /// The flange keeps to a straight line.
+    #[serde(default)]
+    pub line: bool,
     /// % of what the limits allow.
     #[serde(default = "hundred")]
     #[schema(minimum = 1, maximum = 100)]
@@ -59,6 +71,18 @@ pub struct MoveRequest {
     /// The controller cannot be asked for its limits, and those that are built into it are safe for this arm.
     #[serde(default)]
     pub accept_device_limits: bool,
+}
+
+/// A pose of the flange in the frame of the base.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlangeObject {
+    /// x, y, z, m.
+    #[schema(min_items = 3, max_items = 3)]
+    pub xyz_m: [f64; 3],
+    /// Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad.
+    #[schema(min_items = 3, max_items = 3)]
+    pub rpy_rad: [f64; 3],
 }
 
 fn hundred() -> f64 {
@@ -192,7 +216,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Moves the arm from where it stands to joint positions: a job.
+/// Moves the arm from where it stands to joint positions, a named pose or a pose of the flange: a job.
 #[utoipa::path(
     post,
     path = "/api/moves",
@@ -207,12 +231,39 @@ pub(super) async fn begin_move(
     after: AskedAfter,
     Body(request): Body<MoveRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let MoveRequest { to_rad, speed_percent, policy, accept_device_limits } = request;
+    let MoveRequest { to_rad, to_pose, to_flange, line, speed_percent, policy, accept_device_limits } =
+        request;
     within("speed_percent", speed_percent, 100.0)?;
-    let what = format!("move to {}", to_rad.map(|q| q.to_string()).join(", "));
-    let course = Course::To(to_rad);
+    let (place, target) = match (to_rad, to_pose, to_flange) {
+        (Some(to), None, None) => (listed(&to), Target::Joints(to)),
+        (None, Some(name), None) => {
+            // Whoever may not command learns nothing.
+            agent.commander(&asker)?;
+            let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
+            let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
+            (name, Target::Joints(to))
+        }
+        (None, None, Some(FlangeObject { xyz_m, rpy_rad })) => {
+            let pose = Orientation::Rpy(rpy_rad).at(xyz_m).map_err(|error| {
+                let error = ErrorObject::new("pose", error.to_string(), "lengths are in m, angles in rad");
+                error.kind(ErrorKind::Usage)
+            })?;
+            (format!("flange {}", listed(&[xyz_m, rpy_rad].concat())), Target::Flange(pose))
+        }
+        _ => {
+            let message = "a move leads to one place: to_rad, to_pose or to_flange; nothing was sent";
+            let next = "GET /openapi.json describes each request";
+            return Err(ErrorObject::new("request", message, next).kind(ErrorKind::Usage));
+        }
+    };
+    let what = format!("move to {place}{}", if line { ", straight" } else { "" });
+    let course = Course::To(target, line);
     let order = Order { course, approach: false, speed_percent, repeat: 1, accept_device_limits };
     begin(&agent, (&asker, after), what, policy, order)
+}
+
+fn listed(numbers: &[f64]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// From 1 on, and no more than that.

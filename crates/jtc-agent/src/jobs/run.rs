@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
+use jtc_host::plan::kinematics::Target;
 use jtc_host::plan::{self, Planner};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
@@ -28,8 +29,9 @@ const MOVING: Duration = Duration::from_secs(1);
 pub enum Course {
     /// Along a trajectory.
     Along(Trajectory),
-    /// From where the arm stands to this place, rad, straight in joint space where that takes no longer.
-    To([f64; 6]),
+    /// From where the arm stands to this place; true: with the flange on a straight line, else straight in joint space where that takes no
+    /// longer.
+    To(Target, bool),
 }
 
 /// What is run, and how.
@@ -148,7 +150,7 @@ impl Run<'_> {
             Course::Along(trajectory) => {
                 plan::at_speed(trajectory, order.speed_percent).map_err(|e| plan_error(&e))
             }
-            Course::To(place) => {
+            Course::To(place, line) => {
                 let (config, friction) =
                     (site.arm.config_on_device(&site.options.device), site.arm.friction());
                 let planner = Planner {
@@ -157,7 +159,7 @@ impl Run<'_> {
                     speed_pct: order.speed_percent,
                     ..Planner::new(&config)
                 };
-                let planned = planner.to(&status.positions(), place);
+                let planned = planner.to_target(&site.arm.model, &status.positions(), place, *line);
                 let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
                 planned.notes.into_iter().for_each(|text| self.task.note(text));
                 Ok(planned.trajectory)

@@ -104,3 +104,57 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     until(&served, |controller| controller["errors_occurred"] == json!([]));
     assert_eq!(logged(&served, "clear joint 2").len(), 1);
 }
+
+#[test]
+fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 100 })));
+    assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 35 }))).0, 204);
+    assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 35 })));
+
+    // An arm of its own, which has to be whole, and what no frame carries has to be accepted.
+    is_for_the_one_who_commands(&served, "POST /api/recover", &json!({ "arm": AVENA_TOML }));
+    let heavy = AVENA_TOML.replacen("mass_kg = 4", "mass_kg = 5", 1);
+    let other = heavy.replacen("position_max_rad = 2.97", "position_max_rad = 2.5", 1);
+    assert!(heavy != AVENA_TOML && other != heavy);
+    for wrong in [
+        json!({ "arm": "no arm" }),
+        json!({ "arm": AVENA_TOML, "defaults": true }),
+        json!({ "arm": Arm::avena().to_urdf() }),
+    ] {
+        let (status, error) = anna.ask("POST /api/recover", Some(wrong));
+        assert!(matches!(status, 409 | 422), "{status} {error}");
+        assert!(error["next"].as_str().is_some_and(|next| !next.is_empty()), "{error}");
+    }
+    let refused = anna.over(anna.begin("POST /api/recover", json!({ "arm": other })));
+    assert_eq!(
+        (&refused["stage"], &refused["error"]["code"]),
+        (&json!("failed"), &json!("device-limits")),
+        "{refused}"
+    );
+    let mass = || look(&served, "GET /api/arm/model").1["links"][2]["mass_kg"].as_f64().expect("a mass");
+    let before = mass();
+    let body = json!({ "arm": other, "accept_device_limits": true });
+    let job = anna.begin("POST /api/recover", body);
+    assert_eq!(anna.over(job)["stage"], "finished");
+    assert!(event(&served, 0, "note").1["text"].is_string());
+    let masses: Vec<f64> =
+        Arm::parse(&other).expect("an arm").model.links.iter().map(|link| link.mass).collect();
+    let shown = look(&served, "GET /api/arm/model").1;
+    for (n, mass) in masses.iter().enumerate() {
+        assert!((shown["links"][n]["mass_kg"].as_f64().expect("a mass") - mass).abs() < 1e-5, "{shown}");
+    }
+    assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "HoldPos");
+
+    // Back to its own, without torque: it holds the arm then.
+    assert_eq!(anna.ask("POST /api/disable", None).0, 204);
+    until(&served, |controller| controller["state"] == "Init");
+    assert_eq!(served.api("POST /api/arm/defaults", None, None).0, 403);
+    assert_eq!(anna.ask("POST /api/arm/defaults", None).0, 204);
+    until(&served, |controller| controller["state"] == "HoldPos");
+    assert_eq!(mass(), before);
+    // What was asked for before a Stop gives no torque.
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    assert_eq!(anna.ask("POST /api/arm/defaults?asked_after=0", None).0, 409);
+}

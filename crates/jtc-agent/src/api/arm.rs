@@ -133,7 +133,7 @@ pub(super) async fn put_arm(
 }
 
 /// An arm that a controller takes.
-fn taken(text: &str) -> Result<Arm, ErrorObject> {
+pub(super) fn taken(text: &str) -> Result<Arm, ErrorObject> {
     let arm = Arm::parse(text).map_err(|error| {
         let error = error.in_file("text".as_ref());
         ErrorObject::diagnosed(&error)

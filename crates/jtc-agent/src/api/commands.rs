@@ -5,7 +5,6 @@ use std::time::Duration;
 use agent_kit::api::{Body, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
-use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use jtc_host::session::{Flow, Payload};
@@ -17,9 +16,8 @@ use utoipa::ToSchema;
 use super::error::Denials;
 use super::lease::{AskedAfter, KnownHalt};
 use super::objects::PayloadObject;
-use super::runs::JobObject;
 use super::{Agent, ErrorObject};
-use crate::jobs::{Commander, Task, Turn, recover, stopped};
+use crate::jobs::{Commander, Turn, stopped};
 use crate::owner::ClientPort;
 
 /// The lease of a client that waits for an answer is renewed so often.
@@ -51,15 +49,6 @@ pub struct JogRequest {
     /// rad/s, base to wrist. They hold for 200 ms: send them again in time, and zeros at the end.
     #[schema(min_items = 6, max_items = 6)]
     pub rates_rad_s: [f64; 6],
-}
-
-/// The way back to a held arm.
-#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RecoverRequest {
-    /// Where the controller has not been given its arm: let it use its defaults, the stored arm where there is one.
-    #[serde(default)]
-    pub defaults: bool,
 }
 
 impl Agent {
@@ -293,25 +282,4 @@ pub(super) fn body(payload: PayloadObject) -> Result<Payload, ErrorObject> {
         ErrorObject::new("payload", e.to_string(), "no body has such numbers").kind(ErrorKind::Usage)
     })?;
     Ok(payload)
-}
-
-/// Leads the controller back to a held arm, whatever its state is: a job.
-#[utoipa::path(
-    post,
-    path = "/api/recover",
-    operation_id = "recover",
-    params(LeaseKey, KnownHalt),
-    request_body = RecoverRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
-)]
-pub(super) async fn begin_recover(
-    State(agent): State<Agent>,
-    asker: Asker,
-    after: AskedAfter,
-    Body(RecoverRequest { defaults }): Body<RecoverRequest>,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let (commander, turn) = agent.mover(&asker, after)?;
-    let recover = move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, defaults);
-    let job = agent.jobs.begin(&commander, turn, "recover".into(), recover)?;
-    Ok((StatusCode::ACCEPTED, Json(job.into())))
 }

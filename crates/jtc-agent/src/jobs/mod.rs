@@ -21,7 +21,7 @@ pub use commander::{Commander, Turn, Unable, Wish};
 pub use give::{Given, give};
 pub use happening::{Happening, Journal};
 pub use poses::{POSES_MAX, PoseStore, PoseStoreError};
-pub use recover::recover;
+pub use recover::{Numbers, recover};
 pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};

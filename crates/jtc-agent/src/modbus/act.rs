@@ -11,7 +11,7 @@ use super::map::View;
 use super::plc::Plc;
 use crate::api::ErrorObject;
 use crate::jobs::{
-    Commander, Course, Job, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
+    Commander, Course, Job, Numbers, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
 };
 use crate::line::Denied;
 use crate::owner::ClientPort;
@@ -161,13 +161,13 @@ impl Plc {
         command: Command,
         halt: u64,
     ) -> Result<(), Refusal> {
-        let defaults = command == Command::RecoverWithDefaults;
+        let numbers = if command == Command::RecoverWithDefaults { Numbers::Defaults } else { Numbers::None };
         self.free_to_move()?;
         let turn = commander.turn()?;
         self.take_lease(commander)?;
         self.ask_to_move(commander, halt)?;
         let recover =
-            move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, defaults);
+            move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &numbers);
         let job = self.jobs.begin(commander, turn, "recover".into(), recover)?;
         self.begun(commander, &job);
         Ok(())

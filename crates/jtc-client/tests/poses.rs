@@ -30,7 +30,7 @@ fn poses_are_saved_used_deleted_and_outlast_the_agent() {
     let directory = tempfile::tempdir().expect("a directory");
     let first = served(directory.path());
     let home = json!({ "name": "home", "positions_rad": [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], "from": "arm file" });
-    assert_eq!(poses(&first), [home.clone()]);
+    assert_eq!(poses(&first), [home]);
     let put = |name: &str, body: Option<Value>| first.api(&format!("PUT /api/poses/{name}"), None, body);
     let above = json!({ "positions_rad": [0.2, 0.1, 0.1234564, 0.0, 0.0, 0.0] });
     let (status, saved) = put("above-table", Some(above.clone()));

@@ -20,6 +20,7 @@ mod soak;
 mod suite;
 mod tally;
 mod test;
+mod web;
 mod worked_bytes;
 
 use std::process::ExitCode;

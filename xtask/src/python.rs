@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::beside::{self, Ended};
 use crate::shell::{self, apt_install, cargo, command, root, run, works};
 use crate::tally::{Outcome, Tally};
+use crate::web;
 
 /// The interpreter of a virtual environment with the packages of references/`requirements`, made when it is not there yet.
 pub fn environment(requirements: &str) -> Result<PathBuf> {
@@ -57,7 +58,7 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 24] = [
+static CHECKS: [Check; 24] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "plan/check_plan.py", program: Some("examples/plans"), demo_files: &[] },
@@ -136,19 +137,25 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         tally.step("references", || bail!("there is no Python environment, or the programs were not built"));
         return;
     };
-    let wanted: Vec<&Check> = CHECKS.iter().filter(|check| tally.wants(&check.title())).collect();
+    let beside = CHECKS.iter().map(Beside::Reference).chain([Beside::Browser]);
     let ran = beside::beside(
-        wanted,
-        |check, log| check.run((&python, demo), log),
-        |check, ended| {
-            tally.step(&check.title(), || match ended {
-                Ok(None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
-                Ok(Some(Ended { output, passed, seconds })) => {
+        beside.filter(|one| tally.wants(&one.title())).collect(),
+        |one, log| match one {
+            Beside::Reference(check) => check.run((&python, demo), log),
+            Beside::Browser => web::browser(log),
+        },
+        |one, ended| {
+            tally.step(&one.title(), || match (&one, ended?) {
+                (Beside::Reference(_), None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
+                (Beside::Browser, None) => {
+                    Ok(Outcome::Skipped(format!("no {}, or no Node.js", web::BROWSER)))
+                }
+                (Beside::Browser, Some(ended)) => web::counted(&ended),
+                (Beside::Reference(_), Some(Ended { output, passed, seconds })) => {
                     println!("{}\n({seconds:.1} s, beside others)", output.trim_end());
                     ensure!(passed, "it ended with an error");
                     Ok(Outcome::Passed)
                 }
-                Err(error) => Err(error),
             });
         },
     );
@@ -157,11 +164,23 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     }
 }
 
-impl Check {
-    fn title(&self) -> String {
-        format!("references/{}", self.script)
-    }
+/// What runs beside others.
+enum Beside {
+    Reference(&'static Check),
+    /// The dashboard, used in a browser.
+    Browser,
+}
 
+impl Beside {
+    fn title(&self) -> String {
+        match self {
+            Self::Reference(check) => format!("references/{}", check.script),
+            Self::Browser => "dashboard: used in a browser".to_owned(),
+        }
+    }
+}
+
+impl Check {
     /// `None` where the demo did not leave its files at `demo`.
     fn run(&self, (python, demo): (&Path, &Path), log: &Path) -> Result<Option<Ended>> {
         if !self.demo_files.iter().all(|name| demo.join(name).exists()) {

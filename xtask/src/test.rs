@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
-use crate::{dependencies, emulate, firmware, links, python, rules, size, suite, worked_bytes};
+use crate::{dependencies, emulate, firmware, links, python, rules, size, suite, web, worked_bytes};
 
 /// Crates that run on the board.
 const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core", "ucom"];
@@ -36,6 +36,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             ["clippy", "--package", "jtc-host", "--no-default-features", "--", "-D", "warnings"];
         passed(run(&mut cargo(&without_formats)))
     });
+    web::steps(&mut tally);
     tally.step("tests, properties and fuzz regressions", suite::run);
     if !quick {
         tally.step("builds for the board (no_std)", || passed(board_builds()));

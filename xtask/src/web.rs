@@ -1,0 +1,135 @@
+//! The dashboard: its source is checked, built anew and compared with what the agents carry, and used in a browser.
+//!
+//! Whoever builds the programs needs none of that: the built files are in the repository.
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::beside::{self, Ended};
+use crate::shell::{self, Scratch, run};
+use crate::tally::{Counts, Outcome, Tally};
+
+/// Oldest version of Node.js that the builder runs on.
+const NODE: (u32, u32) = (20, 19);
+/// Where Debian puts the browser.
+pub const BROWSER: &str = "/usr/bin/chromium";
+
+/// `program` in `web/`.
+fn command(program: &str) -> Command {
+    let mut command = shell::command(program);
+    command.current_dir(shell::root().join("web"));
+    command
+}
+
+/// Why the source cannot be built here, if it cannot.
+fn missing() -> Option<String> {
+    let version = shell::read(command("node").arg("--version").stderr(Stdio::null())).unwrap_or_default();
+    let mut numbers =
+        version.trim().trim_start_matches('v').split('.').map(|n| n.parse::<u32>().unwrap_or(0));
+    let found = (numbers.next().unwrap_or(0), numbers.next().unwrap_or(0));
+    let (major, minor) = NODE;
+    match (found, shell::works(command("npm").arg("--version"))) {
+        ((0, _), _) | (_, false) => Some("Node.js and npm are not here".into()),
+        (found, _) if found < NODE => {
+            Some(format!("Node.js {} is here, {major}.{minor} is needed", version.trim()))
+        }
+        _ => None,
+    }
+}
+
+/// Installs what the lock file names, from the package registry.
+fn install() -> Result<()> {
+    let stamp = shell::root().join("web/node_modules/.package-lock.json");
+    let lock = shell::root().join("web/package-lock.json");
+    let time = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
+    if time(&stamp).is_some_and(|installed| time(&lock).is_some_and(|wanted| installed >= wanted)) {
+        return Ok(());
+    }
+    run(command("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]))
+        .context("the packages could not be installed; is the network there?")
+}
+
+/// The steps of the source.
+pub fn steps(tally: &mut Tally) {
+    tally.step("dashboard: types and tests of its source", || {
+        if let Some(why) = missing() {
+            return Ok(Outcome::Skipped(why));
+        }
+        install()?;
+        run(command("npm").args(["run", "--silent", "check"]))?;
+        let scratch = Scratch::new("web")?;
+        let mut test = command("npm");
+        let ended = beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?;
+        counted(&ended)
+    });
+    tally.step("dashboard: the built files are those of its source", || match missing() {
+        Some(why) => Ok(Outcome::Skipped(why)),
+        None => install().and_then(|()| same_build()).map(|()| Outcome::Passed),
+    });
+}
+
+/// Builds it elsewhere, and compares each file.
+fn same_build() -> Result<()> {
+    let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
+    let built = scratch.path().join("dist");
+    run(command("npx")
+        .args(["--no-install", "vite", "build", "--logLevel", "error", "--outDir"])
+        .arg(&built))?;
+    run(command("node").arg("tests/sizes.mjs"))?;
+    let (old, new) = (files(&kept)?, files(&built)?);
+    let help = "(cd web && npm ci && npm run build), and commit web/dist";
+    ensure!(old == new, "web/dist holds other files than its source makes: {help}");
+    for name in old {
+        let read = |folder: &Path| std::fs::read(folder.join(&name));
+        ensure!(
+            read(&kept)? == read(&built)?,
+            "web/dist/{} is not what its source makes: {help}",
+            name.display()
+        );
+    }
+    Ok(())
+}
+
+/// All files below a folder, by their names in it.
+fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let (mut found, mut waiting) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(directory) = waiting.pop() {
+        for entry in std::fs::read_dir(&directory).with_context(|| directory.display().to_string())? {
+            let path = entry?.path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else {
+                found.push(path.strip_prefix(folder)?.to_owned());
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here, or nothing that drives it.
+pub fn browser(log: &Path) -> Result<Option<Ended>> {
+    if !Path::new(BROWSER).exists() || missing().is_some() {
+        return Ok(None);
+    }
+    install()?;
+    let release = shell::target().join("release");
+    let mut npm = command("npm");
+    npm.args(["run", "--silent", "e2e"]);
+    npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
+    beside::run(&mut npm, log).map(Some)
+}
+
+/// The numbers of Node's own test runner.
+pub fn counted(Ended { output, passed, seconds }: &Ended) -> Result<Outcome> {
+    println!("{}\n({seconds:.1} s)", output.trim_end());
+    let number = |word: &str| {
+        let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));
+        lines.filter_map(|line| line.strip_prefix(word)?.trim().parse::<u64>().ok()).sum::<u64>()
+    };
+    let counts = Counts { passed: number("pass "), failed: number("fail "), skipped: number("skipped ") };
+    ensure!(*passed || counts.failed > 0, "the tests broke off");
+    ensure!(counts.passed > 0, "no test was run at all");
+    Ok(Outcome::Counted(counts))
+}

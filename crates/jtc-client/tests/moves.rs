@@ -5,6 +5,9 @@ use common::Served;
 use common::program::{Program, event};
 use serde_json::{Value, json};
 
+/// How far the flange is moved down, m.
+const DOWN: f64 = 0.2;
+
 fn positions(served: &Served) -> Vec<f64> {
     let status = served.api("GET /api/status", None, None).1;
     let joints = status["controller"]["joints"].as_array().expect("joints").clone();
@@ -38,9 +41,20 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     let flange = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&bent);
     let rpy = jtc_host::plan::kinematics::rpy_of(&flange);
     let [x, y, z] = flange.position;
-    // A hand's breadth aside, on a line and back without one.
-    let aside = json!({ "xyz_m": [x, y, z + 0.05], "rpy_rad": rpy });
-    let done = moved(json!({ "to_flange": aside, "line": true, "speed_percent": 50 }));
+    // Down, on a line, and back without one: how far the flange is beside the line on the way.
+    let beside = |body: Value| {
+        let job = anna.begin("POST /api/moves", body);
+        let mut most = 0.0f64;
+        let done = common::program::over(&served, job, || {
+            let at = positions(&served).try_into().expect("six");
+            let at = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&at);
+            most = most.max((at.position[0] - x).hypot(at.position[1] - y));
+        });
+        assert_eq!(done["stage"], "finished", "{done}");
+        (done, most)
+    };
+    let down = json!({ "xyz_m": [x, y, z - DOWN], "rpy_rad": rpy });
+    let (done, off_line) = beside(json!({ "to_flange": down, "line": true, "speed_percent": 30 }));
     assert!(
         done["what"].as_str().is_some_and(|w| w.starts_with("move to flange") && w.ends_with("straight")),
         "{done}"
@@ -48,9 +62,11 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     let there = positions(&served);
     let there: [f64; 6] = there.try_into().expect("six");
     let reached = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&there);
-    let off: Vec<f64> = reached.position.iter().zip([x, y, z + 0.05]).map(|(a, b)| (a - b).abs()).collect();
+    let off: Vec<f64> = reached.position.iter().zip([x, y, z - DOWN]).map(|(a, b)| (a - b).abs()).collect();
     assert!(off.iter().all(|off| *off < 0.005), "{off:?}");
-    moved(json!({ "to_flange": { "xyz_m": [x, y, z], "rpy_rad": rpy } }));
+    let back = json!({ "to_flange": { "xyz_m": [x, y, z], "rpy_rad": rpy }, "speed_percent": 30 });
+    let (_, off_arc) = beside(back);
+    assert!(off_line < 0.002 && off_arc > 0.005, "{off_line} m, {off_arc} m");
     is_at(&served, bent);
     moved(json!({ "to_rad": [0, 0, 0, 0, 0, 0] }));
 

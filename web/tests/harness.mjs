@@ -1,16 +1,19 @@
 // What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
 import { spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer, request } from 'node:http';
 import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { extname, join, normalize } from 'node:path';
 import { createInterface } from 'node:readline';
+import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
 import { chromium } from 'playwright-core';
 
-const DIST = fileURLToPath(new URL('../dist/', import.meta.url));
+const DIST = process.env.DIST ?? fileURLToPath(new URL('../dist/', import.meta.url));
+/** Pictures of pages in which a test has failed. */
+const PICTURES = fileURLToPath(new URL('./out/', import.meta.url));
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/debug/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 const CSP = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:";
@@ -170,12 +173,35 @@ export async function stage(browser, options = {}) {
       contexts.push(page.context());
       return page;
     },
+    /** What each page shows, for whoever looks for the reason of a failure. */
+    async picture(name) {
+      for (const [i, context] of contexts.entries()) {
+        for (const page of context.pages()) await page.screenshot({ path: join(PICTURES, `${name}-${i}.png`), fullPage: true }).catch(() => {});
+      }
+    },
     async end() {
       for (const context of contexts) await context.close();
       await site.end();
       await agent.end();
     },
   };
+}
+
+/** Does it on a stage of its own, and takes a picture where it fails. */
+export function staged(browser) {
+  return (name, options, act) =>
+    test(name, async () => {
+      const scene = await stage(browser(), options);
+      try {
+        await act(scene);
+      } catch (error) {
+        mkdirSync(PICTURES, { recursive: true });
+        await scene.picture(name.replace(/[^a-z0-9]+/gi, '-').slice(0, 50));
+        throw error;
+      } finally {
+        await scene.end();
+      }
+    });
 }
 
 /** What the page says of the state. */

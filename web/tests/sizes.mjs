@@ -4,7 +4,7 @@ import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
-const DIST = fileURLToPath(new URL('../dist/', import.meta.url));
+const DIST = process.env.DIST ?? fileURLToPath(new URL('../dist/', import.meta.url));
 const FIRST_MOST = 40_000;
 const ALL_MOST = 400_000;
 const gzipped = (path) => gzipSync(readFileSync(path), { level: 9 }).length;

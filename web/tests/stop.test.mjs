@@ -1,23 +1,16 @@
 // Stop, and what is said when nothing can be known: the part of the page that everything else stands behind.
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-
-import { commanding, jtc, recover, stage, startBrowser, state, until } from './harness.mjs';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { after, before } from 'node:test';
+
+import { commanding, jtc, recover, staged, startBrowser, state, until } from './harness.mjs';
 
 let browser;
 before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 
-async function on(options, act) {
-  const scene = await stage(browser, options);
-  try {
-    await act(scene);
-  } finally {
-    await scene.end();
-  }
-}
+const on = staged(() => browser);
 
 /** Six seconds of motion, begun by another client. */
 async function moving(agent, act) {
@@ -36,134 +29,124 @@ async function moving(agent, act) {
   });
 }
 
-const words = (page) => page.getByTestId('stop-words');
+on('Stop by one touch ends a motion, and says what it did', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await state(page).getByText('Holding').waitFor();
+  await moving(agent, async () => {
+    await state(page).getByText('Moving').waitFor();
+    // The press alone: nobody has to let go for it.
+    const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.getByText(/Stopped on the path in \d\.\d s; the arm is held/).waitFor();
+    await page.mouse.up();
+  });
+  await state(page).getByText('Holding').waitFor();
+  assert.deepEqual(page.complaints.filter((text) => !/40[45]/.test(text)), []);
+});
 
-test('Stop by one touch ends a motion, and says what it did', () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look();
-    await state(page).getByText('Holding').waitFor();
-    await moving(agent, async () => {
-      await state(page).getByText('Moving').waitFor();
-      // The press alone: nobody has to let go for it.
-      const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
-      await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
-      await page.mouse.down();
-      await page.getByText(/Stopped on the path in \d\.\d s; the arm is held/).waitFor();
-      await page.mouse.up();
-    });
-    await state(page).getByText('Holding').waitFor();
-    assert.deepEqual(page.complaints.filter((text) => !/40[45]/.test(text)), []);
-  }));
-
-test('the space bar stops, also with a button in focus, and in a field it is a space', () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look();
-    await page.click('#tab-jog');
-    const field = page.getByLabel('Name of the pose');
-    await field.waitFor();
-    await field.fill('a');
-    await field.press('Space');
-    assert.equal(await field.inputValue(), 'a ');
-    assert.equal((await agent.ask('GET', '/api/status')).body.last_halt, 0);
-    await moving(agent, async () => {
-      await page.getByRole('button', { name: /^Theme/ }).focus();
-      const before = await page.evaluate(() => document.documentElement.dataset.theme);
-      await page.keyboard.press('Space');
-      await page.getByText(/Stopped on the path/).waitFor();
-      assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), before, 'the button in focus was pressed, too');
-    });
-    await page.getByRole('switch').first().waitFor({ state: 'attached' }).catch(() => {});
+on('the space bar stops, also with a button in focus, and in a field it is a space', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await page.click('#tab-jog');
+  const field = page.getByLabel('Name of the pose');
+  await field.waitFor();
+  await field.fill('a');
+  await field.press('Space');
+  assert.equal(await field.inputValue(), 'a ');
+  assert.equal((await agent.ask('GET', '/api/status')).body.last_halt, 0);
+  await moving(agent, async () => {
+    await page.getByRole('button', { name: /^Theme/ }).focus();
+    const before = await page.evaluate(() => document.documentElement.dataset.theme);
     await page.keyboard.press('Space');
-    await page.getByText(/Nothing was moving; the arm is held/).waitFor();
-  }));
+    await page.getByText(/Stopped on the path/).waitFor();
+    assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), before, 'the button in focus was pressed, too');
+  });
+  await page.getByRole('switch').first().waitFor({ state: 'attached' }).catch(() => {});
+  await page.keyboard.press('Space');
+  await page.getByText(/Nothing was moving; the arm is held/).waitFor();
+});
 
-test('a dialog leaves Stop where it is', () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look();
-    const stop = page.getByRole('button', { name: /STOP/ });
-    const outside = await stop.boundingBox();
-    await page.getByRole('button', { name: /commands/ }).click();
-    await page.getByRole('dialog').waitFor();
-    const inside = await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).boundingBox();
-    assert.ok(Math.abs(inside.x - outside.x) < 3 && Math.abs(inside.y - outside.y) < 3, JSON.stringify({ inside, outside }));
-    await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).click();
-    await until('it was sent once', async () => (await agent.ask('GET', '/api/status')).body.last_halt === 1);
-  }));
+on('a dialog leaves Stop where it is', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  const stop = page.getByRole('button', { name: /STOP/ });
+  const outside = await stop.boundingBox();
+  await page.getByRole('button', { name: /commands/ }).click();
+  await page.getByRole('dialog').waitFor();
+  const inside = await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).boundingBox();
+  assert.ok(Math.abs(inside.x - outside.x) < 3 && Math.abs(inside.y - outside.y) < 3, JSON.stringify({ inside, outside }));
+  await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).click();
+  await until('it was sent once', async () => (await agent.ask('GET', '/api/status')).body.last_halt === 1);
+});
 
-test('Stop stands at one place on every tab', () =>
-  on({}, async ({ look }) => {
-    const page = await look({ viewport: { width: 800, height: 1000 } });
-    const places = new Set();
-    for (const tab of ['state', 'run', 'jog', 'teach', 'arm', 'plots', 'log']) {
-      await page.click(`#tab-${tab}`);
-      await page.waitForTimeout(150);
-      const { x, y } = await page.getByRole('button', { name: /STOP/ }).boundingBox();
-      places.add(`${x},${y}`);
-    }
-    assert.equal(places.size, 1);
-  }));
+on('Stop stands at one place on every tab', {}, async ({ look }) => {
+  const page = await look({ viewport: { width: 800, height: 1000 } });
+  const places = new Set();
+  for (const tab of ['state', 'run', 'jog', 'teach', 'arm', 'plots', 'log']) {
+    await page.click(`#tab-${tab}`);
+    await page.waitForTimeout(150);
+    const { x, y } = await page.getByRole('button', { name: /STOP/ }).boundingBox();
+    places.add(`${x},${y}`);
+  }
+  assert.equal(places.size, 1);
+});
 
-test("a viewer sees no command, and Stop works", () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look({ token: 'viewer' });
-    await state(page).getByText('Holding').waitFor();
-    await page.getByRole('button', { name: 'Looking only' }).waitFor();
-    for (const [tab, command] of [['jog', 'Joint 1, positive'], ['teach', 'Teach'], ['run', 'Open a file'], ['state', 'Recover'], ['plots', 'Set'], ['arm', 'Set']]) {
-      await page.click(`#tab-${tab}`);
-      await page.waitForTimeout(200);
-      assert.equal(await page.locator('#panel').getByRole('button', { name: command, exact: true }).count(), 0, `${tab}: ${command}`);
-    }
-    await moving(agent, async () => {
-      await page.getByRole('button', { name: /STOP/ }).click();
-      await page.getByText(/Stopped on the path/).waitFor();
-    });
-  }));
-
-test('a lost agent is red within two seconds, and nothing old is shown', () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look();
-    await state(page).getByText('Holding').waitFor();
-    const position = page.locator('.bars .joint .value').first();
-    await until('a position is shown', async () => /\d/.test(await position.innerText()));
-    agent.kill();
-    const begun = Date.now();
-    await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
-    const red = await state(page).evaluate((element) => getComputedStyle(element).backgroundColor);
-    assert.match(red, /rgb\((200, 16, 46|216, 33, 61)\)/);
-    await page.getByText('Not the arm as it is now').waitFor();
-    for (const text of await page.locator('.bars .joint .value').allInnerTexts()) assert.match(text, /^[^\d]*–/, text);
-    assert.ok(Date.now() - begun < 2500);
+on("a viewer sees no command, and Stop works", {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look({ token: 'viewer' });
+  await state(page).getByText('Holding').waitFor();
+  await page.getByRole('button', { name: 'Looking only' }).waitFor();
+  for (const [tab, command] of [['jog', 'Joint 1, positive'], ['teach', 'Teach'], ['run', 'Open a file'], ['state', 'Recover'], ['plots', 'Set'], ['arm', 'Set']]) {
+    await page.click(`#tab-${tab}`);
+    await page.waitForTimeout(200);
+    assert.equal(await page.locator('#panel').getByRole('button', { name: command, exact: true }).count(), 0, `${tab}: ${command}`);
+  }
+  await moving(agent, async () => {
     await page.getByRole('button', { name: /STOP/ }).click();
-    await page.getByText(/STOP NOT SENT/).waitFor();
-  }));
+    await page.getByText(/Stopped on the path/).waitFor();
+  });
+});
 
-test('an agent that hangs is noticed as well, and comes back by itself', () =>
-  on({}, async ({ agent, look }) => {
-    await recover(agent);
-    const page = await look();
-    await state(page).getByText('Holding').waitFor();
-    agent.suspend();
-    await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
-    agent.wake();
-    await state(page).getByText('Holding').waitFor({ timeout: 8000 });
-    await until('positions are shown', async () => /\d/.test(await page.locator('.bars .joint .value').first().innerText()));
-  }));
+on('a lost agent is red within two seconds, and nothing old is shown', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await state(page).getByText('Holding').waitFor();
+  const position = page.locator('.bars .joint .value').first();
+  await until('a position is shown', async () => /\d/.test(await position.innerText()));
+  agent.kill();
+  const begun = Date.now();
+  await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
+  const red = await state(page).evaluate((element) => getComputedStyle(element).backgroundColor);
+  assert.match(red, /rgb\((200, 16, 46|216, 33, 61)\)/);
+  await page.getByText('Not the arm as it is now').waitFor();
+  for (const text of await page.locator('.bars .joint .value').allInnerTexts()) assert.match(text, /^[^\d]*–/, text);
+  assert.ok(Date.now() - begun < 2500);
+  await page.getByRole('button', { name: /STOP/ }).click();
+  await page.getByText(/STOP NOT SENT/).waitFor();
+});
 
-test('a wrong token is said to be wrong, and a right one lets in', () =>
-  on({}, async ({ agent, look }) => {
-    const page = await look({ token: 'wrong-wrong-wrong-wrong' });
-    await page.getByRole('dialog').getByText(/not accepted/).waitFor();
-    assert.equal(new URL(page.url()).hash, '', 'the token stays in the address');
-    await page.getByLabel('Token of this agent').fill(agent.operator);
-    await page.getByRole('button', { name: 'Use this token' }).click();
-    await state(page).getByText('No torque').waitFor();
-    await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
-    assert.equal(await page.evaluate(() => localStorage.getItem('openjtc-token')), null);
-    await page.reload();
-    await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
-  }));
+on('an agent that hangs is noticed as well, and comes back by itself', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await state(page).getByText('Holding').waitFor();
+  agent.suspend();
+  await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
+  agent.wake();
+  await state(page).getByText('Holding').waitFor({ timeout: 8000 });
+  await until('positions are shown', async () => /\d/.test(await page.locator('.bars .joint .value').first().innerText()));
+});
+
+on('a wrong token is said to be wrong, and a right one lets in', {}, async ({ agent, look }) => {
+  const page = await look({ token: 'wrong-wrong-wrong-wrong' });
+  await page.getByRole('dialog').getByText(/not accepted/).waitFor();
+  assert.equal(new URL(page.url()).hash, '', 'the token stays in the address');
+  await page.getByLabel('Token of this agent').fill(agent.operator);
+  await page.getByRole('button', { name: 'Use this token' }).click();
+  await state(page).getByText('No torque').waitFor();
+  await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
+  assert.equal(await page.evaluate(() => localStorage.getItem('openjtc-token')), null);
+  await page.reload();
+  await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
+});

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 
 import { explained } from '../../src/lib/arm/explain.ts';
 import type { Controller } from '../../src/lib/arm/types.ts';
-import { causesOf, codeOf, eventWords, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
+import { causesOf, codeOf, eventWords, isHeld, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
 import { angle, duration, number, parse } from '../../src/lib/format.ts';
 import { deviceKind, takesText } from '../../src/lib/keys.ts';
 
@@ -29,6 +29,14 @@ test('each state has a word, and says what leads on', () => {
   }
   assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'defaults');
   assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);
+});
+
+test('held is held only when every drive is enabled', () => {
+  const late = controller();
+  for (const joint of late.joints.slice(2, 4)) joint.state = 'in transition';
+  assert.ok(!isHeld(late));
+  assert.match(stateWords(late, undefined, []).detail, /joints 3, 4 are being enabled/);
+  assert.ok(isHeld(controller()));
 });
 
 test('the most particular cause stands first, sums last; codes go to explain', () => {

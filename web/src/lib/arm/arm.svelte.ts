@@ -255,8 +255,7 @@ export class ArmPage {
   readPoses(): Promise<void> {
     return this.#quietly(async () => {
       try {
-        const answer = await this.session.api.get<{ poses: Pose[] } | Pose[]>('/api/poses');
-        this.poses = Array.isArray(answer) ? answer : answer.poses;
+        this.poses = await this.session.api.get<Pose[]>('/api/poses');
         this.posesMissing = false;
       } catch (error) {
         this.posesMissing = error instanceof ApiError && error.isMissingPath;

@@ -2,8 +2,8 @@
 
 /** So often rates are sent, ms: they hold for 200 ms. */
 export const PERIOD_MS = 90;
-/** No request is waited for longer than this before the next one goes out, ms. */
-const LATE_MS = 160;
+/** A request without an answer for so long is not waited for, ms. */
+const LATE_MS = 1000;
 
 export interface JogLine {
   /** Sends rates; resolves when they were taken. `first`: the person has just touched. */
@@ -65,7 +65,7 @@ export class Jogger {
   #send(first: boolean): void {
     const rates = this.#rates;
     if (!rates) return;
-    // One request at a time, so that a slow line does not fill with old ones.
+    // One request at a time: the agent refuses a second one, and a slow line does not fill with old ones.
     if (this.#open > 0 && this.#line.now() - this.#sentAt < LATE_MS) return;
     const turn = this.#turn;
     this.#open += 1;

@@ -32,6 +32,8 @@ export interface Pose {
   name: string;
   positions_rad: number[];
   from?: string;
+  /** Why no motion leads there. */
+  warning?: string | null;
 }
 
 export interface Page {

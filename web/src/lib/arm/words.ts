@@ -59,6 +59,16 @@ export function hasTorque(controller: Controller | null | undefined): boolean {
   return controller != null && ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
 }
 
+/** Drives that are not enabled yet, from 1: the controller holds its position with those that are. */
+export function enabling(controller: Controller): number[] {
+  return controller.joints.filter((joint) => joint.state !== 'OperationEnable' && joint.state !== 'Start').map((joint) => joint.joint);
+}
+
+/** Every joint that is there is held: what moves the arm can begin. */
+export function isHeld(controller: Controller | null | undefined): boolean {
+  return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0 && controller.errors.length === 0;
+}
+
 export function isMoving(controller: Controller | null | undefined): boolean {
   return controller != null && controller.trajectory === 'Execute' && controller.state === 'Operate';
 }
@@ -107,6 +117,11 @@ export function stateWords(controller: Controller, job: string | undefined, miss
     case 'HoldPos': {
       if (isPaused(controller)) {
         return { ...base, tone: 'pause', word: 'Paused', detail: job ? `${job} stands on its path.` : 'The motion stands on its path.', next: 'Resume goes on; Stop ends the motion.', step: 'resume' };
+      }
+      const late = enabling(controller);
+      if (late.length > 0) {
+        const which = late.length === controller.joints.length ? 'The drives are' : `The ${late.length === 1 ? 'drive of joint' : 'drives of joints'} ${late.join(', ')} ${late.length === 1 ? 'is' : 'are'}`;
+        return { ...base, tone: 'off', word: 'Enabling', detail: `${which} being enabled.`, next: '' };
       }
       const gone = absent(controller);
       if (gone.length > 0) {

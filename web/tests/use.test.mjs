@@ -1,0 +1,306 @@
+// The page as somebody uses it: run, jog, poses, teach, the arm, plots and gains, two at one arm, errors.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before } from 'node:test';
+
+import { commanding, ended, jtc, recover, staged, startBrowser, state, until } from './harness.mjs';
+
+let browser;
+before(async () => (browser = await startBrowser()));
+after(() => browser.close());
+
+const on = staged(() => browser);
+
+const status = async (agent) => (await agent.ask('GET', '/api/status')).body;
+const joints = async (agent) => (await status(agent)).controller.joints.map((joint) => joint.position_rad);
+const moves = async (agent) => (await status(agent)).controller.joints.some((joint) => Math.abs(joint.velocity_rad_s) > 0.01);
+const held = (page) => state(page).getByText('Holding', { exact: true }).waitFor({ timeout: 15_000 });
+const fine = (page) => assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);
+
+async function letGo(page) {
+  await page.getByRole('button', { name: 'You command' }).click();
+  await page.getByRole('button', { name: 'Let the lease go' }).click();
+  await page.getByRole('button', { name: 'Close' }).click();
+}
+
+on('from no torque to a held arm by one button, and what was wrong in words', {}, async ({ look }) => {
+  const page = await look();
+  await state(page).getByText('No torque').waitFor();
+  await state(page).getByText(/has not been given: friction, PID, arm model/).waitFor();
+  await page.getByText('SIMULATED', { exact: true }).waitFor();
+  await page.getByRole('button', { name: 'Recover with defaults' }).click();
+  await held(page);
+  await page.getByRole('button', { name: 'You command' }).waitFor();
+  fine(page);
+});
+
+on('a file is checked, looked at, and run; the report is one touch away', {}, async ({ agent, look }) => {
+  await recover(agent);
+  await jtc(['example', 'motion', '-o', agent.dir]);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-run');
+  await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
+  await page.getByText('Passed the check').waitFor();
+  const slider = page.getByLabel('Time in the preview, s');
+  await slider.waitFor();
+  const before = await joints(agent);
+  await slider.fill('3');
+  await until('the ghost is where the motion is at 3 s', () => page.evaluate(() => Math.abs(globalThis.arm.preview.time - 3) < 0.01));
+  assert.deepEqual(await joints(agent), before, 'the preview moved the arm');
+  await page.getByRole('button', { name: /^Run/ }).click();
+  await state(page).getByText('Moving', { exact: true }).waitFor();
+  await page.getByRole('progressbar', { name: 'Progress' }).waitFor();
+  await page.getByRole('button', { name: 'Pause' }).click();
+  await state(page).getByText('Paused', { exact: true }).waitFor();
+  assert.equal((await status(agent)).controller.trajectory, 'Pause');
+  await page.getByRole('contentinfo').getByRole('button', { name: 'Resume' }).click();
+  await state(page).getByText('Moving', { exact: true }).waitFor();
+  await page.getByRole('slider', { name: /^Speed/ }).focus();
+  await page.keyboard.press('ArrowLeft');
+  await page.keyboard.press('ArrowRight');
+  await page.getByText('Finished.').waitFor({ timeout: 20_000 });
+  await page.locator('#panel').getByText('Error max, mrad').waitFor();
+  const [report] = await Promise.all([page.context().waitForEvent('page'), page.getByRole('button', { name: 'Report' }).click()]);
+  await report.waitForURL(/\/api\/jobs\/\d+\/report/);
+  fine(page);
+});
+
+on('what a check refuses is named with its joint, and shown at its place', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const rows = ['t,q1,q2,q3,q4,q5,q6'];
+  for (let i = 0; i <= 60; i += 1) rows.push([(i * 0.03).toFixed(2), ...[0.8, 0.4, -0.7, 0.8, 0.6, -1].map((a) => (a * (1 - Math.cos((i / 60) * 2 * Math.PI)) * 0.5).toFixed(6))].join(','));
+  writeFileSync(join(agent.dir, 'fast.csv'), rows.join('\n'));
+  const page = await look();
+  await held(page);
+  await page.click('#tab-run');
+  await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'fast.csv'));
+  await page.getByText('Refused by the check').waitFor();
+  assert.ok(await page.getByRole('button', { name: /^Run/ }).isDisabled());
+  await page.getByText(/Error, joint \d/).first().waitFor();
+  await page.locator('#panel').getByRole('button', { name: 'Show' }).first().click();
+  assert.ok((await page.evaluate(() => globalThis.arm.preview.time)) > 0);
+});
+
+on('a joint moves as long as its key is held', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-jog');
+  const key = page.getByRole('button', { name: 'Joint 3, positive' });
+  const box = await key.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await until('it moves', () => moves(agent));
+  await page.waitForTimeout(900);
+  assert.ok(await moves(agent), 'it moves on while it is held');
+  await page.mouse.up();
+  await until('it rests', async () => !(await moves(agent)), 1000);
+  assert.ok((await joints(agent))[2] > 0.02);
+  // By keyboard, and let go by the window that loses the focus.
+  await page.getByRole('button', { name: 'Joint 3, negative' }).focus();
+  await page.keyboard.down('Enter');
+  await until('it moves back', () => moves(agent));
+  await page.evaluate(() => globalThis.dispatchEvent(new Event('blur')));
+  await until('it rests again', async () => !(await moves(agent)), 1000);
+  await page.keyboard.up('Enter');
+  fine(page);
+});
+
+on('a jog ends with the connection', {}, async ({ agent, site, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-jog');
+  const box = await page.getByRole('button', { name: 'Joint 1, negative' }).boundingBox();
+  await page.mouse.move(box.x + 20, box.y + 20);
+  await page.mouse.down();
+  await until('it moves', () => moves(agent));
+  await site.end();
+  await until('it rests', async () => !(await moves(agent)), 1500);
+  await page.mouse.up();
+});
+
+on('a pose is saved, gone to, and removed', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-jog');
+  await page.getByLabel('Name of the pose').fill('home');
+  await page.getByRole('button', { name: 'Save where it stands' }).click();
+  const row = page.locator('#panel li').filter({ hasText: 'home' });
+  await row.waitFor();
+  await letGo(page);
+  await commanding(agent, async (key) => {
+    const job = await agent.ask('POST', '/api/moves', { to_rad: [0.2, 0, 0, 0, 0, 0] }, key);
+    await ended(agent, job.body.number);
+  });
+  await held(page);
+  await row.getByRole('button', { name: 'Go' }).click();
+  await until('it is home', async () => Math.abs((await joints(agent))[0]) < 0.002 && !(await moves(agent)), 20_000);
+  await page.getByRole('button', { name: 'Remove home' }).click();
+  await row.getByRole('button', { name: 'Remove', exact: true }).click();
+  await row.waitFor({ state: 'detached' });
+  fine(page);
+});
+
+on('teaching is switched on and off; a way is recorded, thinned, planned', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-teach');
+  await page.getByRole('button', { name: 'Teach', exact: true }).click();
+  await state(page).getByText('Teaching', { exact: true }).waitFor();
+  await page.locator('#panel').getByRole('button', { name: /End teaching/ }).click();
+  await held(page);
+  // Nobody leads a simulated arm by hand: a move takes the hand's place.
+  await page.getByRole('button', { name: 'Record', exact: true }).click();
+  await letGo(page);
+  await commanding(agent, async (key) => {
+    for (const to of [[0.3, 0.1, 0, 0, 0, 0], [0.1, 0.3, 0.2, 0, 0, 0]]) await ended(agent, (await agent.ask('POST', '/api/moves', { to_rad: to }, key)).body.number);
+  });
+  await page.getByRole('button', { name: 'End recording' }).click();
+  await page.getByText(/Thinned so that no joint/).waitFor();
+  await page.getByRole('button', { name: 'Plan', exact: true }).click();
+  await page.getByText(/kept as number \d/).waitFor({ timeout: 60_000 });
+  await page.getByRole('button', { name: 'Look at it and run' }).click();
+  await page.getByText(/Passed/).waitFor();
+  fine(page);
+});
+
+on('an arm file is compared, and given; the payload is set', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-arm');
+  const own = (await agent.ask('GET', '/api/arm')).body.text;
+  const other = own.replace('kp = 8000', 'kp = 7900');
+  writeFileSync(join(agent.dir, 'mine.toml'), other);
+  await page.getByLabel('Arm file', { exact: true }).setInputFiles(join(agent.dir, 'mine.toml'));
+  await page.getByText('differs at one place').waitFor();
+  await page.getByText('joint 1, pid.kp').waitFor();
+  await page.getByRole('button', { name: 'Give it to the controller' }).click();
+  await page.getByText('the same as the controller has').waitFor({ timeout: 15_000 });
+  assert.match((await agent.ask('GET', '/api/arm')).body.text, /kp = 7900/);
+  await page.getByLabel('Mass, kg').fill('1,5');
+  await page.getByLabel('Centre z, mm').fill('40');
+  await page.getByRole('button', { name: 'Set', exact: true }).click();
+  await page.getByText(/computes with 1\.50 kg/).waitFor();
+  assert.deepEqual((await agent.ask('GET', '/api/payload')).body.com_m, [0, 0, 0.04]);
+  fine(page);
+});
+
+on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-plots');
+  await page.locator('.uplot canvas').first().waitFor();
+  await until('the plot has curves', () => page.evaluate(() => globalThis.arm.history.length > 20));
+  await page.getByLabel(/^Kp/).fill('7000');
+  await page.locator('#panel').getByRole('button', { name: 'Set', exact: true }).click();
+  await until('the controller has them', async () => /kp = 7000/.test((await agent.ask('GET', '/api/arm')).body.text));
+  const test = page.getByRole('button', { name: 'Test', exact: true });
+  await until('it can be tested', () => test.isEnabled());
+  const before = await joints(agent);
+  await test.click();
+  await page.locator('#panel td', { hasText: '7000' }).waitFor({ timeout: 30_000 });
+  const now = await joints(agent);
+  before.forEach((q, i) => assert.ok(Math.abs(q - now[i]) < 0.002, 'it is back where it began'));
+  await page.getByRole('button', { name: 'Undo' }).click();
+  await until('the old ones are back', async () => !/kp = 7000/.test((await agent.ask('GET', '/api/arm')).body.text));
+  fine(page);
+});
+
+on('two at one arm: one commands, the other asks for it and gets it', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const [anna, bert] = [await look(), await look()];
+  for (const [page, name] of [[anna, 'Anna'], [bert, 'Bert']]) {
+    await page.getByRole('button', { name: 'Nobody commands' }).click();
+    await page.getByLabel(/^Name that others read/).fill(name);
+    await page.getByLabel(/^Name that others read/).press('Tab');
+    await page.getByRole('button', { name: 'Close' }).click();
+  }
+  await anna.getByRole('button', { name: 'Nobody commands' }).click();
+  await anna.getByRole('button', { name: 'Take the lease' }).click();
+  await anna.getByRole('button', { name: 'Close' }).click();
+  await bert.getByRole('button', { name: 'Anna commands' }).waitFor();
+  await bert.click('#tab-jog');
+  await bert.getByRole('button', { name: 'Pump on' }).click();
+  const message = bert.getByRole('alert').filter({ hasText: 'Anna' });
+  await message.waitFor();
+  await message.getByRole('button', { name: 'Ask for it' }).click();
+  await anna.getByText('Bert asks').waitFor({ timeout: 6000 });
+  await anna.getByRole('button', { name: /You command/ }).click();
+  await anna.getByRole('button', { name: 'Give it to Bert' }).click();
+  await bert.getByRole('banner').getByRole('button', { name: 'You command' }).waitFor({ timeout: 8000 });
+  // Everyone stops, whoever commands.
+  await anna.getByRole('button', { name: 'Close' }).click();
+  await anna.getByRole('button', { name: /STOP/ }).click();
+  await until('it was sent', async () => (await status(agent)).last_halt === 1);
+});
+
+on('an error is said with its cause, explained, and recovered from', { faults: 'format = 2\n\n[[fault]]\nkind = "node-silent"\njoint = 2\nat_point = 1500\nfor_s = 0.05\n' }, async ({ agent, look }) => {
+  await recover(agent);
+  await jtc(['example', 'motion', '-o', agent.dir]);
+  const page = await look();
+  await held(page);
+  await page.click('#tab-run');
+  await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
+  await page.getByText('Passed the check').waitFor();
+  await page.getByRole('button', { name: /^Run/ }).click();
+  await state(page).getByText('Error', { exact: true }).waitFor({ timeout: 20_000 });
+  await page.getByRole('alert').first().waitFor();
+  await state(page).getByRole('button', { name: 'Explain' }).click();
+  const page_ = page.getByRole('dialog');
+  await page_.getByText('Meaning').waitFor();
+  await page_.getByText('What to do').waitFor();
+  await page.keyboard.press('Escape');
+  await page.getByRole('button', { name: 'Flight recorder' }).first().waitFor();
+  await state(page).getByRole('button', { name: 'Recover' }).click();
+  await held(page);
+  fine(page);
+});
+
+on('an arm at rest costs little: no picture is drawn, and hardly any time is used', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await held(page);
+  await page.locator('[data-testid=view]').evaluate((box) => new Promise((done) => {
+    const wait = () => (box.scene ? done() : setTimeout(wait, 50));
+    wait();
+  }));
+  await page.waitForTimeout(1500);
+  const drawn = () => page.getByTestId('view').evaluate((box) => box.scene.drawn);
+  const client = await page.context().newCDPSession(page);
+  await client.send('Performance.enable');
+  const busy = async () => (await client.send('Performance.getMetrics')).metrics.find((metric) => metric.name === 'TaskDuration').value;
+  const [pictures, time] = [await drawn(), await busy()];
+  await page.waitForTimeout(4000);
+  const share = ((await busy()) - time) / 4;
+  assert.equal((await drawn()) - pictures, 0);
+  assert.ok(share < 0.1, `${(share * 100).toFixed(1)} % of a core`);
+  console.log(`idle: ${(share * 100).toFixed(1)} % of a core`);
+});
+
+on('the first paint comes soon', {}, async ({ look }) => {
+  const page = await look();
+  const first = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime);
+  assert.ok(first < 1000, `${first} ms`);
+  console.log(`first paint: ${Math.round(first)} ms`);
+});
+
+on('nothing is asked of anybody else', {}, async ({ site, look }) => {
+  const page = await look();
+  const others = [];
+  page.on('request', (request) => {
+    if (!request.url().startsWith(site.url) && !request.url().startsWith('blob:') && !request.url().startsWith('data:')) others.push(request.url());
+  });
+  await page.reload();
+  for (const tab of ['run', 'jog', 'teach', 'arm', 'plots', 'log']) {
+    await page.click(`#tab-${tab}`);
+    await page.waitForTimeout(200);
+  }
+  assert.deepEqual(others, []);
+});

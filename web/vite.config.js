@@ -11,7 +11,7 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 800,
-    rollupOptions: { input: { index: 'index.html' } },
+    rollupOptions: { input: { index: 'index.html', chain: 'chain.html' } },
   },
   server: { proxy: { '/api': { target: process.env.AGENT ?? 'http://127.0.0.1:8780', ws: true, changeOrigin: true } } },
 });

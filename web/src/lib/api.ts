@@ -75,7 +75,7 @@ export function problemOf(status: number, text: string): Problem {
       code: 'no-such-path',
       message: 'This agent does not offer that.',
       cause: 'It is older than this page.',
-      next: 'Update the agent (jtc --version shows what runs).',
+      next: 'Update the agent (--version shows what runs).',
     };
   }
   if (status === 408 || status === 504) {

@@ -94,12 +94,13 @@ export class Session<S extends SessionStatus> {
   stopState = $state<StopState>({ phase: 'idle', at: 0, answered: 0, text: '' });
   theme = $state<Theme>(savedTheme());
   name = $state(load('name') ?? deviceKind(navigator.userAgent, navigator.maxTouchPoints, screen.width));
-  policy = $state<Policy>((load('policy') as Policy | null) ?? 'pause');
+  policy = $state<Policy>('stop');
 
   /** Something that this page has begun goes on. */
   isBusy: () => boolean = () => false;
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
+  readonly #messageHandlers: ((message: { kind: string }) => void)[] = [];
   readonly #lossHandlers: (() => void)[] = [];
   #describe: Describe;
   #touched = 0;
@@ -110,8 +111,11 @@ export class Session<S extends SessionStatus> {
   #lostAt = performance.now();
   #probing = false;
 
-  constructor(describe: Describe) {
+  /** `policies` are those that the agent knows, the usual one first. */
+  constructor(describe: Describe, policies: readonly [Policy, ...Policy[]] = ['pause', 'stop', 'continue']) {
     this.#describe = describe;
+    const saved = load('policy') as Policy | null;
+    this.policy = saved !== null && policies.includes(saved) ? saved : policies[0];
     const { token, rest } = tokenIn(location.hash);
     if (token) {
       this.tokens.set(token, this.tokens.isRemembered());
@@ -135,6 +139,9 @@ export class Session<S extends SessionStatus> {
       {
         status: (status) => this.#take(status),
         events: (message) => this.#hear(message),
+        other: (message) => {
+          for (const handler of this.#messageHandlers) handler(message);
+        },
         phase: (phase) => {
           this.phase = phase;
           this.#look();
@@ -151,6 +158,11 @@ export class Session<S extends SessionStatus> {
 
   onEvent(handler: (entry: Entry, isNew: boolean) => void): void {
     this.#eventHandlers.push(handler);
+  }
+
+  /** Called with what the stream has beside status and events. */
+  onMessage(handler: (message: { kind: string }) => void): void {
+    this.#messageHandlers.push(handler);
   }
 
   /** Called when what is shown is no more what is. */

@@ -1,0 +1,325 @@
+// What the page of a chain knows: bus, boards, values, jobs. Components read it, and ask by it.
+import { getContext, setContext } from 'svelte';
+
+import { History } from '../arm/history.ts';
+import { ApiError } from '../api.ts';
+import type { Policy } from '../lease.ts';
+import { Session } from '../session.svelte.ts';
+import type { BoardObject, BoardsMessage, ChainEntry, Happening, JobObject, Status, Values, ValuesMessage } from './types.ts';
+import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, stoppedWords } from './words.ts';
+
+/** Rows that are kept of the outputs of a board: two minutes at 25 Hz. */
+const ROWS = 3000;
+/** What people read changes so often at most, ms. */
+const READ_MS = 120;
+/** Outputs that are older are not those of now, ms; the agent says so from half a second on. */
+const OLD_MS = 900;
+const TICK_MS = 250;
+
+export const POLICIES: [Policy, string][] = [
+  ['stop', 'are stopped'],
+  ['continue', 'go on with the inputs that they have'],
+];
+
+/** A job as its events tell it. */
+export interface Course {
+  number: number;
+  what: string;
+  client: string;
+  own: boolean;
+  over: boolean;
+  /** Of an update: who gets the image now, and how far it is. */
+  progress: { boards: number[]; attempt: number; cycle: number; bytes: number; total: number } | undefined;
+  notes: string[];
+}
+
+/** A board, when that was received, and when its last heartbeat was, by this browser's clock. */
+export interface BoardView {
+  board: BoardObject;
+  at: number;
+  beat: number | undefined;
+}
+
+export type Tab = 'boards' | 'board' | 'update' | 'doctor' | 'jobs' | 'log';
+
+/** What is asked before it is done. */
+export type Question = { what: 'init' } | { what: 'run' } | { what: 'reset'; board: number };
+
+const KEY = Symbol('chain');
+const BEAT_MS = 150;
+
+export class ChainPage {
+  readonly session: Session<Status> = new Session<Status>((entry) => eventWords((entry as ChainEntry).event), ['stop', 'continue']);
+
+  tab = $state<Tab>('boards');
+  chosen = $state<number | undefined>(undefined);
+  views = $state.raw<BoardView[]>([]);
+  /** What is shown of boards is of now. */
+  known = $state(false);
+  /** The newest values, each board; replaced a few times a second. */
+  values = $state.raw<ReadonlyMap<number, { values: Values; at: number }>>(new Map());
+  course = $state<Course | undefined>(undefined);
+  jobs = $state.raw<JobObject[]>([]);
+  stopWords = $state('');
+  stopFailed = $state(false);
+  question = $state<Question | undefined>(undefined);
+  /** performance.now(), a few times a second: for ages. */
+  now = $state(performance.now());
+  /** Counts Stops, of whomever: what waits to be sent is dropped. */
+  halts = $state(0);
+  /** A result of a scan or of numbering that nobody has put away yet. */
+  found = $state.raw<JobObject | undefined>(undefined);
+
+  readonly #newest = new Map<number, { values: Values; at: number }>();
+  readonly #traces = new Map<number, { names: string; history: History }>();
+  #read = 0;
+  #agent = '';
+  #stop: { at: number } | undefined;
+  #stopTimer: ReturnType<typeof setTimeout> | undefined;
+
+  readonly boards = $derived(this.views.map((view) => view.board));
+  readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);
+  readonly isRunning = $derived(this.course !== undefined && !this.course.over);
+  readonly words = $derived.by<BusWords | undefined>(() => {
+    const status = this.session.status;
+    if (!status || !this.session.fresh) return undefined;
+    const course = this.course && !this.course.over ? `${jobWords(this.course.what)}, by ${this.course.client}` : undefined;
+    return busWords(status, this.boards, course);
+  });
+  readonly runs = $derived(this.boards.some((board) => board.state === 'running' || board.state === 'started'));
+
+  constructor() {
+    this.session.onStatus((status) => this.#take(status));
+    this.session.onEvent((entry, isNew) => this.#hear((entry as ChainEntry).event, isNew));
+    this.session.onMessage((message) => this.#receive(message));
+    this.session.onLoss(() => this.#lose());
+    // Boards that this page commands are stopped when its lease lapses: it lasts for as long as they run and the page is looked at.
+    this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
+  }
+
+  start(): void {
+    this.session.start();
+    setInterval(() => {
+      if (!document.hidden) this.now = performance.now();
+    }, TICK_MS);
+  }
+
+  choose(number: number, open: boolean): void {
+    this.chosen = number;
+    if (open || this.tab !== 'boards') this.tab = 'board';
+  }
+
+  view(number: number | undefined): BoardView | undefined {
+    return this.views.find((view) => view.board.number === number);
+  }
+
+  /** Whether outputs that came then are those of now. */
+  isOld(of: { values: Values; at: number } | undefined): boolean {
+    return !this.known || !of || of.values.stale || (of.values.age_s ?? Infinity) * 1000 + (this.now - of.at) > OLD_MS;
+  }
+
+  /** The last minutes of the outputs of a board: time, then one column each. */
+  trace(number: number): History | undefined {
+    return this.#traces.get(number)?.history;
+  }
+
+  /** A command for a board or the chain; what was refused is a message on the page. */
+  async command<T = unknown>(what: string, method: string, path: string, body?: unknown): Promise<{ value: T } | undefined> {
+    // Boards answer one after the other, and a job that goes on first ends what it has begun.
+    return this.session.command<T>(what, method, path, body === undefined ? { within: 30_000 } : { body, within: 30_000 });
+  }
+
+  scan(): void {
+    void this.command('Scan', 'POST', '/api/scan');
+  }
+
+  cancel(): void {
+    const job = this.course;
+    if (job) void this.command(`Cancel ${jobWords(job.what).toLowerCase()}`, 'DELETE', `/api/jobs/${job.number}`);
+  }
+
+  async stop(): Promise<void> {
+    const at = performance.now();
+    this.#stop = { at };
+    this.halts += 1;
+    this.stopFailed = false;
+    this.stopWords = 'Stop is being sent';
+    clearTimeout(this.#stopTimer);
+    await this.session.stop();
+    const state = this.session.stopState;
+    if (state.phase === 'failed') {
+      this.#stop = undefined;
+      this.stopFailed = true;
+      this.stopWords = state.text;
+    } else if (this.#stop?.at === at) {
+      const updates = this.isRunning && this.course?.what === 'update';
+      this.stopWords = updates ? 'Stop was sent to all boards; they are asked when the update is over. Cancel ends the update.' : 'Stop was sent to all boards; each is being asked.';
+    }
+  }
+
+  #wordStop(event: Extract<Happening, { kind: 'stopped' }>): void {
+    const { text, failed } = stoppedWords(event);
+    if (!this.#stop && !failed) return;
+    const took = this.#stop && !failed && event.boards.length > 0 ? ` ${((performance.now() - this.#stop.at) / 1000).toFixed(1)} s.` : '';
+    this.#stop = undefined;
+    this.stopWords = text + took;
+    this.stopFailed = failed;
+    clearTimeout(this.#stopTimer);
+    if (!failed) this.#stopTimer = setTimeout(() => (this.stopWords = ''), 12_000);
+  }
+
+  #take(status: Status): void {
+    if (status.agent !== this.#agent) {
+      const other = this.#agent !== '';
+      this.#agent = status.agent;
+      if (other) {
+        this.course = undefined;
+        this.found = undefined;
+        this.#newest.clear();
+        this.values = new Map();
+      }
+      void this.readJobs();
+    }
+    const known = this.session.fresh;
+    if (known !== this.known) this.known = known;
+  }
+
+  #receive(message: { kind: string }): void {
+    if (message.kind === 'boards') this.#takeBoards((message as BoardsMessage).boards);
+    else if (message.kind === 'values') this.#takeValues((message as ValuesMessage).values);
+  }
+
+  #takeBoards(boards: BoardObject[]): void {
+    const at = performance.now();
+    const before = new Map(this.views.map((view) => [view.board.number, view]));
+    this.views = boards.map((board) => {
+      const beat = board.heartbeat_age_s == null ? undefined : at - board.heartbeat_age_s * 1000;
+      const last = before.get(board.number)?.beat;
+      // The same heartbeat, received twice: its time differs by what the messages were under way.
+      return { board, at, beat: beat !== undefined && last !== undefined && Math.abs(beat - last) < BEAT_MS ? last : beat };
+    });
+    if (this.chosen === undefined || !boards.some((board) => board.number === this.chosen)) this.chosen = boards[0]?.number;
+  }
+
+  #takeValues(list: Values[]): void {
+    const at = performance.now();
+    for (const values of list) {
+      this.#newest.set(values.board, { values, at });
+      if (!values.stale) this.#remember(values);
+    }
+    if (at - this.#read < READ_MS) return;
+    this.#read = at;
+    this.values = new Map(this.#newest);
+  }
+
+  #remember(values: Values): void {
+    const names = values.outputs.map((output) => output.name).join('\n');
+    let trace = this.#traces.get(values.board);
+    if (!trace || trace.names !== names) {
+      trace = { names, history: new History(values.outputs.length + 1, ROWS) };
+      this.#traces.set(values.board, trace);
+    }
+    const row = values.outputs.map((output) => (typeof output.value === 'number' ? output.value : typeof output.value === 'boolean' ? Number(output.value) : NaN));
+    trace.history.push([Date.now() / 1000 - (values.age_s ?? 0), ...row]);
+  }
+
+  /** Nothing that is known is of now. */
+  #lose(): void {
+    this.known = false;
+    this.halts += 1;
+    // A gap in the plots, and no line over it.
+    for (const { history } of this.#traces.values()) {
+      const row = new Array<number>(history.channels).fill(NaN);
+      row[0] = Date.now() / 1000;
+      history.push(row);
+    }
+  }
+
+  #hear(event: Happening, isNew: boolean): void {
+    const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
+    switch (event.kind) {
+      case 'begun':
+        this.course = {
+          number: event.job, what: event.what, client: event.client, over: false, progress: undefined, notes: [],
+          own: this.session.leasePhase === 'held' && event.client === this.session.name,
+        };
+        break;
+      case 'progress':
+        if (course) course.progress = event;
+        break;
+      case 'job_note':
+        if (course) course.notes = [...course.notes.slice(-5), event.text];
+        break;
+      case 'ended':
+        if (course) course.over = true;
+        if (isNew) void this.#ended(event.job);
+        break;
+      case 'halt':
+        this.halts += 1;
+        if (isNew && !this.#stop && performance.now() - this.session.stopState.at > 3000) this.session.toast({ tone: 'info', title: 'Stopped', text: `By ${event.by}.` });
+        break;
+      case 'stopped':
+        if (isNew) this.#wordStop(event);
+        break;
+      case 'heartbeat':
+        if (isNew && event.change === 'lost') this.session.toast({ tone: 'error', title: event.board ? `Board ${event.board} is lost` : 'A board is lost', text: 'No heartbeat for 3 s: it may still run.' });
+        break;
+      case 'state': {
+        // The inputs and outputs of another start are not those of this one.
+        const view = this.view(event.board);
+        if (view && event.state === 'exloader' && this.#newest.delete(event.board)) this.values = new Map(this.#newest);
+        break;
+      }
+    }
+  }
+
+  async #ended(number: number): Promise<void> {
+    await this.readJobs();
+    const job = this.jobs.find((each) => each.number === number);
+    if (!job) return;
+    if (job.chain) this.found = job;
+    const own = this.course?.number === number && this.course.own;
+    if (!own) return;
+    if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
+    else if (job.stage === 'finished' && !job.chain) this.session.toast({ tone: 'good', title: jobWords(job.what), text: jobResult(job) });
+  }
+
+  async readJobs(): Promise<void> {
+    try {
+      this.jobs = await this.session.api.get<JobObject[]>('/api/jobs');
+    } catch (error) {
+      if (!(error instanceof ApiError)) throw error;
+    }
+  }
+
+  /** The values of a board that sends none: of one whose names are not known the board itself is asked. */
+  async readValues(number: number): Promise<void> {
+    await this.session.attempt(`Values of board ${number}`, async () => {
+      const values = await this.session.api.get<Values>(`/api/boards/${number}/values`);
+      this.#newest.set(number, { values, at: performance.now() });
+      this.values = new Map(this.#newest);
+    });
+  }
+
+  /** Inputs and parameters as the agent has confirmed them, at once. */
+  confirm(number: number, list: 'inputs' | 'parameters', value: Values['inputs'][number]): void {
+    const old = this.#newest.get(number);
+    if (!old) return;
+    const merged = old.values[list].map((each) => (each.index === value.index ? { ...each, ...value } : each));
+    this.#newest.set(number, { ...old, values: { ...old.values, [list]: merged } });
+    this.values = new Map(this.#newest);
+  }
+
+  /** The state of a board in words; nothing is said of one of which nothing is known. */
+  boardWords(board: BoardObject): ReturnType<typeof boardWords> {
+    return this.known ? boardWords(board) : { tone: 'lost', word: 'Not known', detail: 'Nothing is received from the agent.' };
+  }
+}
+
+export function provideChain(chain: ChainPage): void {
+  setContext(KEY, chain);
+}
+
+export function useChain(): ChainPage {
+  return getContext<ChainPage>(KEY);
+}

@@ -1,0 +1,23 @@
+// How far an update is: an image goes over twice, is checked, written, and read back.
+import type { Course } from './chain.svelte.ts';
+
+export interface Phase {
+  /** 0: checked, 1: written, 2: read back. */
+  at: number;
+  /** 0 to 1, of all that is transferred to these boards. */
+  share: number;
+  words: string;
+}
+
+export const PHASES = ['Transferred and checked', 'Written', 'Read back'] as const;
+
+export function phaseOf(course: Pick<Course, 'progress'> | undefined): Phase | undefined {
+  const progress = course?.progress;
+  if (!progress) return undefined;
+  const share = progress.total > 0 ? Math.min(1, progress.bytes / progress.total) : 0;
+  const percent = `${Math.round(share * 100)} %`;
+  const again = progress.attempt > 1 ? `, attempt ${progress.attempt}` : '';
+  if (share >= 1) return { at: 2, share, words: `read back${again}` };
+  if (progress.cycle >= 2) return { at: 1, share, words: `is written, ${percent}${again}` };
+  return { at: 0, share, words: `checked, nothing erased yet, ${percent}${again}` };
+}

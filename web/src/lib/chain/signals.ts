@@ -1,0 +1,80 @@
+// Inputs, outputs and parameters: their names, what a slider may set, and how a value is written in a request.
+import { number, parse } from '../format.ts';
+import type { Value } from './types.ts';
+
+/** "position [0.01 deg]": boards put in brackets what one step of the word is. */
+export function nameParts(name: string): { name: string; step: string } {
+  const found = /^(.*?)\s*\[([^\]]*)\]\s*$/.exec(name);
+  return found ? { name: found[1] ?? name, step: found[2] ?? '' } : { name, step: '' };
+}
+
+/** The unit of a value, by the signal table, or the step of its word as the board names it. */
+export function unitWords(value: Value): string {
+  if (value.unit) return value.unit;
+  const { step } = nameParts(value.name);
+  return step === '' ? '' : /^[\d.]/.test(step) ? `× ${step}` : step;
+}
+
+/** A number in a text of the agent, with a true minus sign. */
+export function minus(text: string): string {
+  return text.replace(/^-(?=[\d.])/, '\u2212');
+}
+
+export type Form = 'number' | 'switch' | 'word';
+
+/** How a value is set: what the signal table calls bits is no number. */
+export function formOf(value: Value): Form {
+  if (typeof value.value === 'boolean') return 'switch';
+  return typeof value.value === 'string' ? 'word' : 'number';
+}
+
+export interface Range {
+  min: number;
+  max: number;
+  step: number;
+  /** By the signal table; else somebody has chosen it, or nobody. */
+  by: 'table' | 'page' | 'nobody';
+}
+
+/** A step that makes about a thousand of a range, and no more than a word has. */
+export function stepOf(min: number, max: number, whole: boolean): number {
+  const step = 10 ** Math.floor(Math.log10(Math.max(1e-9, (max - min) / 500)));
+  return whole ? Math.max(1, step) : step;
+}
+
+const WORD = { min: -32768, max: 65535 };
+
+/** What a slider goes over. Without a table it is a small part of what a word can hold, so that a touch does not send the largest. */
+export function rangeOf(value: Value, chosen: { min: number; max: number } | undefined): Range {
+  const whole = !value.unit;
+  const of = (min: number, max: number, by: Range['by']): Range => ({ min, max, step: stepOf(min, max, whole), by });
+  if (typeof value.min === 'number' && typeof value.max === 'number' && value.max > value.min) return of(value.min, value.max, 'table');
+  if (chosen && chosen.max > chosen.min) return of(chosen.min, chosen.max, 'page');
+  const now = typeof value.value === 'number' ? Math.abs(value.value) : 0;
+  const reach = Math.max(whole ? 1000 : 100, now);
+  return whole ? of(Math.max(WORD.min, -reach), Math.min(WORD.max, reach), 'nobody') : of(-reach, reach, 'nobody');
+}
+
+export function digitsOf(step: number): number {
+  return Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9)));
+}
+
+/** A number with its unit, for people. */
+export function text(value: number, step: number, unit: string | null | undefined): string {
+  return `${number(value, digitsOf(step))}${unit ? ` ${unit}` : ''}`;
+}
+
+/** A number as the agent takes it: with its unit where there is one, since a bare one could mean something else. */
+export function given(value: number, step: number, unit: string | null | undefined): number | string {
+  const plain = value.toFixed(digitsOf(step));
+  return unit ? `${plain} ${unit}` : Number(plain);
+}
+
+/** What somebody has typed: a number, or anything else that the agent understands, as 0x05DC, 15deg, on. */
+export function typed(input: string, unit: string | null | undefined): number | string | undefined {
+  const trimmed = input.trim();
+  if (trimmed === '') return undefined;
+  const value = /^0x/i.test(trimmed) ? NaN : parse(trimmed);
+  if (!Number.isFinite(value)) return trimmed;
+  return unit ? `${value} ${unit}` : value;
+}

@@ -1,0 +1,34 @@
+// Types of a chain's agent: those of its description, and the messages of its stream, which OpenAPI has no word for.
+import type { Entry } from '../connection.ts';
+import type { SessionStatus } from '../session.svelte.ts';
+import type { BoardObject, Happening, StatusObject, ValueObject } from './api-types.ts';
+
+export type { BoardObject, ChainObject, FindingObject, Happening, JobObject, UpdateObject, UpdateRequest, UpdatedObject } from './api-types.ts';
+
+/** Limits of the signal table, where the agent names them. */
+export type Value = ValueObject & { min?: number | null; max?: number | null };
+
+export interface Values {
+  board: number;
+  age_s?: number | null;
+  stale: boolean;
+  outputs: Value[];
+  inputs: Value[];
+  parameters: Value[];
+}
+
+export type Status = StatusObject & SessionStatus;
+
+export interface ChainEntry extends Entry {
+  event: Happening;
+}
+
+export interface BoardsMessage {
+  kind: 'boards';
+  boards: BoardObject[];
+}
+
+export interface ValuesMessage {
+  kind: 'values';
+  values: Values[];
+}

@@ -1,0 +1,68 @@
+// The form of an update: kept while another tab is looked at.
+import type { UpdateRequest } from './types.ts';
+
+export interface Picked {
+  name: string;
+  size: number;
+  base64: string;
+}
+
+/** Largest image that the agent takes, bytes; its base64 is a third more. */
+export const SIZE_MOST = 1 << 20;
+
+export async function pick(file: File): Promise<Picked> {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  let text = '';
+  for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
+  return { name: file.name, size: bytes.length, base64: btoa(text) };
+}
+
+/** Raw bytes are taken of a file that is named so: text is never flashed as bytes by mistake. */
+export function formatOf(name: string): UpdateRequest['format'] {
+  return /\.bin$/i.test(name) ? 'bin' : undefined;
+}
+
+/** A number as people write it, 0x4B3F or 19263; undefined: none. */
+export function word(text: string): number | undefined {
+  const trimmed = text.trim();
+  if (!/^(0x[0-9a-f]{1,4}|\d{1,5})$/i.test(trimmed)) return undefined;
+  const value = Number(trimmed);
+  return value <= 0xffff ? value : undefined;
+}
+
+class UpdateForm {
+  boards = $state<number[]>([]);
+  image = $state.raw<Picked | undefined>(undefined);
+  second = $state.raw<Picked | undefined>(undefined);
+  format = $state<'' | 'bin' | 'hex' | 'srec'>('');
+  addresses = $state<'' | 'byte' | 'word'>('');
+  date = $state('');
+  programId = $state('');
+  checkFlash = $state(true);
+  group = $state(false);
+  start = $state(false);
+  force = $state(false);
+  unverified = $state(false);
+
+  request(flashOf: (board: number) => number | null | undefined, dryRun: boolean): UpdateRequest | undefined {
+    if (!this.image || this.boards.length === 0) return undefined;
+    const expected = word(this.programId);
+    const format = this.format || formatOf(this.image.name);
+    return {
+      boards: this.boards.map((board) => ({ board, ...(this.checkFlash && flashOf(board) != null ? { flash_number: flashOf(board)! } : {}) })),
+      image: this.image.base64,
+      ...(this.second ? { second: this.second.base64 } : {}),
+      ...(format ? { format } : {}),
+      ...(this.addresses ? { addresses: this.addresses } : {}),
+      ...(this.date ? { date: this.date } : {}),
+      ...(expected === undefined ? {} : { expect_program_id: expected }),
+      group: this.group,
+      start: this.start,
+      dry_run: dryRun,
+      force: this.force,
+      accept_unverified: this.unverified,
+    };
+  }
+}
+
+export const form = new UpdateForm();

@@ -55,12 +55,12 @@ pub fn check() -> Result<()> {
         let list = std::fs::read_to_string(path)?;
         used.extend(list.lines().filter_map(|line| line.split_once("==")).map(|(name, _)| name.to_owned()));
     }
-    for path in files(&root().join("references"), &["json"]) {
-        if path.file_name().is_some_and(|name| name == "package.json") {
-            let package: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
-            used.extend(
-                package["dependencies"].as_object().into_iter().flatten().map(|(name, _)| name.clone()),
-            );
+    let references = files(&root().join("references"), &["json"]).into_iter();
+    let packages = references.filter(|path| path.file_name().is_some_and(|name| name == "package.json"));
+    for path in packages.chain([root().join("web/package.json")]) {
+        let package: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
+        for table in ["dependencies", "devDependencies"] {
+            used.extend(package[table].as_object().into_iter().flatten().map(|(name, _)| name.clone()));
         }
     }
     let own: BTreeSet<String> = std::fs::read_dir(root().join("crates"))?

@@ -1,6 +1,7 @@
 //! Independent references in Python: a virtual environment made by itself, and the checks that run in it.
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -11,6 +12,9 @@ use crate::web;
 
 /// The interpreter of a virtual environment with the packages of references/`requirements`, made when it is not there yet.
 pub fn environment(requirements: &str) -> Result<PathBuf> {
+    // Whoever asks while it is being made waits for it.
+    static MAKING: Mutex<()> = Mutex::new(());
+    let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
     let list = root().join("references").join(requirements);
     let text = std::fs::read_to_string(&list).with_context(|| list.display().to_string())?;
     let mut hasher = DefaultHasher::new();
@@ -147,9 +151,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         |one, ended| {
             tally.step(&one.title(), || match (&one, ended?) {
                 (Beside::Reference(_), None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
-                (Beside::Browser, None) => {
-                    Ok(Outcome::Skipped(format!("no {}, or no Node.js", web::BROWSER)))
-                }
+                (Beside::Browser, None) => Ok(Outcome::Skipped(format!("there is no {}", web::BROWSER))),
                 (Beside::Browser, Some(ended)) => web::counted(&ended),
                 (Beside::Reference(_), Some(Ended { output, passed, seconds })) => {
                     println!("{}\n({seconds:.1} s, beside others)", output.trim_end());

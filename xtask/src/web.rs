@@ -2,40 +2,27 @@
 //!
 //! Whoever builds the programs needs none of that: the built files are in the repository.
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
 use crate::beside::{self, Ended};
+use crate::python;
 use crate::shell::{self, Scratch, run};
 use crate::tally::{Counts, Outcome, Tally};
 
-/// Oldest version of Node.js that the builder runs on.
-const NODE: (u32, u32) = (20, 19);
 /// Where Debian puts the browser.
 pub const BROWSER: &str = "/usr/bin/chromium";
 
-/// `program` in `web/`.
-fn command(program: &str) -> Command {
-    let mut command = shell::command(program);
-    command.current_dir(shell::root().join("web"));
-    command
-}
-
-/// Why the source cannot be built here, if it cannot.
-fn missing() -> Option<String> {
-    let version = shell::read(command("node").arg("--version").stderr(Stdio::null())).unwrap_or_default();
-    let mut numbers =
-        version.trim().trim_start_matches('v').split('.').map(|n| n.parse::<u32>().unwrap_or(0));
-    let found = (numbers.next().unwrap_or(0), numbers.next().unwrap_or(0));
-    let (major, minor) = NODE;
-    match (found, shell::works(command("npm").arg("--version"))) {
-        ((0, _), _) | (_, false) => Some("Node.js and npm are not here".into()),
-        (found, _) if found < NODE => {
-            Some(format!("Node.js {} is here, {major}.{minor} is needed", version.trim()))
-        }
-        _ => None,
-    }
+/// `program` of Node.js in `web/`: that of the references' environment, so that none has to be there.
+fn command(program: &str) -> Result<Command> {
+    let python = python::environment("requirements.txt")?;
+    let programs = python.parent().context("an interpreter in no folder")?;
+    let mut command = shell::command(programs.join(program));
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let all = [programs.to_owned()].into_iter().chain(std::env::split_paths(&others));
+    command.current_dir(shell::root().join("web")).env("PATH", std::env::join_paths(all)?);
+    Ok(command)
 }
 
 /// Installs what the lock file names, from the package registry.
@@ -46,26 +33,21 @@ fn install() -> Result<()> {
     if time(&stamp).is_some_and(|installed| time(&lock).is_some_and(|wanted| installed >= wanted)) {
         return Ok(());
     }
-    run(command("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]))
+    run(command("npm")?.args(["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]))
         .context("the packages could not be installed; is the network there?")
 }
 
 /// The steps of the source.
 pub fn steps(tally: &mut Tally) {
     tally.step("dashboard: types and tests of its source", || {
-        if let Some(why) = missing() {
-            return Ok(Outcome::Skipped(why));
-        }
         install()?;
-        run(command("npm").args(["run", "--silent", "check"]))?;
+        run(command("npm")?.args(["run", "--silent", "check"]))?;
         let scratch = Scratch::new("web")?;
-        let mut test = command("npm");
-        let ended = beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?;
-        counted(&ended)
+        let mut test = command("npm")?;
+        counted(&beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?)
     });
-    tally.step("dashboard: the built files are those of its source", || match missing() {
-        Some(why) => Ok(Outcome::Skipped(why)),
-        None => install().and_then(|()| same_build()).map(|()| Outcome::Passed),
+    tally.step("dashboard: the built files are those of its source", || {
+        install().and_then(|()| same_build()).map(|()| Outcome::Passed)
     });
 }
 
@@ -73,10 +55,10 @@ pub fn steps(tally: &mut Tally) {
 fn same_build() -> Result<()> {
     let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
     let built = scratch.path().join("dist");
-    run(command("npx")
+    run(command("npx")?
         .args(["--no-install", "vite", "build", "--logLevel", "error", "--outDir"])
         .arg(&built))?;
-    run(command("node").arg("tests/sizes.mjs"))?;
+    run(command("node")?.arg("tests/sizes.mjs"))?;
     let (old, new) = (files(&kept)?, files(&built)?);
     let help = "(cd web && npm ci && npm run build), and commit web/dist";
     ensure!(old == new, "web/dist holds other files than its source makes: {help}");
@@ -108,14 +90,14 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here, or nothing that drives it.
+/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here.
 pub fn browser(log: &Path) -> Result<Option<Ended>> {
-    if !Path::new(BROWSER).exists() || missing().is_some() {
+    if !Path::new(BROWSER).exists() {
         return Ok(None);
     }
     install()?;
     let release = shell::target().join("release");
-    let mut npm = command("npm");
+    let mut npm = command("npm")?;
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
     beside::run(&mut npm, log).map(Some)

@@ -255,6 +255,8 @@ export async function ended(agent, number, within = 30_000) {
 export async function recover(agent) {
   return commanding(agent, async (key) => {
     const job = await agent.ask('POST', '/api/recover', { defaults: true }, key);
-    return ended(agent, job.body.number);
+    await ended(agent, job.body.number);
+    // The drives are enabled one moment later than the controller holds.
+    await until('the arm is held', async () => (await agent.ask('GET', '/api/status')).body.controller.joints.every((joint) => joint.state === 'OperationEnable'));
   });
 }

@@ -78,7 +78,7 @@ on('what a check refuses is named with its joint, and shown at its place', {}, a
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'fast.csv'));
   await page.getByText('Refused by the check').waitFor();
   assert.ok(await page.getByRole('button', { name: /^Run/ }).isDisabled());
-  await page.getByText(/Error, joint \d/).first().waitFor();
+  await page.getByText(/Error: joint \d/).first().waitFor();
   await page.locator('#panel').getByRole('button', { name: 'Show' }).first().click();
   assert.ok((await page.evaluate(() => globalThis.arm.preview.time)) > 0);
 });
@@ -286,7 +286,7 @@ on('an arm at rest costs little: no picture is drawn, and hardly any time is use
 
 on('the first paint comes soon', {}, async ({ look }) => {
   const page = await look();
-  const first = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime);
+  const first = await until('something is painted', () => page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime));
   assert.ok(first < 1000, `${first} ms`);
   console.log(`first paint: ${Math.round(first)} ms`);
 });

@@ -38,7 +38,7 @@ export interface Surroundings {
 export type Phase = 'connecting' | 'open' | 'waiting' | 'closed';
 
 /** Without a message for so long the connection counts as lost, ms: the agent sends one each half second at least. */
-export const SILENT_MS = 1600;
+export const SILENT_MS = 1400;
 /** A socket that does not open for so long is given up, ms. */
 const OPENING_MS = 4000;
 const WAIT_MS = [200, 400, 800, 1500, 2000];

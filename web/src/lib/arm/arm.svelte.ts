@@ -32,6 +32,9 @@ export interface Course {
   own: boolean;
 }
 
+/** What becomes of a job before it moves anything. */
+const STAGES = { begun: ': being prepared', uploading: ': being uploaded', executing: '', ended: '' };
+
 export interface Preview {
   points: Points;
   /** s on the slider. */
@@ -77,7 +80,7 @@ export class ArmPage {
 
   readonly words = $derived.by<StateWords | undefined>(() => {
     if (!this.controller) return undefined;
-    const course = this.course && this.course.stage !== 'ended' ? `${jobWords(this.course.what)}, by ${this.course.client}` : undefined;
+    const course = this.course && this.course.stage !== 'ended' ? `${jobWords(this.course.what)}, by ${this.course.client}${STAGES[this.course.stage]}` : undefined;
     return stateWords(this.controller, course, this.info?.missing ?? []);
   });
   readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);

@@ -144,8 +144,8 @@ export class ArmScene {
     this.#path.material.color.set(palette.ghost);
     this.#ghostMaterial.color.set(palette.ghost);
     this.#payload.material.color.set(palette.warn);
-    this.#sky.intensity = palette.dark ? 0.75 : 1.25;
-    this.#sun.intensity = palette.dark ? 1.9 : 2.1;
+    this.#sky.intensity = palette.dark ? 1.15 : 1.3;
+    this.#sun.intensity = palette.dark ? 2.5 : 2.2;
     if (this.#model) this.setModel(this.#model);
     this.ask();
   }

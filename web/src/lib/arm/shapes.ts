@@ -144,7 +144,7 @@ function linkOf(parent: Group, to: Vector3, aside: number, radius: number, thin:
     // Two axes side by side: a straight tube in the plane of the masses, and a housing at its far end.
     const [from, end] = [new Vector3(0, 0, aside), new Vector3(to.x, to.y, aside)];
     parent.add(tube(from, end, radius * 0.8, Math.max(thin * 0.86, radius * 0.62), material));
-    const back = new Mesh(rounded(thin * 1.0, Math.min(aside, to.z) - thin * 0.8, Math.max(aside, to.z) + thin * 0.8), material);
+    const back = new Mesh(rounded(thin * 0.96, Math.min(aside, to.z) - thin * 0.78, Math.max(aside, to.z) + thin * 0.78), material);
     back.position.set(to.x, to.y, 0);
     parent.add(back);
   } else {

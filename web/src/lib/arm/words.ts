@@ -129,7 +129,7 @@ export function stateWords(controller: Controller, job: string | undefined, miss
         return { ...base, tone: 'hold', word: 'Holding', detail: `Set absent: ${gone.length === 1 ? 'joint' : 'joints'} ${names}. No motion is executed.`, next: 'Joints that are there can be jogged.' };
       }
       if (fastest(controller) > MOVES_RAD_S) return { ...base, tone: 'move', word: 'Moving', detail: job ?? 'Joints are jogged.', next: '' };
-      return { ...base, tone: 'hold', word: 'Holding', detail: job ?? 'The arm is held. Nothing is asked of it.', next: '' };
+      return { ...base, tone: 'hold', word: 'Holding', detail: job ?? 'The arm is held, and can be moved.', next: '' };
     }
     default:
       return { ...base, tone: 'off', word: controller.state, detail: controller.next, next: '' };

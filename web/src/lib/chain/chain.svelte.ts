@@ -71,10 +71,10 @@ export class ChainPage {
   found = $state.raw<JobObject | undefined>(undefined);
 
   readonly #newest = new Map<number, { values: Values; at: number }>();
-  readonly #traces = new Map<number, { names: string; history: History }>();
+  readonly #traces = new Map<number, { names: string; history: History; last: number }>();
   #read = 0;
   #agent = '';
-  #stop: { at: number } | undefined;
+  #stop: { at: number; ran: boolean } | undefined;
   #stopTimer: ReturnType<typeof setTimeout> | undefined;
 
   readonly boards = $derived(this.views.map((view) => view.board));
@@ -140,7 +140,7 @@ export class ChainPage {
 
   async stop(): Promise<void> {
     const at = performance.now();
-    this.#stop = { at };
+    this.#stop = { at, ran: this.runs || this.isRunning || !this.known };
     this.halts += 1;
     this.stopFailed = false;
     this.stopWords = 'Stop is being sent';
@@ -158,12 +158,13 @@ export class ChainPage {
   }
 
   #wordStop(event: Extract<Happening, { kind: 'stopped' }>): void {
-    const { text, failed } = stoppedWords(event);
+    const { text, failed, why } = stoppedWords(event, this.#stop?.ran ?? true);
     if (!this.#stop && !failed) return;
-    const took = this.#stop && !failed && event.boards.length > 0 ? ` ${((performance.now() - this.#stop.at) / 1000).toFixed(1)} s.` : '';
+    const took = this.#stop?.ran && !failed && event.boards.length > 0 ? ` ${((performance.now() - this.#stop.at) / 1000).toFixed(1)} s.` : '';
     this.#stop = undefined;
     this.stopWords = text + took;
     this.stopFailed = failed;
+    if (failed) this.session.toast({ tone: 'error', title: 'Not stopped', text: why });
     clearTimeout(this.#stopTimer);
     if (!failed) this.#stopTimer = setTimeout(() => (this.stopWords = ''), 12_000);
   }
@@ -216,11 +217,13 @@ export class ChainPage {
     const names = values.outputs.map((output) => output.name).join('\n');
     let trace = this.#traces.get(values.board);
     if (!trace || trace.names !== names) {
-      trace = { names, history: new History(values.outputs.length + 1, ROWS) };
+      trace = { names, history: new History(values.outputs.length + 1, ROWS), last: 0 };
       this.#traces.set(values.board, trace);
     }
     const row = values.outputs.map((output) => (typeof output.value === 'number' ? output.value : typeof output.value === 'boolean' ? Number(output.value) : NaN));
-    trace.history.push([Date.now() / 1000 - (values.age_s ?? 0), ...row]);
+    // A message that was long under way does not put a value before an earlier one.
+    trace.last = Math.max(trace.last + 0.001, Date.now() / 1000 - (values.age_s ?? 0));
+    trace.history.push([trace.last, ...row]);
   }
 
   /** Nothing that is known is of now. */
@@ -228,10 +231,10 @@ export class ChainPage {
     this.known = false;
     this.halts += 1;
     // A gap in the plots, and no line over it.
-    for (const { history } of this.#traces.values()) {
-      const row = new Array<number>(history.channels).fill(NaN);
-      row[0] = Date.now() / 1000;
-      history.push(row);
+    for (const trace of this.#traces.values()) {
+      const row = new Array<number>(trace.history.channels).fill(NaN);
+      row[0] = trace.last = Math.max(trace.last + 0.001, Date.now() / 1000);
+      trace.history.push(row);
     }
   }
 
@@ -261,9 +264,12 @@ export class ChainPage {
       case 'stopped':
         if (isNew) this.#wordStop(event);
         break;
-      case 'heartbeat':
-        if (isNew && event.change === 'lost') this.session.toast({ tone: 'error', title: event.board ? `Board ${event.board} is lost` : 'A board is lost', text: 'No heartbeat for 3 s: it may still run.' });
+      case 'heartbeat': {
+        const title = event.board ? `Board ${event.board} is lost` : 'A board is lost';
+        if (isNew && event.change === 'lost') this.session.toast({ tone: 'error', title, text: 'No heartbeat for 3 s: it may still run.' });
+        else this.session.toasts = this.session.toasts.filter((toast) => toast.title !== title);
         break;
+      }
       case 'state': {
         // The inputs and outputs of another start are not those of this one.
         const view = this.view(event.board);
@@ -279,7 +285,8 @@ export class ChainPage {
     if (!job) return;
     if (job.chain) this.found = job;
     const own = this.course?.number === number && this.course.own;
-    if (!own) return;
+    // What was cancelled was cancelled by somebody, and the outcome of an update stands where it was asked for.
+    if (!own || job.stage === 'cancelled' || (job.update && this.tab === 'update')) return;
     if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
     else if (job.stage === 'finished' && !job.chain) this.session.toast({ tone: 'good', title: jobWords(job.what), text: jobResult(job) });
   }

@@ -10,7 +10,7 @@ export interface Wires<T> {
   never(handle: unknown): void;
 }
 
-/** Time between two sent values, ms. */
+/** Time between the answer to one value and the next, ms. */
 export const EVERY_MS = 100;
 
 export class Sender<T> {
@@ -51,7 +51,6 @@ export class Sender<T> {
     const { value } = this.#next;
     this.#next = undefined;
     this.#sending = true;
-    this.#sent = this.#wires.now();
     void this.#wires
       .send(value)
       .catch((error: unknown) => {
@@ -61,6 +60,8 @@ export class Sender<T> {
       })
       .finally(() => {
         this.#sending = false;
+        // From its end: the first one may have taken the lease before it went.
+        this.#sent = this.#wires.now();
         if (!this.#next) this.#wires.changed(false);
         this.#go();
       });

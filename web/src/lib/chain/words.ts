@@ -188,13 +188,16 @@ export function jobResult(job: JobObject): string {
 }
 
 /** What a Stop did, as boards have confirmed it. */
-export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>): { text: string; failed: boolean } {
+export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
   const { boards, not_stopped } = event;
-  const done = boards.length > 0 ? `Stopped: ${boardList(boards)} confirmed it.` : '';
+  const done = boards.length === 0 ? '' : ran ? `Stopped: ${boardList(boards)} confirmed it.` : `Stop was sent. No board was running; ${boardList(boards)} confirmed it.`;
   if (not_stopped.length > 0) {
-    return { text: `NOT STOPPED: ${not_stopped.join('; ')}. Use the emergency stop. ${done}`.trim(), failed: true };
+    // The reasons are long, and what to do comes first.
+    const which = not_stopped.map((each) => /^(board \d+):/.exec(each)?.[1] ?? each);
+    const rest = boards.length === 0 ? 'No board confirmed it.' : `${count(boards.length, 'board')} confirmed it.`;
+    return { text: `NOT STOPPED: ${which.join(', ')}. Use the emergency stop. ${rest}`, failed: true, why: not_stopped.join('; ') };
   }
-  return { text: done || 'Stop was sent. No board was running.', failed: false };
+  return { text: done || 'Stop was sent. No board was running.', failed: false, why: '' };
 }
 
 export type EventTone = 'info' | 'good' | 'warn' | 'error';
@@ -208,8 +211,8 @@ export function eventWords(event: Happening): { text: string; tone: EventTone; o
     case 'halt':
       return line(`Stop by ${event.by}${event.times ? `, ${event.times} times` : ''}`, 'warn', 'Stop');
     case 'stopped': {
-      const { text, failed } = stoppedWords(event);
-      return line(text, failed ? 'error' : 'good', 'Stop');
+      const { text, failed, why } = stoppedWords(event);
+      return line(failed ? `${text} ${why}` : text, failed ? 'error' : 'good', 'Stop');
     }
     case 'heartbeat': {
       const words = { late: 'Heartbeat late', lost: 'Lost: no heartbeat for 3 s', back: 'Heartbeat is back', rebooted: 'Rebooted: it has no number any more' }[event.change] ?? event.change;
@@ -217,7 +220,7 @@ export function eventWords(event: Happening): { text: string; tone: EventTone; o
     }
     case 'loop': {
       const words = { 'left-loop': 'Left its control loop by itself', 'stopped-by-policy': 'Stopped, as another board was lost', 'in-loop': 'In its control loop again' }[event.change] ?? event.change;
-      return line(words, event.change === 'in-loop' ? 'good' : 'error', `board ${event.board}`);
+      return line(words, event.change === 'in-loop' ? 'good' : event.change === 'left-loop' ? 'error' : 'warn', `board ${event.board}`);
     }
     case 'state': {
       const words: Record<string, string> = { exloader: 'Loader, application not started', started: 'Application started', running: 'Control loop runs', programming: 'Being programmed', '?': 'Not known' };

@@ -1,0 +1,126 @@
+// What the tests of a chain's page stand on: an agent with simulated boards, the page in front of it, and a browser.
+import { spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+import { fileURLToPath } from 'node:url';
+
+import { ended, open, startPage, until } from './harness.mjs';
+
+export { ended, startBrowser, until } from './harness.mjs';
+
+const UCOM = process.env.UCOM ?? fileURLToPath(new URL('../../target/debug/ucom', import.meta.url));
+
+function firstLine(child, name) {
+  let errors = '';
+  child.stderr.on('data', (data) => (errors += data));
+  return new Promise((done, fail) => {
+    createInterface({ input: child.stdout }).once('line', done);
+    child.once('exit', (code) => fail(new Error(`${name} ended with ${code}: ${errors}`)));
+  });
+}
+
+/**
+ * An agent in a directory of its own with so many simulated boards. `edges` is a signal table; with `separate` the boards are a process of their own, which
+ * takes faults by `fault`.
+ */
+export async function startChain({ boards = 3, edges = undefined, separate = false } = {}) {
+  const dir = mkdtempSync(join(tmpdir(), 'openjtc-chain-'));
+  const tokenFile = join(dir, 'tokens.toml');
+  const env = { ...process.env, XDG_STATE_HOME: dir, XDG_CACHE_HOME: dir };
+  let bus = ['--sim', '--boards', String(boards)];
+  let sim;
+  if (separate) {
+    sim = spawn(UCOM, ['sim', '--boards', String(boards), '--listen', '127.0.0.1:0', '--json'], { cwd: dir, env });
+    const ready = await firstLine(sim, 'ucom sim');
+    bus = ['--bus', /socketcand:[^"\s]+/.exec(ready)[0]];
+  }
+  if (edges) writeFileSync(join(dir, 'ucom-edges.toml'), edges);
+  const child = spawn(UCOM, ['serve', ...bus, '--listen', '127.0.0.1:0', '--token-file', tokenFile, '--json'], { cwd: dir, env });
+  const { url } = JSON.parse(await firstLine(child, 'ucom serve'));
+  await until('there are tokens', () => existsSync(tokenFile));
+  const tokens = readFileSync(tokenFile, 'utf8');
+  const token = (role) => new RegExp(`${role} = "([^"]+)"`).exec(tokens)[1];
+  const gone = new Promise((done) => child.once('exit', done));
+  const agent = {
+    url,
+    dir,
+    operator: token('operator'),
+    viewer: token('viewer'),
+    kill: () => child.kill('SIGKILL'),
+    fault: (line) => sim.stdin.write(`${line}\n`),
+    async end() {
+      child.kill('SIGKILL');
+      sim?.kill('SIGKILL');
+      await gone;
+      rmSync(dir, { recursive: true, force: true });
+    },
+    async ask(method, path, body, key) {
+      const headers = { Authorization: `Bearer ${token('operator')}`, 'Content-Type': 'application/json' };
+      if (key) headers['Lease-Key'] = key;
+      const response = await fetch(url + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+      const text = await response.text();
+      return { status: response.status, body: text ? JSON.parse(text) : undefined };
+    },
+    /** Does a job as another client, which then lets the lease go: what it has started runs on. */
+    async job(path, body = {}) {
+      const grant = await agent.ask('POST', '/api/lease', { name: 'test', policy: 'continue', lasts_s: 60 });
+      const { key } = grant.body;
+      const begun = await agent.ask('POST', path, body, key);
+      const job = await ended(agent, begun.body.number);
+      await until('the lease is free', async () => (await agent.ask('DELETE', '/api/lease', undefined, key)).status !== 409);
+      return job;
+    },
+    board: async (number) => (await agent.ask('GET', `/api/boards/${number}`)).body,
+  };
+  return agent;
+}
+
+/** An agent with its page, for one test; `look` opens it in a browser of its own. `direct`: as the agent serves it itself. */
+export async function stage(browser, { direct = false, mock = undefined, ...options } = {}) {
+  const agent = await startChain(options);
+  const site = direct ? { url: agent.url, end: async () => {} } : await startPage(agent, mock);
+  const contexts = [];
+  return {
+    agent,
+    site,
+    async look({ token = 'operator', ...rest } = {}) {
+      const word = token === 'none' ? '' : `#token=${agent[token] ?? token}`;
+      const page = await open(browser, `${site.url}/${direct ? '' : 'chain.html'}${word}`, rest);
+      contexts.push(page.context());
+      return page;
+    },
+    async end() {
+      for (const context of contexts) await context.close();
+      await site.end();
+      await agent.end();
+    },
+  };
+}
+
+/** What the page says of the bus. */
+export function state(page) {
+  return page.locator('section[aria-label="State"]');
+}
+
+export const card = (page, number) => page.getByRole('button', { name: new RegExp(`^Board ${number} `) });
+
+/** Any bytes are a program for a simulated board. */
+export function image(bytes) {
+  return Buffer.from(Array.from({ length: bytes }, (_, i) => (37 * i + 11) & 0xff));
+}
+
+export const EDGES = `[[program]]
+program_id = PROGRAM
+name = "neck"
+[program.ci]
+set_position = { scale = 0.01, unit = "deg", min = -60, max = 60 }
+stiffness = { scale = 0.1, unit = "%", min = 0, max = 100 }
+[program.so]
+position = { scale = 0.01, unit = "deg" }
+velocity = { scale = 0.1, unit = "deg/s" }
+current = { unit = "mA" }
+temperature = { scale = 0.1, unit = "°C" }
+reference = { scale = 0.01, unit = "deg" }
+`;

@@ -24,9 +24,9 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     assert_eq!(anna.over(job)["stage"], "finished");
     assert!(blocks(&served) > before, "it records");
     // Two at once: one of them reads it, and the other is refused or reads it when that is over. Others are served meanwhile.
-    let viewer = served.tokens.viewer.clone();
+    let (viewer, operator) = (&served.tokens.viewer, &served.tokens.operator);
     let files = std::thread::scope(|scope| {
-        let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(&viewer), "GET /api/log")));
+        let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(operator), "GET /api/log")));
         assert_eq!(served.get("POST /api/pause").0, 200);
         assert_eq!(served.api("GET /api/info", None, None).0, 200);
         both.map(|one| one.join().expect("an answer"))
@@ -51,14 +51,17 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let said: Vec<&str> = account.story.events.iter().map(|event| event.text.as_str()).collect();
     assert!(said.iter().any(|text| text.contains("HoldPos")), "{said:?}");
 
-    // Nobody else clears it.
-    for (token, key) in [(&served.tokens.viewer, None), (&served.tokens.operator, None)] {
+    // Nobody else reads or clears it.
+    assert_eq!(served.api_as(Some(viewer), "GET /api/log", None, None).0, 403);
+    let mut looks = served.session("bob", Some(viewer));
+    assert!(looks.log_status().is_ok() && looks.fetch_log(|_, _| {}).is_err());
+    for (token, key) in [(viewer, None), (operator, None)] {
         assert_eq!(served.api_as(Some(token), "DELETE /api/log", key, None).0, 403);
     }
     assert_eq!(served.api_as(None, "DELETE /api/log", Some(&anna.key), None).0, 403);
     assert_eq!(anna.ask("DELETE /api/log", None).0, 204);
     text_with(&served.log, &["\"clear log\""]);
-    let (_, _, file) = served.bytes_as(None, "GET /api/log");
+    let (_, _, file) = served.bytes_as(Some(operator), "GET /api/log");
     std::fs::write(&path, &file).expect("a file");
     if let Ok(log) = FlightLog::load(&path) {
         let again = Account::of(log, None, "the test");

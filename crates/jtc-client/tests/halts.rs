@@ -9,6 +9,7 @@ use common::Served;
 use common::program::{Program, WAIT};
 use jtc_host::arm::AVENA_TOML;
 use serde_json::{Value, json};
+use test_kit::written::text_with;
 
 fn positions(served: &Served) -> Vec<f64> {
     let (_, status) = served.api("GET /api/status", None, None);
@@ -70,31 +71,19 @@ fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
     let served = Served::start(115_200);
     let text =
         AVENA_TOML.replacen("name = \"avena\"", "name = \"other\"", 1) + "\n[settings]\nstop_ms = 400\n";
-    let mut named = 0;
-    for after_ms in [60, 150, 300] {
-        let anna = Program::new(&served, "anna", 60.0, "continue");
-        let (status, job) = anna.ask("PUT /api/arm", Some(json!({ "text": text })));
-        assert_eq!(status, 202, "{job}");
-        std::thread::sleep(Duration::from_millis(after_ms));
-        assert_eq!(served.get("POST /api/stop").0, 200);
-        let done = anna.over(job["number"].as_u64().expect("a number"));
-        assert_eq!(
-            (&done["stage"], &done["error"]["code"]),
-            (&json!("stopped"), &json!("stopped")),
-            "after {after_ms} ms: {done}"
-        );
-        let message = done["error"]["message"].as_str().expect("words");
-        let given = &done["given"];
-        if given["named"] == true {
-            named += 1;
-            assert!(message.contains("in use already") && message.contains("its name"), "{done}");
-        }
-        let (_, status) = served.api("GET /api/status", None, None);
-        assert_eq!(status["controller"]["state"], "Init", "it has no torque: {done}");
-        assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
-        std::thread::sleep(Duration::from_millis(3_200));
-    }
-    assert!(named > 0, "none of the Stops came behind the name");
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    let (status, job) = anna.ask("PUT /api/arm", Some(json!({ "text": text })));
+    assert_eq!(status, 202, "{job}");
+    text_with(&served.log, &["SetSettings"]);
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    let done = anna.over(job["number"].as_u64().expect("a number"));
+    assert_eq!((&done["stage"], &done["error"]["code"]), (&json!("stopped"), &json!("stopped")), "{done}");
+    // They were on the line before the Stop, and what the controller has of an arm is not taken back.
+    let (message, given) = (done["error"]["message"].as_str().expect("words"), &done["given"]);
+    assert!(message.contains("in use already: one setting"), "{done}");
+    assert_eq!(message.contains("its name"), given["named"] == true, "{done}");
+    let (_, status) = served.api("GET /api/status", None, None);
+    assert_eq!(status["controller"]["state"], "Init", "it has no torque: {done}");
 }
 
 #[test]

@@ -26,8 +26,10 @@ impl Given {
     /// What is in use of an arm that was not given whole, in words.
     fn in_use(&self) -> Option<String> {
         let mut parts = Vec::new();
-        if self.settings > 0 {
-            parts.push(format!("{} settings", self.settings));
+        match self.settings {
+            0 => {}
+            1 => parts.push("one setting".to_owned()),
+            n => parts.push(format!("{n} settings")),
         }
         if self.named {
             parts.push("its name".to_owned());

@@ -1,5 +1,5 @@
 //! What a frame of a host may do, and who may send it.
-use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, Response};
+use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, Response};
 
 /// What a frame of a host does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +51,12 @@ impl HostFrame {
         let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
         let (frame_type, class) = (frame.frame_type, Class::of(frame));
         Some(Self { bytes, frame_type, class })
+    }
+
+    /// It reads the log of the flight recorder, which records nothing meanwhile (J-56): not for everyone who may look.
+    pub fn reads_log(&self) -> bool {
+        let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
+        matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
     }
 
     /// The frame that a device returns to it beside the record.

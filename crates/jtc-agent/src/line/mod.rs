@@ -240,9 +240,8 @@ impl SharedLine {
         {
             return self.refuse(id, &frame, denied);
         }
-        // Reading the log holds up what it records: not for everyone who may look.
         let viewer = self.introduction(id).is_some_and(|client| client.role == Role::Viewer);
-        if frame.frame_type == FrameType::GetLog && viewer {
+        if viewer && frame.reads_log() {
             return self.refuse(id, &frame, Denied::Viewer);
         }
         if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.wait(frame)) {

@@ -162,7 +162,7 @@ export function startBrowser() {
 /** An agent with its page, for one test; `look` opens it in a browser of its own. */
 export async function stage(browser, options = {}) {
   const agent = await startAgent(options);
-  const site = options.direct ? { url: agent.url, end: async () => {} } : await startPage(agent, options.mock);
+  const site = process.env.DIRECT ? { url: agent.url, end: async () => {} } : await startPage(agent, options.mock);
   const contexts = [];
   return {
     agent,

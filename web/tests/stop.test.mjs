@@ -131,6 +131,8 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   await recover(agent);
   const page = await look();
   await state(page).getByText('Holding').waitFor();
+  // A picture that is drawn for the first time keeps a computer without graphics busy.
+  await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0), 20_000);
   agent.suspend();
   await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
   agent.wake();

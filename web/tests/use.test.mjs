@@ -250,7 +250,7 @@ on('an error is said with its cause, explained, and recovered from', { faults: '
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
   await page.getByText('Passed the check').waitFor();
   await page.getByRole('button', { name: /^Run/ }).click();
-  await state(page).getByText('Error', { exact: true }).waitFor({ timeout: 20_000 });
+  await state(page).getByText('Error', { exact: true }).waitFor({ timeout: 60_000 });
   await page.getByRole('alert').first().waitFor();
   await state(page).getByRole('button', { name: 'Explain' }).click();
   const page_ = page.getByRole('dialog');

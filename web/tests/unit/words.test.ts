@@ -3,13 +3,13 @@ import { test } from 'node:test';
 
 import { explained } from '../../src/lib/arm/explain.ts';
 import type { Controller } from '../../src/lib/arm/types.ts';
-import { causesOf, codeOf, eventWords, isHeld, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
+import { causesOf, eventWords, isHeld, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
 import { angle, duration, number, parse } from '../../src/lib/format.ts';
 import { deviceKind, takesText } from '../../src/lib/keys.ts';
 
 function controller(change: Partial<Controller> = {}): Controller {
-  const joints = Array.from({ length: 6 }, (_, i) => ({ joint: i + 1, state: 'OperationEnable', errors: [] as string[], velocity_rad_s: 0, position_rad: 0 }));
-  return { state: 'HoldPos', trajectory: 'Null', point: 0, errors: [], errors_occurred: [], next: '', joints, ...change };
+  const joints = Array.from({ length: 6 }, (_, i) => ({ joint: i + 1, state: 'OperationEnable', errors: [] as string[], error_codes: [] as string[], velocity_rad_s: 0, position_rad: 0 }));
+  return { state: 'HoldPos', trajectory: 'Null', point: 0, errors: [], error_codes: [], causes: [], errors_occurred: [], next: '', joints, ...change };
 }
 
 test('each state has a word, and says what leads on', () => {
@@ -20,7 +20,7 @@ test('each state has a word, and says what leads on', () => {
     [{ state: 'Teaching' }, 'Teaching', 'teach'],
     [{ state: 'Init' }, 'No torque', 'off'],
     [{ state: 'Error' }, 'Error', 'error'],
-    [{ errors: ['emergency input'] }, 'Error', 'error'],
+    [{ errors: ['emergency input'], causes: ['emergency input'] }, 'Error', 'error'],
   ];
   for (const [change, word, tone] of cases) {
     const words = stateWords(controller(change), undefined, []);
@@ -39,16 +39,10 @@ test('held is held only when every drive is enabled', () => {
   assert.ok(isHeld(controller()));
 });
 
-test('the most particular cause stands first, sums last; codes go to explain', () => {
-  const wrong = controller({ errors: ['external error', 'emergency input'] });
-  const [third] = wrong.joints.slice(2);
-  if (third) third.errors = ['torque'];
-  const causes = causesOf(wrong);
-  assert.deepEqual(causes.map((cause) => cause.words), ['Joint 3: torque', 'emergency input', 'external error']);
-  assert.equal(causes[1]?.code, 'emergency-input');
-  assert.equal(codeOf('internal CAN error'), 'internal-can-error');
-  const named = controller({ errors: ['x'], error_codes: ['joint-torque'] });
-  assert.equal(causesOf(named)[0]?.code, 'joint-torque');
+test('the first cause is the detail, and each goes to explain as it is', () => {
+  const wrong = controller({ state: 'Error', causes: ['joint 3: torque', 'emergency input'] });
+  assert.deepEqual(causesOf(wrong)[0], { words: 'Joint 3: torque', code: 'joint 3: torque' });
+  assert.equal(stateWords(wrong, undefined, []).detail, 'Joint 3: torque. All torques are off.');
 });
 
 test('what Stop did is said in words', () => {

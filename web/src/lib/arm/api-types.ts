@@ -44,6 +44,40 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/arm/defaults": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Has the controller use the arm that is built into it, or stored: friction, gains and model. In Init it holds the arm then. */
+        post: operations["use_default_arm"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/arm/model": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Frames, limits and masses of the arm in use. The controller is asked when its arm may have changed, and once in a while. */
+        get: operations["get_arm_model"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/clear": {
         parameters: {
             query?: never;
@@ -53,7 +87,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Clears the errors of the controller and of all drives. */
+        /**
+         * Clears the errors of the controller and of all drives, or of those that are named.
+         * @description Of all drives also those that have occurred; where some are named their current ones, and those of the controller itself.
+         */
         post: operations["clear"];
         delete?: never;
         options?: never;
@@ -78,6 +115,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/doctor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Looks for what is wrong with link, joint bus and set-up, which takes two seconds. Nothing is changed.
+         * @description The link is judged by all that came from the controller. Other rates are not tried: the line is in use.
+         */
+        get: operations["examine"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/events": {
         parameters: {
             query?: never;
@@ -87,6 +144,40 @@ export interface paths {
         };
         /** What has happened behind a number: after a lost connection, ask on from the last one. */
         get: operations["get_events"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/explain": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All pages. */
+        get: operations["list_codes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/explain/{code}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The page about a code. */
+        get: operations["explain"];
         put?: never;
         post?: never;
         delete?: never;
@@ -155,6 +246,26 @@ export interface paths {
         };
         /** A job, while it goes on and afterwards. */
         get: operations["get_job"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/jobs/{number}/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The report of the last motion of a job that is over, as `jtc traj run` writes it: a page with figures and plots.
+         * @description It is made of the statuses that came while the motion went on. The reports of the last 16 jobs are kept, within 64 MB.
+         */
+        get: operations["get_report"];
         put?: never;
         post?: never;
         delete?: never;
@@ -247,7 +358,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Moves the arm from where it stands to joint positions: a job. */
+        /** Moves the arm from where it stands to joint positions, a named pose or a pose of the flange: a job. */
         post: operations["move_to"];
         delete?: never;
         options?: never;
@@ -307,6 +418,41 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/poses": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All named poses. */
+        get: operations["list_poses"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/poses/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /** Saves a pose, in place of what was saved under this name. */
+        put: operations["put_pose"];
+        post?: never;
+        /** Keeps a pose no more that was saved. */
+        delete: operations["delete_pose"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recover": {
         parameters: {
             query?: never;
@@ -318,6 +464,23 @@ export interface paths {
         put?: never;
         /** Leads the controller back to a held arm, whatever its state is: a job. */
         post: operations["recover"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/reset": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Has nodes of the joint bus start anew. Where the arm moves no joint does. */
+        post: operations["reset"];
         delete?: never;
         options?: never;
         head?: never;
@@ -383,7 +546,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        get?: never;
+        /** The speed on the path, as the controller has it. */
+        get: operations["get_speed"];
         /** Another speed on the path, now. */
         put: operations["set_speed"];
         post?: never;
@@ -496,6 +660,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/trajectories/{number}/points": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Points of a trajectory, to draw it. */
+        get: operations["get_points"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/metrics": {
         parameters: {
             query?: never;
@@ -583,8 +764,27 @@ export interface components {
             /** @description What is wrong, worst first. */
             problems: components["schemas"]["ProblemObject"][];
         };
+        /** @description Nodes whose errors are cleared. */
+        ClearRequest: {
+            /** @description The gripper. */
+            gripper?: boolean;
+            /** @description Joints, 1 to 6 from the base. */
+            joints?: number[];
+        };
         /** @description What the controller reports. */
         ControllerObject: {
+            /**
+             * @description What is wrong, the most particular first, with the joint of each: also what its drive reports. `GET /api/explain/{code}` takes them as
+             *     they are.
+             */
+            causes: string[];
+            /**
+             * @description Where the joints are commanded to be, rad, from the base; missing where the agent does not know: no trajectory that was sent through
+             *     it is executed.
+             */
+            commanded_rad?: number[] | null;
+            /** @description Names of their pages, in the same order: `GET /api/explain/{code}`. */
+            error_codes: string[];
             /** @description Errors now. */
             errors: string[];
             /** @description Errors since they were cleared last. */
@@ -602,6 +802,23 @@ export interface components {
             state: string;
             /** @description What becomes of the trajectory. */
             trajectory: string;
+        };
+        /** @description What was found. */
+        DoctorObject: {
+            /** @description Worst first. */
+            findings: components["schemas"]["FindingObject"][];
+            /** @description Nothing is a problem. */
+            healthy: boolean;
+            /**
+             * Format: double
+             * @description How long was listened, s.
+             */
+            listened_s: number;
+            /**
+             * Format: u-int64
+             * @description Statuses that came meanwhile.
+             */
+            statuses: number;
         };
         /** @description Why something was not done. */
         ErrorObject: {
@@ -663,12 +880,41 @@ export interface components {
             /** @description Some that were asked for are not kept any more. */
             missed: boolean;
         };
+        /** @description A finding. */
+        FindingObject: {
+            /** @description What helps; empty where nothing is to be done. */
+            next: string;
+            /** @description `problem`, `warning` or `good`. */
+            severity: string;
+            /** @description What it is. */
+            what: string;
+            /** @description What usually causes it; empty where nothing is known. */
+            why: string;
+        };
+        /** @description A pose of the flange in the frame of the base. */
+        FlangeObject: {
+            /** @description Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad. */
+            rpy_rad: number[];
+            /** @description x, y, z, m. */
+            xyz_m: number[];
+        };
+        /** @description Where a frame is. */
+        FrameObject: {
+            /** @description Roll, pitch, yaw, rad. */
+            origin_rpy_rad: number[];
+            /** @description x, y, z, m. */
+            origin_xyz_m: number[];
+        };
         /** @description What the controller was given. */
         GivenObject: {
             /** @description Hash of the arm, where all of it was read back and nothing differs. */
             hash?: string | null;
+            /** @description The controller has the arm's name. */
+            named: boolean;
             /** @description Friction, gains and model, as far as they were confirmed. */
             parts: components["schemas"]["PartObject"][];
+            /** @description So many settings have changed. */
+            settings: number;
             /**
              * Format: u-int32
              * @description Its number in the memory that lasts.
@@ -899,6 +1145,8 @@ export interface components {
              * @description Its number.
              */
             number: number;
+            /** @description Where the report of its last motion is, a page; missing where it has moved nothing, or later ones have taken its place. */
+            report?: string | null;
             result?: components["schemas"]["ResultObject"] | null;
             /**
              * Format: u-int32
@@ -917,6 +1165,8 @@ export interface components {
         };
         /** @description What the controller reports of a joint. */
         JointObject: {
+            /** @description Names of their pages, in the same order. */
+            error_codes: string[];
             /** @description Errors that the controller has found at it. */
             errors: string[];
             /**
@@ -1087,18 +1337,107 @@ export interface components {
             /** @description In words: it records, or why it has stopped. */
             state: string;
         };
-        /** @description A move from where the arm stands. */
+        /** @description A joint: where it is, and its limits. */
+        ModelJoint: {
+            /**
+             * Format: double
+             * @description Highest acceleration, rad/s².
+             */
+            acceleration_max_rad_s2: number;
+            /**
+             * Format: u-int8
+             * @description Which, 1 to 6 from the base.
+             */
+            joint: number;
+            /** @description Its name. */
+            name: string;
+            /** @description How it is turned there: roll, pitch, yaw about fixed axes, as in a URDF, rad. */
+            origin_rpy_rad: number[];
+            /** @description Where its frame is in that of the joint before it, at position 0: x, y, z, m. */
+            origin_xyz_m: number[];
+            /**
+             * Format: double
+             * @description Highest position, rad.
+             */
+            position_max_rad: number;
+            /**
+             * Format: double
+             * @description Lowest position, rad.
+             */
+            position_min_rad: number;
+            /**
+             * Format: double
+             * @description Highest torque, N·m.
+             */
+            torque_max_nm: number;
+            /**
+             * Format: double
+             * @description Highest speed, rad/s.
+             */
+            velocity_max_rad_s: number;
+        };
+        /** @description A link. */
+        ModelLink: {
+            /** @description Centre of mass, m. */
+            com_xyz_m: number[];
+            /**
+             * Format: double
+             * @description kg.
+             */
+            mass_kg: number;
+            /** @description Its name. */
+            name: string;
+        };
+        /** @description The arm in use. */
+        ModelObject: {
+            /** @description The flange, which does not move, in the frame of joint 6. */
+            flange: components["schemas"]["FrameObject"];
+            /** @description Acceleration of gravity in the frame of the base, m/s². */
+            gravity_m_s2: number[];
+            /** @description Hash of all that decides how the arm moves; missing where the agent's arm lacks a part of that. */
+            hash?: string | null;
+            /** @description Joints, from the base. Each rotates about the z axis of its frame. */
+            joints: components["schemas"]["ModelJoint"][];
+            /** @description Links: the base, and behind each joint the one that it moves, in whose frame its numbers are. */
+            links: components["schemas"]["ModelLink"][];
+            /** @description Its name. */
+            name: string;
+            /** @description Whose it is. */
+            source: components["schemas"]["ModelSource"];
+        };
+        /**
+         * @description Whose arm it is.
+         * @enum {string}
+         */
+        ModelSource: "controller" | "agent";
+        /** @description A move from where the arm stands, to one of the three places. */
         MoveRequest: {
             /** @description The controller cannot be asked for its limits, and those that are built into it are safe for this arm. */
             accept_device_limits?: boolean;
+            /** @description The flange keeps to a straight line. */
+            line?: boolean;
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: double
              * @description % of what the limits allow.
              */
             speed_percent?: number;
-            /** @description rad, base to wrist. */
-            to_rad: number[];
+            to_flange?: components["schemas"]["FlangeObject"] | null;
+            /** @description A named pose, of those that `GET /api/poses` lists. */
+            to_pose?: string | null;
+            /** @description Joint positions, rad, base to wrist. */
+            to_rad?: number[] | null;
+        };
+        /** @description A page about a code. */
+        PageObject: {
+            /** @description Other pages that fit what was asked for. */
+            also?: string[];
+            /** @description Name of the code, unique: as in `error_codes` of the status. */
+            code: string;
+            /** @description What it means, what usually causes it, what to do, the next command: as `jtc explain` prints it. */
+            text: string;
+            /** @description As it stands on a screen. */
+            title: string;
         };
         /** @description A part that the controller confirmed. */
         PartObject: {
@@ -1192,11 +1531,51 @@ export interface components {
             /** @description Waypoints in a form that `jtc plan` takes: CSV with the columns q1 to q6, or x, y, z with an orientation, or pose; or JSON. At most 500. */
             waypoints: string;
         };
+        /** @description A trajectory to draw. */
+        PointsObject: {
+            /**
+             * Format: double
+             * @description s.
+             */
+            duration_s: number;
+            /** @description What people call it. */
+            name: string;
+            /**
+             * Format: u-int16
+             * @description Its number.
+             */
+            number: number;
+            /** @description Where the joints are at each of them, from the base, rad. */
+            positions_rad: number[][];
+            /** @description Times of the points, s. */
+            times_s: number[];
+        };
         /**
          * @description What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
          * @enum {string}
          */
         Policy: "continue" | "pause" | "stop";
+        /**
+         * @description Where a pose is kept.
+         * @enum {string}
+         */
+        PoseFrom: "arm file" | "agent";
+        /** @description A named pose. */
+        PoseObject: {
+            /** @description Where it is kept. */
+            from: components["schemas"]["PoseFrom"];
+            /** @description Its name. */
+            name: string;
+            /** @description Where the joints are, from the base, rad. */
+            positions_rad: number[];
+            /** @description Why no motion leads there, in words; missing where one may. */
+            warning?: string | null;
+        };
+        /** @description Where a pose is. */
+        PoseRequest: {
+            /** @description rad, from the base; missing: where the arm stands now. */
+            positions_rad?: number[] | null;
+        };
         /** @description A thing that is wrong with a trajectory. */
         ProblemObject: {
             /**
@@ -1228,8 +1607,25 @@ export interface components {
         };
         /** @description The way back to a held arm. */
         RecoverRequest: {
+            /** @description The controller uses other limits than this arm has, and they are safe for it. */
+            accept_device_limits?: boolean;
+            /** @description The text of an arm file, or of a robot description: the controller is given its friction, gains and model. Not beside `defaults`. */
+            arm?: string | null;
             /** @description Where the controller has not been given its arm: let it use its defaults, the stored arm where there is one. */
             defaults?: boolean;
+        };
+        /** @description A page that opens in a browser, and needs nothing else. */
+        ReportPage: string;
+        /** @description Nodes that start anew. */
+        ResetRequest: {
+            /** @description All joints and the gripper. */
+            all?: boolean;
+            /** @description Also where the arm has torque: somebody supports it, or it may fall. */
+            arm_may_fall?: boolean;
+            /** @description The gripper. */
+            gripper?: boolean;
+            /** @description Joints, 1 to 6 from the base. */
+            joints?: number[];
         };
         /** @description Figures of a motion. */
         ResultObject: {
@@ -1430,10 +1826,15 @@ export type ArmObject = components['schemas']['ArmObject'];
 export type ArmRequest = components['schemas']['ArmRequest'];
 export type BoundObject = components['schemas']['BoundObject'];
 export type CheckObject = components['schemas']['CheckObject'];
+export type ClearRequest = components['schemas']['ClearRequest'];
 export type ControllerObject = components['schemas']['ControllerObject'];
+export type DoctorObject = components['schemas']['DoctorObject'];
 export type ErrorObject = components['schemas']['ErrorObject'];
 export type EventObject = components['schemas']['EventObject'];
 export type EventsObject = components['schemas']['EventsObject'];
+export type FindingObject = components['schemas']['FindingObject'];
+export type FlangeObject = components['schemas']['FlangeObject'];
+export type FrameObject = components['schemas']['FrameObject'];
 export type GivenObject = components['schemas']['GivenObject'];
 export type Happening = components['schemas']['Happening'];
 export type InfoObject = components['schemas']['InfoObject'];
@@ -1449,14 +1850,25 @@ export type LeaseRequest = components['schemas']['LeaseRequest'];
 export type LeaseState = components['schemas']['LeaseState'];
 export type LogFile = components['schemas']['LogFile'];
 export type LogStatusObject = components['schemas']['LogStatusObject'];
+export type ModelJoint = components['schemas']['ModelJoint'];
+export type ModelLink = components['schemas']['ModelLink'];
+export type ModelObject = components['schemas']['ModelObject'];
+export type ModelSource = components['schemas']['ModelSource'];
 export type MoveRequest = components['schemas']['MoveRequest'];
+export type PageObject = components['schemas']['PageObject'];
 export type PartObject = components['schemas']['PartObject'];
 export type PayloadObject = components['schemas']['PayloadObject'];
 export type PlanObject = components['schemas']['PlanObject'];
 export type PlanRequest = components['schemas']['PlanRequest'];
+export type PointsObject = components['schemas']['PointsObject'];
 export type Policy = components['schemas']['Policy'];
+export type PoseFrom = components['schemas']['PoseFrom'];
+export type PoseObject = components['schemas']['PoseObject'];
+export type PoseRequest = components['schemas']['PoseRequest'];
 export type ProblemObject = components['schemas']['ProblemObject'];
 export type RecoverRequest = components['schemas']['RecoverRequest'];
+export type ReportPage = components['schemas']['ReportPage'];
+export type ResetRequest = components['schemas']['ResetRequest'];
 export type ResultObject = components['schemas']['ResultObject'];
 export type Role = components['schemas']['Role'];
 export type RunRequest = components['schemas']['RunRequest'];
@@ -1958,6 +2370,193 @@ export interface operations {
             };
         };
     };
+    use_default_arm: {
+        parameters: {
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
+                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 */
+                asked_after?: number;
+            };
+            header: {
+                /** @description Key of the lease */
+                "Lease-Key": string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It uses them */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    get_arm_model: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The arm that the controller has, or the agent's */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ModelObject"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
     clear: {
         parameters: {
             query?: never;
@@ -1968,7 +2567,11 @@ export interface operations {
             path?: never;
             cookie?: never;
         };
-        requestBody?: never;
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["ClearRequest"] | null;
+            };
+        };
         responses: {
             /** @description They are cleared; those that last come again */
             204: {
@@ -2194,6 +2797,123 @@ export interface operations {
             };
         };
     };
+    examine: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description What was found */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DoctorObject"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
     get_events: {
         parameters: {
             query?: {
@@ -2239,6 +2959,144 @@ export interface operations {
             };
             /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    list_codes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page for each code */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PageObject"][];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    explain: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of a code, or what `jtc explain` takes: the words that a screen shows, a number as `can:0x100`, words of a name */
+                code: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page that fits best */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PageObject"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Nothing is known about that */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2629,6 +3487,90 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    get_report: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Number of the job */
+                number: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": components["schemas"]["ReportPage"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description There is none */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The job goes on */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
             };
             /** @description Too many wrong tokens came */
             429: {
@@ -4045,6 +4987,320 @@ export interface operations {
             };
         };
     };
+    list_poses: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description By name */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PoseObject"][];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    put_pose: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description A letter, then letters, digits, _, - and ., 64 at most */
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["PoseRequest"] | null;
+            };
+        };
+        responses: {
+            /** @description The pose, to a millionth of a radian */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PoseObject"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    delete_pose: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Its name */
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is gone */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description There is none */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
     recover: {
         parameters: {
             query?: {
@@ -4075,6 +5331,128 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["JobObject"];
                 };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    reset: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description Key of the lease */
+                "Lease-Key": string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ResetRequest"];
+            };
+        };
+        responses: {
+            /** @description They start anew, and are brought up again */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description What was asked cannot be read */
             400: {
@@ -4568,6 +5946,123 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    get_speed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description 100: that of the trajectory; also where the controller knows no other */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SpeedObject"];
+                };
             };
             /** @description What was asked cannot be read */
             400: {
@@ -5389,6 +6884,138 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CheckObject"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description There is none */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
+    get_points: {
+        parameters: {
+            query?: {
+                /** @description Most points: of more of them some are left out, evenly, and never the first and the last. */
+                most?: number;
+            };
+            header?: never;
+            path: {
+                /** @description 1 to 99 */
+                number: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Times and joint positions */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointsObject"];
                 };
             };
             /** @description What was asked cannot be read */

@@ -1,5 +1,5 @@
 // What the controller reports, in words: what is, why, and what leads on.
-import type { Controller, Happening, Joint } from './types.ts';
+import type { Controller, Happening } from './types.ts';
 import { count, duration } from '../format.ts';
 
 /** A state's colour and shape; each shape is another one, for those who do not see colours. */
@@ -24,29 +24,9 @@ export interface StateWords {
   step?: Step;
 }
 
-/** "emergency input" is explained as `emergency-input`. */
-export function codeOf(words: string): string {
-  return words.trim().toLowerCase().replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '');
-}
-
-function paired(words: readonly string[], codes: readonly string[] | undefined): Cause[] {
-  return words.map((each, i) => ({ words: each, code: codes?.[i] ?? codeOf(each) }));
-}
-
-/** The bits that only sum up others. */
-const SUMS = new Set([
-  'internal error', 'external error', 'internal joint error', 'internal joints error', 'external joint error', 'external joints error',
-  'emergency output',
-]);
-
-/** What is wrong now, the most particular first. */
+/** What is wrong now, the most particular first. `explain` takes each as it is. */
 export function causesOf(controller: Controller): Cause[] {
-  const ofJoints = controller.joints.flatMap((joint) =>
-    paired(joint.errors, joint.error_codes).map(({ words, code }) => ({ words: `Joint ${joint.joint}: ${words}`, code })),
-  );
-  const own = paired(controller.errors, controller.error_codes);
-  const sums = own.filter((cause) => SUMS.has(cause.words));
-  return [...ofJoints, ...own.filter((cause) => !SUMS.has(cause.words)), ...sums];
+  return controller.causes.map((words) => ({ words: words.charAt(0).toUpperCase() + words.slice(1), code: words }));
 }
 
 /** Joints that are set absent: under torque no other drive is in Start. */
@@ -79,7 +59,7 @@ export function isPaused(controller: Controller | null | undefined): boolean {
 
 /** Fastest joint, rad/s. */
 export function fastest(controller: Controller): number {
-  return Math.max(...controller.joints.map((joint: Joint) => Math.abs(joint.velocity_rad_s ?? 0)));
+  return Math.max(...controller.joints.map((joint) => Math.abs(joint.velocity_rad_s ?? 0)));
 }
 
 const MOVES_RAD_S = 0.01;

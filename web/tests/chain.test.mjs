@@ -306,6 +306,10 @@ test('Stop stands at one place on every tab and in dialogs', () =>
 test('no width scrolls sideways, and axe finds nothing, light and dark', () =>
   on({ boards: 3, edges: EDGES.replace('PROGRAM', '0x8676') }, async ({ agent, look }) => {
     await running(agent, [1, 2], true);
+    const flaws = async (page, where) => {
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      assert.deepEqual(violations.map((each) => `${where}: ${each.id}: ${each.nodes.map((node) => node.html.slice(0, 160)).join(' | ')}`), []);
+    };
     for (const [width, colorScheme] of [[360, 'light'], [800, 'dark'], [1400, 'light'], [1400, 'dark'], [2560, 'light']]) {
       const page = await look({ viewport: { width, height: 900 }, colorScheme });
       await state(page).getByText('2 boards are active').waitFor();
@@ -315,8 +319,37 @@ test('no width scrolls sideways, and axe finds nothing, light and dark', () =>
         await page.waitForTimeout(200);
         const over = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
         assert.ok(over <= 0, `${width} ${tab}: ${over} px too wide`);
-        const { violations } = await new AxeBuilder({ page }).analyze();
-        assert.deepEqual(violations.map((each) => `${tab} ${width} ${colorScheme}: ${each.id}: ${each.nodes.map((node) => node.html.slice(0, 160)).join(' | ')}`), []);
+        await flaws(page, `${tab} ${width} ${colorScheme}`);
       }
+      if (width < 1000) await page.click('#tab-boards');
+      for (const name of ['Number …', 'Run …', 'Nobody commands']) {
+        await page.getByRole('button', { name }).click();
+        await page.getByRole('dialog').waitFor();
+        await flaws(page, `${name} ${width} ${colorScheme}`);
+        await page.keyboard.press('Escape');
+        await page.getByRole('dialog').waitFor({ state: 'detached' });
+      }
+      await page.click('#tab-board');
+      await page.getByRole('button', { name: 'Plot position' }).click();
+      await page.locator('.uplot canvas').waitFor();
+      await flaws(page, `plot ${width} ${colorScheme}`);
     }
+  }));
+
+test('the lease is asked of who has it, and let go', () =>
+  on({ boards: 1 }, async ({ agent, look }) => {
+    await agent.job('/api/init');
+    const { key } = (await agent.ask('POST', '/api/lease', { name: 'Anna', lasts_s: 60 })).body;
+    const page = await look();
+    await page.getByText('Anna commands this chain: one client at a time.').first().waitFor();
+    await page.getByRole('button', { name: 'Start', exact: true }).click();
+    await page.getByRole('alert').getByText(/one client commands at a time/).waitFor();
+    await page.getByRole('alert').getByRole('button', { name: 'Ask for it' }).click();
+    await page.getByRole('button', { name: 'Asked Anna' }).waitFor();
+    await until('Anna lets it go', async () => (await agent.ask('DELETE', '/api/lease', undefined, key)).status < 300);
+    await page.getByRole('button', { name: 'You command', exact: true }).click();
+    await page.getByRole('dialog').getByText(/boards that it has started/).waitFor();
+    await page.getByRole('dialog').getByRole('button', { name: 'Let the lease go' }).click();
+    await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
+    assert.equal((await agent.ask('GET', '/api/status')).body.lease, undefined);
   }));

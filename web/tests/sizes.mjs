@@ -5,24 +5,29 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const DIST = process.env.DIST ?? fileURLToPath(new URL('../dist/', import.meta.url));
-const FIRST_MOST = 40_000;
+const FIRST_MOST = { 'index.html': 40_000, 'chain.html': 44_000 };
 const ALL_MOST = 400_000;
 const gzipped = (path) => gzipSync(readFileSync(path), { level: 9 }).length;
 
-const first = new Set();
-const follow = (path) => {
+const follow = (path, first) => {
   if (first.has(path)) return;
   first.add(path);
   const text = readFileSync(path, 'utf8');
   // Static imports alone: what is imported by a call is loaded later.
-  for (const [, next] of text.matchAll(/(?:from|import)\s*["'](\.\/[^"']+\.js)["']/g)) follow(join(dirname(path), next));
+  for (const [, next] of text.matchAll(/(?:from|import)\s*["'](\.\/[^"']+\.js)["']/g)) follow(join(dirname(path), next), first);
 };
-for (const [, path] of readFileSync(join(DIST, 'index.html'), 'utf8').matchAll(/(?:src|href)="(\/[^"]+\.js)"/g)) follow(join(DIST, path));
-const firstBytes = [...first].reduce((sum, path) => sum + gzipped(path), 0);
+let large = false;
+for (const [page, most] of Object.entries(FIRST_MOST)) {
+  const first = new Set();
+  for (const [, path] of readFileSync(join(DIST, page), 'utf8').matchAll(/(?:src|href)="(\/[^"]+\.js)"/g)) follow(join(DIST, path), first);
+  const bytes = [...first].reduce((sum, path) => sum + gzipped(path), 0);
+  console.log(`${page}: first JS ${(bytes / 1000).toFixed(1)} kB of ${most / 1000} kB gzip`);
+  large ||= bytes > most;
+}
 const files = readdirSync(DIST, { recursive: true, withFileTypes: true }).filter((entry) => entry.isFile());
 const all = files.reduce((sum, entry) => sum + gzipped(join(entry.parentPath, entry.name)), 0);
-console.log(`first JS ${(firstBytes / 1000).toFixed(1)} kB of ${FIRST_MOST / 1000} kB gzip, all ${(all / 1000).toFixed(1)} kB of ${ALL_MOST / 1000} kB gzip`);
-if (firstBytes > FIRST_MOST || all > ALL_MOST) {
-  console.error('the page is larger than it may be');
+console.log(`all ${(all / 1000).toFixed(1)} kB of ${ALL_MOST / 1000} kB gzip`);
+if (large || all > ALL_MOST) {
+  console.error('a page is larger than it may be');
   process.exit(1);
 }

@@ -242,6 +242,8 @@ export class ChainPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
+        // What a Stop did is told until somebody goes on.
+        if (isNew && !this.#stop) this.stopWords = '';
         this.course = {
           number: event.job, what: event.what, client: event.client, over: false, progress: undefined, notes: [],
           own: this.session.leasePhase === 'held' && event.client === this.session.name,

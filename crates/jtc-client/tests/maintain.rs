@@ -63,11 +63,12 @@ fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
     until(&served, |controller| controller["state"] != "HoldPos");
     assert_eq!(logged(&served, "reset joint 3").len(), 2, "what was refused is written down, too");
     anna.recover();
-    // In motion no joint does, whatever may fall.
-    let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.4, 0, 0, 0, 0, 0], "speed_percent": 20 }));
-    until(&served, |controller| controller["state"] == "Operate");
-    assert_eq!(anna.ask("POST /api/reset", Some(json!({ "all": true }))).0, 409);
-    assert_eq!(anna.over(job)["stage"], "finished");
+    // While it is led by hand no joint does, whatever may fall; the gripper may.
+    assert_eq!(anna.ask("POST /api/teach", Some(json!({ "on": true }))).0, 204);
+    let (status, error) = anna.ask("POST /api/reset", Some(json!({ "joints": [3], "arm_may_fall": true })));
+    assert_eq!((status, error["code"].as_str()), (409, Some("powered")), "{error}");
+    assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "Teaching");
+    assert_eq!(anna.ask("POST /api/reset", Some(json!({ "gripper": true, "arm_may_fall": true }))).0, 204);
 }
 
 /// A drive that fails while the arm is held: it is cleared alone, or with all others.

@@ -8,9 +8,11 @@ status`, `jtc monitor` and `jtc traj stop` look and stop from elsewhere; the sec
 compares every answer with the description. Needs openapi-python-client and schemathesis.
 """
 
+import contextlib
 import json
 import subprocess
 import time
+import urllib.error
 import urllib.request
 
 import served
@@ -139,8 +141,13 @@ def everything_else(jtc, directory):
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=9))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
         assert anna.ask("get_log_status")[1].state == "recording"
-        url = f"{agent.url}/api/log"
-        with urllib.request.urlopen(url, timeout=60) as response:
+        # Reading it holds up what it records: operators do.
+        asked = urllib.request.Request(f"{agent.url}/api/log")
+        with contextlib.suppress(urllib.error.HTTPError):
+            urllib.request.urlopen(asked, timeout=60).close()
+            raise AssertionError("it is read without a token")
+        asked.add_header("Authorization", f"Bearer {agent.tokens['operator']}")
+        with urllib.request.urlopen(asked, timeout=60) as response:
             log = response.read()
         # The magic of the format stands at both ends.
         assert log.startswith(MCAP) and log.endswith(MCAP), log[:20]

@@ -120,9 +120,10 @@ def check_motion(viewer, arm):
     viewer.message("/jtc/status", lambda message: message["trajectory"] == "Execute")
     commanded = viewer.message("/joint_commands", lambda message: abs(message["position"][0]) > 0.05)["position"]
     measured = viewer.message("/joint_states", lambda message: math.dist(message["position"], commanded) < 0.05)
-    assert viewer.call("pause") == {"sent": "pause"}
+    halt = viewer.call("pause")
+    assert halt["sent"] == "pause"
     viewer.message("/jtc/status", lambda message: message["trajectory"] == "Pause")
-    assert viewer.call("stop") == {"sent": "stop"}
+    assert viewer.call("stop") == {"sent": "stop", "halt": halt["halt"] + 1}
     assert arm.over(number) == "stopped"
     print(f"moved to {measured['position'][0]:.3f} rad, paused and stopped by the viewer")
 

@@ -281,9 +281,10 @@ async def check_motion(arm):
         assert len(errors) > 300 and max(errors) < 0.02, (len(errors), max(errors, default=None))
         check_metrics(arm)
         assert max(gaps) < 3, "the one that reads is not disturbed"
-        assert (await viewer.call("pause", 1)) == {"sent": "pause"}
+        halt = await viewer.call("pause", 1)
+        assert halt["sent"] == "pause"
         await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Pause")
-        assert (await viewer.call("stop", 2)) == {"sent": "stop"}
+        assert (await viewer.call("stop", 2)) == {"sent": "stop", "halt": halt["halt"] + 1}
         assert await asyncio.to_thread(arm.over, number) == "stopped"
         # The one that does not read is put out, whatever the system keeps for it.
         end = time.monotonic() + GONE_S

@@ -59,7 +59,7 @@ pub fn services() -> Vec<Service<'static>> {
         request: shape("openjtc.HaltRequest", r#"{"type":"object","properties":{}}"#),
         response: shape(
             "openjtc.HaltResponse",
-            r#"{"type":"object","properties":{"sent":{"type":"string"}}}"#,
+            r#"{"type":"object","properties":{"sent":{"type":"string"},"halt":{"type":"integer"}}}"#,
         ),
     };
     vec![service(STOP, "stop"), service(PAUSE, "pause")]

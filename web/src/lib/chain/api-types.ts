@@ -1016,6 +1016,16 @@ export interface components {
         ValueObject: {
             /** @description Its place in the buffer. */
             index: number;
+            /**
+             * Format: double
+             * @description Greatest value, alike.
+             */
+            max?: number | null;
+            /**
+             * Format: double
+             * @description Least value, in its unit, where the signal table has one.
+             */
+            min?: number | null;
             /** @description Its name. */
             name: string;
             /** @description For people, with its unit. */

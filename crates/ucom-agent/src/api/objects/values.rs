@@ -46,6 +46,12 @@ pub struct ValueObject {
     /// Its unit, where the signal table has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
+    /// Least value, in its unit, where the signal table has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// Greatest value, alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
 }
 
 impl ValueObject {
@@ -59,6 +65,8 @@ impl ValueObject {
             value: word.map(value),
             text: word.map(|word| signal.map_or_else(|| word.to_string(), |s| s.text_with_unit(word))),
             unit: unit.map(|signal| signal.unit.clone()),
+            min: signal.and_then(|signal| signal.min),
+            max: signal.and_then(|signal| signal.max),
         }
     }
 }
@@ -94,5 +102,24 @@ impl ValuesObject {
             inputs: list(Kind::Ci, values.inputs.clone()),
             parameters: list(Kind::Par, values.parameters.iter().map(parameter).collect()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ucom::Profile;
+
+    use super::*;
+
+    #[test]
+    fn a_value_has_the_limits_of_its_signal_where_it_has_some() {
+        let bare = Signal::bare(&Profile::default());
+        let limited = Signal { min: Some(-45.0), max: Some(45.0), ..bare.clone() };
+        let limits = |signal| {
+            let value = ValueObject::of("position", 0, signal, None);
+            (value.min, value.max)
+        };
+        assert_eq!(limits(Some(&limited)), (Some(-45.0), Some(45.0)));
+        assert_eq!((limits(Some(&bare)), limits(None)), ((None, None), (None, None)));
     }
 }

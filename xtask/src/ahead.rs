@@ -32,6 +32,7 @@ fn make() -> Result<()> {
     python::environment("requirements.txt")?;
     python::programs()?;
     emulate::programs()?;
+    firmware::lints()?;
     for board in firmware::BOARDS {
         firmware::build(board)?;
     }

@@ -141,7 +141,8 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         tally.step("references", || bail!("there is no Python environment, or the programs were not built"));
         return;
     };
-    let beside = CHECKS.iter().map(Beside::Reference).chain([Beside::Browser]);
+    // The longest first.
+    let beside = [Beside::Browser].into_iter().chain(CHECKS.iter().map(Beside::Reference));
     let ran = beside::beside(
         beside.filter(|one| tally.wants(&one.title())).collect(),
         |one, log| match one {

@@ -49,7 +49,7 @@ export interface Handlers<S extends BaseStatus> {
   /** Every other message, by its kind. */
   other?(message: { kind: string }): void;
   phase(phase: Phase): void;
-  /** A socket did not open: the reason is asked for elsewhere, a browser does not tell it. */
+  /** A socket did not open: the reason is asked for elsewhere, a browser does not report it. */
   refused(): void;
 }
 

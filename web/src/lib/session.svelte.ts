@@ -138,7 +138,7 @@ export class Session<S extends SessionStatus> {
       browser(),
       {
         status: (status) => this.#take(status),
-        events: (message) => this.#hear(message),
+        events: (message) => this.#receive(message),
         other: (message) => {
           for (const handler of this.#messageHandlers) handler(message);
         },
@@ -335,7 +335,7 @@ export class Session<S extends SessionStatus> {
     for (const handler of this.#statusHandlers) handler(status);
   }
 
-  #hear(message: EventsMessage): void {
+  #receive(message: EventsMessage): void {
     if (message.agent !== this.#agent) {
       this.#agent = message.agent;
       this.#known = -1;

@@ -32,7 +32,7 @@ test('what is refused says message, cause and what helps', async () => {
   });
 });
 
-test('a path that the agent does not have is told from a number that it does not have', () => {
+test('a path that the agent does not have is distinguished from a number that it does not have', () => {
   assert.ok(new ApiError(404, problemOf(404, '')).isMissingPath);
   assert.ok(new ApiError(405, problemOf(405, '')).isMissingPath);
   assert.ok(!new ApiError(404, problemOf(404, '{"code":"not-found","message":"no job 9","next":""}')).isMissingPath);

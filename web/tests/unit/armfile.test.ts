@@ -29,7 +29,7 @@ test('differences name the place, joints from 1; single precision is the same', 
   ]);
 });
 
-test('poses are no difference of the arm; tables of numbers are told in one line', () => {
+test('poses are no difference of the arm; tables of numbers are shown in one line', () => {
   assert.deepEqual(differences(AVENA, `${AVENA}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n`), []);
   const table = differences(AVENA, AVENA.replace('-43.39838393343234', '-44.0'));
   assert.equal(table.length, 1);

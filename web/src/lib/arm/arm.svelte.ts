@@ -17,7 +17,7 @@ const ROWS = 15_000;
 /** What people read changes so often at most, ms. */
 const READ_MS = 120;
 
-/** A job as its events tell it. */
+/** A job as its events report it. */
 export interface Course {
   number: number;
   what: string;
@@ -88,7 +88,7 @@ export class ArmPage {
 
   constructor() {
     this.session.onStatus((status) => this.#take(status));
-    this.session.onEvent((entry, isNew) => this.#hear(entry as ArmEntry, isNew));
+    this.session.onEvent((entry, isNew) => this.#receive(entry as ArmEntry, isNew));
     this.session.onLoss(() => this.#lose());
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
@@ -179,7 +179,7 @@ export class ArmPage {
     this.history.push(row);
   }
 
-  #hear({ event }: ArmEntry, isNew: boolean): void {
+  #receive({ event }: ArmEntry, isNew: boolean): void {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':

@@ -21,7 +21,7 @@ export const POLICIES: [Policy, string][] = [
   ['continue', 'go on with the inputs that they have'],
 ];
 
-/** A job as its events tell it. */
+/** A job as its events report it. */
 export interface Course {
   number: number;
   what: string;
@@ -90,7 +90,7 @@ export class ChainPage {
 
   constructor() {
     this.session.onStatus((status) => this.#take(status));
-    this.session.onEvent((entry, isNew) => this.#hear((entry as ChainEntry).event, isNew));
+    this.session.onEvent((entry, isNew) => this.#happened((entry as ChainEntry).event, isNew));
     this.session.onMessage((message) => this.#receive(message));
     this.session.onLoss(() => this.#lose());
     // Boards that this page commands are stopped when its lease lapses: it lasts for as long as they run and the page is looked at.
@@ -238,11 +238,11 @@ export class ChainPage {
     }
   }
 
-  #hear(event: Happening, isNew: boolean): void {
+  #happened(event: Happening, isNew: boolean): void {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
-        // What a Stop did is told until somebody goes on.
+        // What a Stop did is shown until somebody goes on.
         if (isNew && !this.#stop) this.stopWords = '';
         this.course = {
           number: event.job, what: event.what, client: event.client, over: false, progress: undefined, notes: [],

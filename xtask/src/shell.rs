@@ -62,10 +62,10 @@ pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
     done
 }
 
-/// The same command at the lowest priority.
-fn nice(command: &Command) -> Command {
+/// The same command at a lower priority: 19 is the lowest.
+pub fn nice(command: &Command, by: u8) -> Command {
     let mut nice = Command::new("nice");
-    nice.args(["-n", "19"]).arg(command.get_program()).args(command.get_args());
+    nice.args(["-n", &by.to_string()]).arg(command.get_program()).args(command.get_args());
     if let Some(directory) = command.get_current_dir() {
         nice.current_dir(directory);
     }
@@ -75,7 +75,6 @@ fn nice(command: &Command) -> Command {
             None => nice.env_remove(name),
         };
     }
-    nice.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     nice
 }
 
@@ -85,7 +84,10 @@ pub fn run(command: &mut Command) -> Result<()> {
     if !background {
         announce(command);
     }
-    let status = if background { nice(command).status() } else { command.status() };
+    let silent = |mut command: Command| {
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status()
+    };
+    let status = if background { silent(nice(command, 19)) } else { command.status() };
     let status = status.with_context(|| format!("cannot start `{}`", shown(command)))?;
     if !status.success() {
         bail!("`{}` ended with {status}", shown(command));

@@ -281,6 +281,8 @@ async def check_motion(arm):
         assert len(errors) > 300 and max(errors) < 0.02, (len(errors), max(errors, default=None))
         check_metrics(arm)
         assert max(gaps) < 3, "the one that reads is not disturbed"
+        # In the midst of the path, not while it is given once more.
+        await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Execute" and 1000 < words["point"] < 3000)
         halt = await viewer.call("pause", 1)
         assert halt["sent"] == "pause"
         await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Pause")
@@ -362,8 +364,9 @@ def watched(jtc, directory):
         arm.json("PUT", "/api/trajectories/3", {"name": "sway", "text": served.sway(0.3, 6)})
         assert arm.over(arm.json("POST", "/api/recover", {"defaults": True})["number"]) == "finished"
         before = check_metrics(arm)
-        asyncio.run(check_channels(arm))
-        asyncio.run(check_motion(arm))
+        with arm.renewing():
+            asyncio.run(check_channels(arm))
+            asyncio.run(check_motion(arm))
         after = check_metrics(arm)
 
         def more(name, *labels):

@@ -16,6 +16,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -126,6 +127,23 @@ class Requests:
             return stage, stage
 
         return over(ask, number)
+
+    @contextlib.contextmanager
+    def renewing(self):
+        """The lease does not lapse within the block, however long a busy computer takes for it."""
+        done = threading.Event()
+
+        def renew():
+            while not done.wait(5):
+                self.json("PUT", "/api/lease")
+
+        thread = threading.Thread(target=renew)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
 
 def generated(description, directory, name):

@@ -6,9 +6,9 @@ import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { fileURLToPath } from 'node:url';
 
-import { ended, open, startPage, until } from './harness.mjs';
+import { ended, open, until } from './harness.mjs';
 
-export { ended, startBrowser, until } from './harness.mjs';
+export { ended, passes, startBrowser, until } from './harness.mjs';
 
 const UCOM = process.env.UCOM ?? fileURLToPath(new URL('../../target/debug/ucom', import.meta.url));
 
@@ -48,7 +48,10 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
     dir,
     operator: token('operator'),
     viewer: token('viewer'),
-    kill: () => child.kill('SIGKILL'),
+    kill() {
+      child.kill('SIGKILL');
+      return gone;
+    },
     fault: (line) => sim.stdin.write(`${line}\n`),
     async end() {
       child.kill('SIGKILL');
@@ -77,23 +80,20 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
   return agent;
 }
 
-/** An agent with its page, for one test; `look` opens it in a browser of its own. `direct`: as the agent serves it itself. */
-export async function stage(browser, { direct = false, mock = undefined, ...options } = {}) {
+/** An agent with its page, for one test; `look` opens it in a browser of its own. */
+export async function stage(browser, options = {}) {
   const agent = await startChain(options);
-  const site = direct ? { url: agent.url, end: async () => {} } : await startPage(agent, mock);
   const contexts = [];
   return {
     agent,
-    site,
     async look({ token = 'operator', ...rest } = {}) {
       const word = token === 'none' ? '' : `#token=${agent[token] ?? token}`;
-      const page = await open(browser, `${site.url}/${direct ? '' : 'chain.html'}${word}`, rest);
+      const page = await open(browser, `${agent.url}/${word}`, rest);
       contexts.push(page.context());
       return page;
     },
     async end() {
       for (const context of contexts) await context.close();
-      await site.end();
       await agent.end();
     },
   };

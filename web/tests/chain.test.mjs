@@ -4,7 +4,7 @@ import { after, before, test } from 'node:test';
 
 import AxeBuilder from '@axe-core/playwright';
 
-import { card, EDGES, image, stage, startBrowser, state, until } from './chain-harness.mjs';
+import { card, EDGES, image, passes, stage, startBrowser, state, until } from './chain-harness.mjs';
 
 let browser;
 before(async () => (browser = await startBrowser()));
@@ -49,12 +49,12 @@ test('a chain is scanned, numbered after a question, run, and stopped by one tou
     assert.equal((await agent.ask('GET', '/api/boards')).body.length, 0, 'nothing is numbered before the answer');
     await page.getByRole('dialog').getByRole('button', { name: 'Reset and number' }).click();
     await card(page, 3).waitFor();
-    await state(page).getByText('At rest').waitFor({ timeout: 15_000 });
+    await state(page).getByText('At rest').waitFor();
     await page.getByRole('button', { name: 'You command' }).waitFor();
     await state(page).getByRole('button', { name: 'Run' }).click();
     await page.getByRole('dialog').getByRole('switch').click();
     await page.getByRole('dialog').getByRole('button', { name: 'Run all' }).click();
-    await state(page).getByText('3 boards are active').waitFor({ timeout: 20_000 });
+    await state(page).getByText('3 boards are active').waitFor();
     await card(page, 2).getByText('Running').waitFor();
     const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -244,7 +244,7 @@ test('a doctor, jobs and events are shown', () =>
     const page = await look();
     await page.click('#tab-doctor');
     await page.getByRole('button', { name: 'Look for what is wrong' }).click();
-    await page.getByText(/Good:/).first().waitFor({ timeout: 20_000 });
+    await page.getByText(/Good:/).first().waitFor();
     await page.click('#tab-jobs');
     await page.locator('#panel').getByText('2 boards have numbers.').waitFor();
     await page.click('#tab-log');
@@ -254,15 +254,17 @@ test('a doctor, jobs and events are shown', () =>
 test('a lost agent is red within two seconds, and nothing old is shown', () =>
   on({ boards: 2 }, async ({ agent, look }) => {
     await running(agent, [1]);
-    const page = await look();
+    const page = await look({ clock: true });
     const value = page.locator('section[aria-label="Outputs"] td.num').first();
     await until('a value is shown', async () => /\d/.test(await value.innerText()));
-    agent.kill();
-    await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
+    await agent.kill();
+    await passes(page, 2000);
+    await page.getByText('No connection', { exact: true }).first().waitFor();
     const red = await state(page).evaluate((element) => getComputedStyle(element).backgroundColor);
     assert.match(red, /rgb\((200, 16, 46|216, 33, 61)\)/);
     for (const text of await page.locator('section[aria-label="Outputs"] td.num').allInnerTexts()) assert.equal(text, '–');
     await card(page, 1).getByText('Not known').waitFor();
+    await page.clock.resume();
     await page.getByRole('button', { name: /STOP/ }).click();
     await page.getByText(/STOP NOT SENT/).waitFor();
   }));

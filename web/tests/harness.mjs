@@ -1,23 +1,18 @@
 // What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { createServer, request } from 'node:http';
-import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
-import { extname, join, normalize } from 'node:path';
+import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
 import { chromium } from 'playwright-core';
 
-const DIST = process.env.DIST ?? fileURLToPath(new URL('../dist/', import.meta.url));
 /** Pictures of pages in which a test has failed. */
 const PICTURES = fileURLToPath(new URL('./out/', import.meta.url));
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/debug/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
-const CSP = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:";
-const TYPES = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml' };
 
 /** `jtc` with these arguments; resolves to what it printed. */
 export function jtc(args, options = {}) {
@@ -62,7 +57,10 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     operator: token('operator'),
     viewer: token('viewer'),
     /** As a computer that loses power: nothing is closed in order. */
-    kill: () => child.kill('SIGKILL'),
+    kill() {
+      child.kill('SIGKILL');
+      return gone;
+    },
     suspend: () => child.kill('SIGSTOP'),
     wake: () => child.kill('SIGCONT'),
     async end() {
@@ -82,94 +80,33 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
   };
 }
 
-/**
- * The built files in front of an agent, as the agent serves them itself: the same policy for contents, the API passed on under the agent's own
- * address. `mock` answers requests itself where it returns something.
- */
-export async function startPage(agent, mock = () => undefined) {
-  const target = new URL(agent.url);
-  const headersFor = (headers) => {
-    const out = { ...headers, host: target.host };
-    if (out.origin) out.origin = target.origin;
-    delete out.referer;
-    return out;
-  };
-  const sockets = new Set();
-  const server = createServer((ask, answer) => {
-    const mocked = mock(ask);
-    if (mocked) {
-      answer.writeHead(mocked.status ?? 200, { 'Content-Type': mocked.type ?? 'application/json' });
-      answer.end(typeof mocked.body === 'string' ? mocked.body : JSON.stringify(mocked.body));
-      return;
-    }
-    if (ask.url.startsWith('/api/') || ask.url.startsWith('/metrics')) {
-      const on = request({ host: target.hostname, port: target.port, method: ask.method, path: ask.url, headers: headersFor(ask.headers) }, (from) => {
-        answer.writeHead(from.statusCode, from.headers);
-        from.pipe(answer);
-      });
-      on.on('error', () => answer.destroy());
-      ask.pipe(on);
-      return;
-    }
-    const path = ask.url.split('?')[0];
-    const file = normalize(join(DIST, path === '/' ? 'index.html' : path));
-    try {
-      if (!file.startsWith(DIST)) throw new Error('outside');
-      const bytes = readFileSync(file);
-      answer.writeHead(200, { 'Content-Type': TYPES[extname(file)] ?? 'application/octet-stream', 'Content-Security-Policy': CSP });
-      answer.end(bytes);
-    } catch {
-      answer.writeHead(404).end();
-    }
-  });
-  server.on('connection', (socket) => {
-    sockets.add(socket);
-    socket.on('close', () => sockets.delete(socket));
-  });
-  server.on('upgrade', (ask, socket, head) => {
-    const on = connect(Number(target.port), target.hostname, () => {
-      const lines = Object.entries(headersFor(ask.headers)).map(([name, value]) => `${name}: ${value}`);
-      on.write(`GET ${ask.url} HTTP/1.1\r\n${lines.join('\r\n')}\r\n\r\n`);
-      on.write(head);
-      on.pipe(socket);
-      socket.pipe(on);
-    });
-    on.on('error', () => socket.destroy());
-    socket.on('error', () => on.destroy());
-    socket.on('close', () => on.destroy());
-    on.on('close', () => socket.destroy());
-  });
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  return {
-    url: `http://127.0.0.1:${server.address().port}`,
-    end: () => {
-      for (const socket of sockets) socket.destroy();
-      return new Promise((done) => server.close(done));
-    },
-  };
-}
+const LAUNCH = {
+  executablePath: CHROMIUM,
+  args: [
+    '--headless=new', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking',
+    '--disable-component-update', '--disable-sync', '--disable-quic', '--no-first-run',
+  ],
+};
 
 export function startBrowser() {
-  return chromium.launch({
-    executablePath: CHROMIUM,
-    args: [
-      '--headless=new', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking',
-      '--disable-component-update', '--disable-sync', '--disable-quic', '--no-first-run',
-    ],
-  });
+  return chromium.launch(LAUNCH);
+}
+
+/** A browser that can be killed, as a tablet whose battery is empty. */
+export async function startMortal() {
+  const server = await chromium.launchServer(LAUNCH);
+  return { browser: await chromium.connect(server.wsEndpoint()), kill: () => server.kill() };
 }
 
 /** An agent with its page, for one test; `look` opens it in a browser of its own. */
 export async function stage(browser, options = {}) {
   const agent = await startAgent(options);
-  const site = process.env.DIRECT ? { url: agent.url, end: async () => {} } : await startPage(agent, options.mock);
   const contexts = [];
   return {
     agent,
-    site,
     async look({ token = 'operator', ...rest } = {}) {
       const word = token === 'none' ? '' : `#token=${agent[token] ?? token}`;
-      const page = await open(browser, `${site.url}/${word}`, rest);
+      const page = await open(browser, `${agent.url}/${word}`, rest);
       contexts.push(page.context());
       return page;
     },
@@ -181,7 +118,6 @@ export async function stage(browser, options = {}) {
     },
     async end() {
       for (const context of contexts) await context.close();
-      await site.end();
       await agent.end();
     },
   };
@@ -209,10 +145,12 @@ export function state(page) {
   return page.locator('section[aria-label="State"]');
 }
 
-/** A page that collects what a browser complains of. */
-export async function open(browser, url, options = {}) {
+/** A page that collects what a browser complains of. With `clock` the test may stop its time, and let it go on as it says (`passes`). */
+export async function open(browser, url, { clock = false, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, ...options });
   const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  if (clock) await page.clock.install();
   page.complaints = [];
   page.on('console', (message) => {
     if (message.type() === 'error') page.complaints.push(message.text());
@@ -222,8 +160,13 @@ export async function open(browser, url, options = {}) {
   return page;
 }
 
-/** Waits until a condition holds in this process. */
-export async function until(what, condition, within = 10_000) {
+/** So much time passes for a page, ms, and then none: what it shows then does not depend on how busy this computer is. */
+export async function passes(page, ms) {
+  await page.clock.pauseAt((await page.evaluate(() => Date.now())) + ms);
+}
+
+/** Waits until a condition holds in this process: long, for a computer that has much else to do. */
+export async function until(what, condition, within = 30_000) {
   const end = Date.now() + within;
   for (;;) {
     const value = await condition();
@@ -245,7 +188,7 @@ export async function commanding(agent, act, name = 'test') {
   }
 }
 
-export async function ended(agent, number, within = 30_000) {
+export async function ended(agent, number, within = 60_000) {
   return until(`job ${number} ended`, async () => {
     const { body } = await agent.ask('GET', `/api/jobs/${number}`);
     return body.stage === 'running' ? undefined : body;

@@ -66,7 +66,7 @@ for (const colorScheme of ['light', 'dark']) {
     for (const [width, height] of SIZES) {
       const page = await look({ viewport: { width, height }, colorScheme });
       await state(page).getByText('Holding').waitFor();
-      await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0), 20_000);
+      await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0));
       for (const tab of TABS) {
         await page.click(`#tab-${tab}`);
         await page.waitForTimeout(500);
@@ -100,8 +100,8 @@ on('dialogs, errors and a lost connection can be read by everyone', {}, async ({
     await page.getByRole('alert').waitFor();
     await reads(page, 'an error');
   }, 'anna');
-  agent.kill();
-  await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2500 });
+  await agent.kill();
+  await page.getByText('No connection', { exact: true }).first().waitFor();
   await reads(page, 'lost');
   if (process.env.PICTURES) await page.screenshot({ path: join(PICTURES, 'lost-800-light.png') });
   report();

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before } from 'node:test';
 
-import { commanding, jtc, recover, staged, startBrowser, state, until } from './harness.mjs';
+import { commanding, jtc, passes, recover, staged, startBrowser, state, until } from './harness.mjs';
 
 let browser;
 before(async () => (browser = await startBrowser()));
@@ -12,13 +12,13 @@ after(() => browser.close());
 
 const on = staged(() => browser);
 
-/** Six seconds of motion, begun by another client. */
+/** Half a minute of motion, begun by another client: it lasts longer than a busy computer takes to act. */
 async function moving(agent, act) {
   await jtc(['example', 'motion', '-o', agent.dir]);
   const text = readFileSync(join(agent.dir, 'motion.csv'), 'utf8');
   await commanding(agent, async (key) => {
     await agent.ask('PUT', '/api/trajectories/1', { name: 'motion', text }, key);
-    const run = await agent.ask('POST', '/api/runs', { trajectory: 1, approach: true }, key);
+    const run = await agent.ask('POST', '/api/runs', { trajectory: 1, approach: true, speed_percent: 20 }, key);
     assert.equal(run.status, 202);
     await until('it moves', async () => {
       const { controller } = (await agent.ask('GET', '/api/status')).body;
@@ -63,7 +63,6 @@ on('the space bar stops, also with a button in focus, and in a field it is a spa
     await page.getByText(/Stopped on the path/).waitFor();
     assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), before, 'the button in focus was pressed, too');
   });
-  await page.getByRole('switch').first().waitFor({ state: 'attached' }).catch(() => {});
   await page.keyboard.press('Space');
   await page.getByText(/Nothing was moving; the arm is held/).waitFor();
 });
@@ -111,32 +110,34 @@ on("a viewer sees no command, and Stop works", {}, async ({ agent, look }) => {
 
 on('a lost agent is red within two seconds, and nothing old is shown', {}, async ({ agent, look }) => {
   await recover(agent);
-  const page = await look();
+  const page = await look({ clock: true });
   await state(page).getByText('Holding').waitFor();
   const position = page.locator('.bars .joint .value').first();
   await until('a position is shown', async () => /\d/.test(await position.innerText()));
-  agent.kill();
-  const begun = Date.now();
-  await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
+  await agent.kill();
+  await passes(page, 2000);
+  await page.getByText('No connection', { exact: true }).first().waitFor();
   const red = await state(page).evaluate((element) => getComputedStyle(element).backgroundColor);
   assert.match(red, /rgb\((200, 16, 46|216, 33, 61)\)/);
   await page.getByText('Not the arm as it is now').waitFor();
   for (const text of await page.locator('.bars .joint .value').allInnerTexts()) assert.match(text, /^[^\d]*–/, text);
-  assert.ok(Date.now() - begun < 2500);
+  await page.clock.resume();
   await page.getByRole('button', { name: /STOP/ }).click();
   await page.getByText(/STOP NOT SENT/).waitFor();
 });
 
 on('an agent that hangs is noticed as well, and comes back by itself', {}, async ({ agent, look }) => {
   await recover(agent);
-  const page = await look();
+  const page = await look({ clock: true });
   await state(page).getByText('Holding').waitFor();
   // A picture that is drawn for the first time keeps a computer without graphics busy.
-  await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0), 20_000);
+  await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0));
   agent.suspend();
-  await page.getByText('No connection', { exact: true }).first().waitFor({ timeout: 2000 });
+  await passes(page, 2000);
+  await page.getByText('No connection', { exact: true }).first().waitFor();
   agent.wake();
-  await state(page).getByText('Holding').waitFor({ timeout: 8000 });
+  await page.clock.resume();
+  await state(page).getByText('Holding').waitFor();
   await until('positions are shown', async () => /\d/.test(await page.locator('.bars .joint .value').first().innerText()));
 });
 

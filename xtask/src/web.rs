@@ -101,7 +101,7 @@ pub fn browser(log: &Path) -> Result<Option<Ended>> {
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
     // It draws in 3D without the hardware for it: what runs beside it and watches a clock goes first.
-    beside::run(&mut shell::nice(&npm, 10), log).map(Some)
+    beside::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 
 /// The numbers of Node's own test runner.

@@ -5,7 +5,7 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use utoipa::IntoResponses;
 
-pub use crate::problem::{Facts, NoFacts, Problem, ProblemWith};
+pub use crate::problem::{Bounds, Facts, Problem, ProblemWith};
 
 /// What every request may be refused with.
 #[derive(IntoResponses)]

@@ -5,6 +5,7 @@ pub mod access;
 pub mod api;
 pub mod events;
 pub mod gate;
+pub mod halt;
 pub mod journal;
 pub mod lease;
 pub mod log;

@@ -27,14 +27,21 @@ pub struct ProblemWith<F> {
 }
 
 /// Why something was not done.
-pub type Problem = ProblemWith<NoFacts>;
+pub type Problem = ProblemWith<Bounds>;
 
-/// Nothing more is known.
+/// What every agent can say of an error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
-pub struct NoFacts {}
+pub struct Bounds {
+    /// What was found, in the unit of the message.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// What is allowed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
+}
 
 /// What an agent knows of an error beside what every agent does.
-pub trait Facts: Default {
+pub trait Facts: Default + From<Bounds> {
     /// The error of its library.
     type Error: Diagnose;
 
@@ -108,8 +115,8 @@ impl<F: Facts> ProblemWith<F> {
 
 impl<F: Facts> From<Problem> for ProblemWith<F> {
     fn from(problem: Problem) -> Self {
-        let Problem { code, message, facts: NoFacts {}, next, status } = problem;
-        Self { code, message, facts: F::default(), next, status }
+        let Problem { code, message, facts, next, status } = problem;
+        Self { code, message, facts: F::from(facts), next, status }
     }
 }
 

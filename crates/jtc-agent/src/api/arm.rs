@@ -1,6 +1,7 @@
 //! The arm of the controller as one thing: read as an arm file, and given whole.
 use agent_kit::api::Refusals;
 use agent_kit::gate::{Asker, plain};
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::{Request, State};
@@ -14,7 +15,6 @@ use utoipa::ToSchema;
 
 use super::body::read;
 use super::error::Denials;
-use super::lease::{AskedAfter, KnownHalt};
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Given, Task, give};

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use agent_kit::api::{Body, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -14,7 +15,6 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
-use super::lease::{AskedAfter, KnownHalt};
 use super::objects::PayloadObject;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Commander, Turn, stopped};

@@ -1,7 +1,7 @@
 //! What the API sends where something is not done: one object, whatever it was.
 use std::collections::BTreeMap;
 
-use agent_kit::api::{self, ProblemWith};
+use agent_kit::api::{self, Bounds, ProblemWith};
 use agent_kit::openapi::denials;
 use jtc_host::error::Facts;
 use jtc_host::{Error, ErrorKind};
@@ -46,6 +46,13 @@ impl From<&Facts> for FactsObject {
             limit: finite(facts.limit),
             cause: facts.cause,
         }
+    }
+}
+
+impl From<Bounds> for FactsObject {
+    fn from(bounds: Bounds) -> Self {
+        let Bounds { value, limit } = bounds;
+        Self { value, limit, ..Self::default() }
     }
 }
 

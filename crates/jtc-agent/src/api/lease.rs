@@ -3,16 +3,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use agent_kit::access::random;
-use agent_kit::api::{Asked, Body, Refusals};
+use agent_kit::api::{Body, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, Halts};
 use agent_kit::lease::{self, LeaseKey, LeaseState, default_lasts_s, lasts};
-use axum::extract::{FromRequestParts, State};
+use axum::extract::State;
 use axum::http::StatusCode;
-use axum::http::request::Parts;
 use axum::{Extension, Json};
-use jtc_host::error::Facts;
 use serde_json::json;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 
 use super::error::Denials;
 use super::{Agent, Caller, ErrorObject};
@@ -50,38 +49,9 @@ pub struct LeaseGrant {
     pub policy: Policy,
 }
 
-/// What the client knew when it asked for what may move the arm.
-#[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(super) struct KnownHalt {
-    /// `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-    /// request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
-    asked_after: Option<u64>,
-}
-
-/// The last halt behind which something was asked for: the one that the client names, else the last when its request arrived. That is taken
-/// before its body, which may be long on its way.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct AskedAfter(pub u64);
-
-impl FromRequestParts<Agent> for AskedAfter {
-    type Rejection = ErrorObject;
-
-    async fn from_request_parts(parts: &mut Parts, agent: &Agent) -> Result<Self, ErrorObject> {
-        let last = agent.line.with(|line, _| line.last_halt());
-        let Asked(KnownHalt { asked_after }) = Asked::from_request_parts(parts, agent).await?;
-        match asked_after {
-            Some(known) if known > last => {
-                let message = format!(
-                    "asked_after {known}: this agent has counted {last} Stops and Pauses; it may have been started again"
-                );
-                let object = ErrorObject::new("request", message, "GET /api/status has last_halt");
-                let facts = Facts { value: Some(known as f64), limit: Some(last as f64), ..Facts::default() };
-                Err(object.with(&facts).unreadable())
-            }
-            known => Ok(Self(known.unwrap_or(last))),
-        }
+impl Halts for Agent {
+    fn last_halt(&self) -> u64 {
+        self.line.with(|line, _| line.last_halt())
     }
 }
 

@@ -1,6 +1,7 @@
 //! What brings a controller back: single nodes cleared and reset, the arm that is built into it.
 use agent_kit::api::{Body, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
@@ -13,7 +14,6 @@ use utoipa::ToSchema;
 use super::body::Perhaps;
 use super::commands::SpeedObject;
 use super::error::Denials;
-use super::lease::{AskedAfter, KnownHalt};
 use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
 

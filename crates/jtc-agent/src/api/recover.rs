@@ -1,6 +1,7 @@
 //! The way back to a held arm.
 use agent_kit::api::Refusals;
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::{Request, State};
@@ -12,7 +13,6 @@ use utoipa::ToSchema;
 use super::arm::{in_words, taken};
 use super::body::read;
 use super::error::Denials;
-use super::lease::{AskedAfter, KnownHalt};
 use super::runs::JobObject;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Numbers, Task, recover};

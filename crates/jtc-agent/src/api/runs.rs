@@ -1,6 +1,7 @@
 //! Runs and moves: jobs, and what becomes of them.
 use agent_kit::api::{Body, Number, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
@@ -12,7 +13,6 @@ use utoipa::ToSchema;
 
 use super::arm::GivenObject;
 use super::error::Denials;
-use super::lease::{AskedAfter, KnownHalt};
 use super::poses::pose_error;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};

@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use agent_kit::api::{Asked, Body, Number, Problem, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
@@ -100,7 +101,7 @@ impl Agent {
     async fn command<T: Send + 'static>(
         &self,
         asker: &Asker,
-        what: (&'static str, u8, bool),
+        what: (&'static str, u8, Option<AskedAfter>),
         act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
         self.command_with(asker, what, json!({}), act).await
@@ -110,13 +111,13 @@ impl Agent {
     async fn command_with<T: Send + 'static>(
         &self,
         asker: &Asker,
-        (what, board, moves): (&'static str, u8, bool),
+        (what, board, after): (&'static str, u8, Option<AskedAfter>),
         asked: serde_json::Value,
         act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
         let client = self.commander(asker)?;
         numbers([board])?;
-        let turn = self.shared.asked(client.id, moves)?;
+        let turn = self.shared.asked(client.id, after)?;
         let facts = json!({ "client": client.id, "command": what, "board": board, "asked": asked });
         let line = Arc::new(Line::new(&self.gate, facts));
         let own = line.clone();
@@ -172,7 +173,7 @@ fn set(
 impl Agent {
     async fn set(
         &self,
-        asker: &Asker,
+        (asker, after): (&Asker, AskedAfter),
         (what, buffer): (&'static str, Buffer),
         (board, name): (u8, String),
         request: &ValueRequest,
@@ -180,7 +181,7 @@ impl Agent {
         let value = request.value.parsed(&name)?;
         let asked = json!({ "name": name, "value": request.value });
         let set = move |hands: &mut Hands| set(hands, buffer, board, &name, &value);
-        Ok(Json(self.command_with(asker, (what, board, true), asked, set).await?))
+        Ok(Json(self.command_with(asker, (what, board, Some(after)), asked, set).await?))
     }
 }
 
@@ -192,7 +193,8 @@ impl Agent {
     params(
         ("number" = u8, Path, description = "Number of the board"),
         ("name" = String, Path, description = "Name of the input, with or without its unit in brackets; or its place"),
-        LeaseKey
+        LeaseKey,
+        KnownHalt
     ),
     request_body = ValueRequest,
     responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
@@ -201,9 +203,10 @@ pub(super) async fn set_input(
     State(agent): State<Agent>,
     Number(place): Number<(u8, String)>,
     asker: Asker,
+    after: AskedAfter,
     Body(request): Body<ValueRequest>,
 ) -> Result<Json<ValueObject>, Problem> {
-    agent.set(&asker, ("input", Buffer::Ci), place, &request).await
+    agent.set((&asker, after), ("input", Buffer::Ci), place, &request).await
 }
 
 /// Writes a parameter by its name. Boards have no way to read it back.
@@ -214,7 +217,8 @@ pub(super) async fn set_input(
     params(
         ("number" = u8, Path, description = "Number of the board"),
         ("name" = String, Path, description = "Name of the parameter, with or without its unit in brackets; or its place"),
-        LeaseKey
+        LeaseKey,
+        KnownHalt
     ),
     request_body = ValueRequest,
     responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
@@ -223,9 +227,10 @@ pub(super) async fn set_parameter(
     State(agent): State<Agent>,
     Number(place): Number<(u8, String)>,
     asker: Asker,
+    after: AskedAfter,
     Body(request): Body<ValueRequest>,
 ) -> Result<Json<ValueObject>, Problem> {
-    agent.set(&asker, ("parameter", Buffer::Par), place, &request).await
+    agent.set((&asker, after), ("parameter", Buffer::Par), place, &request).await
 }
 
 /// Enables or disables the outputs of a running board.
@@ -235,7 +240,8 @@ pub(super) async fn set_parameter(
     operation_id = "set_outputs",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        LeaseKey
+        LeaseKey,
+        KnownHalt
     ),
     request_body = OutputsRequest,
     responses((status = 204, description = "The board has confirmed it"), Refusals, Denials)
@@ -244,6 +250,7 @@ pub(super) async fn set_outputs(
     State(agent): State<Agent>,
     Number(board): Number<u8>,
     asker: Asker,
+    after: AskedAfter,
     Body(OutputsRequest { active }): Body<OutputsRequest>,
 ) -> Result<axum::http::StatusCode, Problem> {
     let change = AdminChange { active: Some(active), ..AdminChange::default() };
@@ -253,7 +260,7 @@ pub(super) async fn set_outputs(
         false => hands.driver.run(request).map(drop),
     };
     let asked = json!({ "active": active });
-    agent.command_with(&asker, ("outputs", board, active), asked, act).await?;
+    agent.command_with(&asker, ("outputs", board, active.then_some(after)), asked, act).await?;
     Ok(axum::http::StatusCode::NO_CONTENT)
 }
 
@@ -263,7 +270,8 @@ pub(super) async fn set_outputs(
     path = "/api/boards/{number}/start",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        LeaseKey
+        LeaseKey,
+        KnownHalt
     ),
     responses((status = 200, description = "The application is up", body = AnswerObject), Refusals, Denials)
 )]
@@ -271,6 +279,7 @@ pub(super) async fn start_board(
     State(agent): State<Agent>,
     Number(board): Number<u8>,
     asker: Asker,
+    after: AskedAfter,
 ) -> Result<Json<AnswerObject>, Problem> {
     let act = move |hands: &mut Hands| {
         let all = hands.starting(&[board], |hands| {
@@ -282,7 +291,7 @@ pub(super) async fn start_board(
             .map(|one| AnswerObject::of(one, &hands.driver.master.profile()))
             .ok_or(SessionError::NoBoards)
     };
-    Ok(Json(agent.command(&asker, ("start", board, true), act).await?))
+    Ok(Json(agent.command(&asker, ("start", board, Some(after)), act).await?))
 }
 
 /// Stops the control loop of a board, and its application.
@@ -318,7 +327,7 @@ pub(super) async fn stop_board(
         let profile = hands.driver.master.profile();
         stopped.boards.first().map(|one| AnswerObject::of(one, &profile)).ok_or(SessionError::NoBoards)
     };
-    Ok(Json(agent.command(&asker, ("stop", board, false), act).await?))
+    Ok(Json(agent.command(&asker, ("stop", board, None), act).await?))
 }
 
 /// Resets a board: its outputs become safe, and its number is gone.
@@ -327,7 +336,8 @@ pub(super) async fn stop_board(
     path = "/api/boards/{number}/reset",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        LeaseKey
+        LeaseKey,
+        KnownHalt
     ),
     responses((status = 200, description = "Who reported", body = ResetObject), Refusals, Denials)
 )]
@@ -335,6 +345,7 @@ pub(super) async fn reset_board(
     State(agent): State<Agent>,
     Number(board): Number<u8>,
     asker: Asker,
+    after: AskedAfter,
 ) -> Result<Json<ResetObject>, Problem> {
     let act = move |hands: &mut Hands| match hands
         .driver
@@ -346,7 +357,7 @@ pub(super) async fn reset_board(
         }
         other => Err(other.into()),
     };
-    Ok(Json(agent.command(&asker, ("reset", board, true), act).await?))
+    Ok(Json(agent.command(&asker, ("reset", board, Some(after)), act).await?))
 }
 
 /// Does something by names; where a board turns out to have others than were kept, once more by those that it sends.

@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
@@ -25,15 +26,15 @@ use crate::work::Kind;
 const LISTEN: Duration = Duration::from_millis(1500);
 
 impl Agent {
-    /// Begins a job for the client that commands.
+    /// Begins a job for the client that commands; one that may move something, behind the Stop that it was asked for `after`.
     pub(super) fn begin(
         &self,
-        asker: &Asker,
+        (asker, after): (&Asker, Option<AskedAfter>),
         (kind, what): (Kind, &'static str),
         act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), SessionError> + Send + 'static,
     ) -> Result<(StatusCode, Json<JobObject>), Problem> {
         let client = self.commander(asker)?;
-        let asked = self.shared.asked(client.id, kind != Kind::Question)?;
+        let asked = self.shared.asked(client.id, after)?;
         let act = move |hands: &mut Hands| act(hands).map_err(|error| hands.problem(&error));
         let job = self.shared.begin((kind, asked), (what, &client.name), act);
         let why = job.as_ref().err().map(|error| error.message.clone());
@@ -59,7 +60,7 @@ pub(super) async fn scan(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin(&asker, (Kind::Question, "scan"), |hands| match hands.driver.run(Request::Scan)? {
+    agent.begin((&asker, None), (Kind::Question, "scan"), |hands| match hands.driver.run(Request::Scan)? {
         Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
         other => Err(other.into()),
     })
@@ -88,19 +89,20 @@ pub struct InitRequest {
 #[utoipa::path(
     post,
     path = "/api/init",
-    params(LeaseKey),
+    params(LeaseKey, KnownHalt),
     request_body = InitRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn init(
     State(agent): State<Agent>,
     asker: Asker,
+    after: AskedAfter,
     Body(InitRequest { expected }): Body<InitRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     numbers(expected.iter().map(|board| board.board))?;
     let expected = expected.iter().map(|board| (board.board, board.flash_number)).collect();
     let options = InitOptions { expected, force: false };
-    agent.begin(&asker, (Kind::Command, "init"), |hands| {
+    agent.begin((&asker, Some(after)), (Kind::Command, "init"), |hands| {
         let outcome = hands.driver.run(Request::Init(options));
         hands.renumbered(match &outcome {
             Ok(Outcome::Init(report)) => Some(report),
@@ -126,7 +128,7 @@ pub(super) async fn doctor(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin(&asker, (Kind::Question, "doctor"), |hands| {
+    agent.begin((&asker, None), (Kind::Question, "doctor"), |hands| {
         let seen = hands.driver.examine(LISTEN)?;
         Ok((Done::Findings(seen.findings), None))
     })
@@ -173,13 +175,14 @@ fn assignments(values: &[NamedValue]) -> Result<Vec<Assignment>, Problem> {
 #[utoipa::path(
     post,
     path = "/api/run",
-    params(LeaseKey),
+    params(LeaseKey, KnownHalt),
     request_body = RunRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn run(
     State(agent): State<Agent>,
     asker: Asker,
+    after: AskedAfter,
     Body(mut request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // Each once, however often it is named.
@@ -187,7 +190,7 @@ pub(super) async fn run(
     request.boards.dedup();
     numbers(request.boards.iter().copied())?;
     let (ci, par) = (assignments(&request.inputs)?, assignments(&request.parameters)?);
-    agent.begin(&asker, (Kind::Command, "run"), move |hands| {
+    agent.begin((&asker, Some(after)), (Kind::Command, "run"), move |hands| {
         let boards = match request.boards.is_empty() {
             true => Boards::All,
             false => Boards::Some(request.boards.clone()),

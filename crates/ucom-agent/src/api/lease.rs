@@ -2,6 +2,7 @@
 use agent_kit::access::random;
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::{Asker, Caller};
+use agent_kit::halt::Halts;
 use agent_kit::lease::{Client, LeaseKey, LeaseState, default_lasts_s, lasts};
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -41,6 +42,12 @@ pub struct LeaseGrant {
     lasts_s: f64,
     /// What becomes of running boards when it has lapsed.
     policy: Policy,
+}
+
+impl Halts for Agent {
+    fn last_halt(&self) -> u64 {
+        self.shared.halts()
+    }
 }
 
 impl Agent {

@@ -127,6 +127,7 @@ impl Agent {
             role: caller.role,
             agent: self.id.to_string(),
             last_event: self.shared.journal.last(),
+            last_halt: self.shared.halts(),
             ..StatusObject::of(&self.shared.picture())
         }
     }
@@ -208,6 +209,8 @@ struct SentObject {
     sent: String,
     /// Number of the last event before it: what came of it follows.
     last_event: u64,
+    /// Its number: `last_halt` until the next.
+    halt: u64,
 }
 
 /// Stops all boards: their control loops ahead of all else, then their applications. No lease is needed.
@@ -239,6 +242,6 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
             .kind(host_kit::ErrorKind::NoLink));
     }
     let last_event = agent.shared.journal.last();
-    agent.shared.halt(&by, client.map(|client| client.id));
-    Ok(Json(SentObject { sent: "stop".into(), last_event }))
+    let halt = agent.shared.halt(&by, client.map(|client| client.id));
+    Ok(Json(SentObject { sent: "stop".into(), last_event, halt }))
 }

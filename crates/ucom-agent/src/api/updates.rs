@@ -1,6 +1,7 @@
 //! Updates: images that are uploaded, checked, written and read back.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::body::Bytes;
@@ -204,13 +205,14 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
 #[utoipa::path(
     post,
     path = "/api/updates",
-    params(LeaseKey),
+    params(LeaseKey, KnownHalt),
     request_body = UpdateRequest,
     responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn update(
     State(agent): State<Agent>,
     asker: Asker,
+    after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // Before the images are read.
@@ -219,7 +221,7 @@ pub(super) async fn update(
     let profile = agent.shared.picture().profile;
     let options = read(request, profile).await?;
     drop(room);
-    agent.begin(&asker, (Kind::Update, "update"), |hands| {
+    agent.begin((&asker, Some(after)), (Kind::Update, "update"), |hands| {
         let start = options.start;
         match hands.driver.run(BusRequest::Update(options))? {
             Outcome::Update(report) => {

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agent_kit::api::Problem;
+use agent_kit::halt::AskedAfter;
 use agent_kit::lease::{ClientId, Leases};
 use tokio::sync::watch;
 use ucom::Profile;
@@ -52,6 +53,11 @@ impl Halts {
         if let Some(old) = self.last.replace(new).filter(|old| old.client != client) {
             self.last_by_another = Some(old);
         }
+    }
+
+    /// Who asked for the last one.
+    fn last_by(&self) -> &str {
+        self.last.as_ref().map_or("", |halt| halt.by.as_str())
     }
 
     /// Somebody else than this client has just stopped the boards.
@@ -124,13 +130,15 @@ impl Shared {
     }
 
     /// Stops all boards, ahead of all else, and sees to it that they have stopped.
-    pub fn halt(&self, by: &str, client: Option<ClientId>) {
-        {
+    /// Returns its number.
+    pub fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
+        let number = {
             // Both at once: what goes on ends, and what takes its turn now finds the Stop.
             let mut halts = lock(&self.halts);
             self.queue.cancel_by_stop();
             halts.add(by, client);
-        }
+            halts.count
+        };
         self.show_halts();
         let act = |hands: Result<&mut Hands, Problem>| {
             if let Ok(hands) = hands {
@@ -138,6 +146,12 @@ impl Shared {
             }
         };
         self.queue.stop(Box::new(act));
+        number
+    }
+
+    /// How many Stops were asked for until now: the number of the last.
+    pub fn halts(&self) -> u64 {
+        lock(&self.halts).count
     }
 
     /// Something goes on or waits that this client asked for, and that moves.
@@ -145,17 +159,22 @@ impl Shared {
         self.queue.moves_for(client)
     }
 
-    /// What this client asks for now, and whether something may move by it.
+    /// What this client asks for now. Where something may move by it, it was asked for behind the Stop of the number `after`.
     ///
     /// # Errors
     ///
-    /// Something may, and somebody else has just stopped the boards.
-    pub fn asked(&self, client: ClientId, moves: bool) -> Result<Asked, Problem> {
+    /// Something may, and another Stop has come since, whoever asked for that; or somebody else has just stopped the boards.
+    pub fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
-        match halts.keeps_calm(client) {
-            Some(halt) if moves => Err(stopped(&halt.by)),
-            _ => Ok(Asked { client, halt: halts.count, moves }),
+        if let Some(AskedAfter(after)) = after {
+            if halts.count != after {
+                return Err(stopped(halts.last_by()));
+            }
+            if let Some(halt) = halts.keeps_calm(client) {
+                return Err(stopped(&halt.by));
+            }
         }
+        Ok(Asked { client, halt: halts.count, moves: after.is_some() })
     }
 
     /// The leases, and the time. One that has lapsed by then has ended, and what it moved follows its policy: before somebody else
@@ -194,16 +213,11 @@ impl Shared {
         self.has_ended() || self.queue.is_cancelled()
     }
 
-    /// The Stops that were asked for until now.
-    pub(super) fn halts(&self) -> u64 {
-        lock(&self.halts).count
-    }
-
     /// Writes the Stops down that are no event yet: the first one at once, others together.
     pub(super) fn show_halts(&self) {
         let mut halts = lock(&self.halts);
         if halts.more > 0 && halts.shown.is_none_or(|at| at.elapsed() >= TOGETHER) {
-            let by = halts.last.as_ref().map_or_else(String::new, |halt| halt.by.clone());
+            let by = halts.last_by().to_owned();
             let more = std::mem::take(&mut halts.more);
             halts.shown = Some(Instant::now());
             self.journal.write(Happening::Halt { by, times: Some(more).filter(|more| *more > 1) });
@@ -215,7 +229,7 @@ impl Shared {
         {
             let halts = lock(&self.halts);
             if halts.count > asked.halt {
-                return Some(stopped(halts.last.as_ref().map_or("", |halt| halt.by.as_str())));
+                return Some(stopped(halts.last_by()));
             }
         }
         let may = !asked.moves || lock(&self.leases).holds(asked.client, self.now());

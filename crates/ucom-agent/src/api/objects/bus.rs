@@ -44,6 +44,8 @@ pub struct StatusObject {
     pub agent: String,
     /// Number of the last event.
     pub last_event: u64,
+    /// Number of the last Stop, 0 before the first: `asked_after` of what is asked for now.
+    pub last_halt: u64,
 }
 
 /// Who commands.
@@ -105,6 +107,7 @@ impl StatusObject {
             role: Role::Viewer,
             agent: String::new(),
             last_event: 0,
+            last_halt: 0,
         }
     }
 }

@@ -51,6 +51,38 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let said: Vec<&str> = account.story.events.iter().map(|event| event.text.as_str()).collect();
     assert!(said.iter().any(|text| text.contains("HoldPos")), "{said:?}");
 
+    // The last half second as numbers, each tick of it: what the recording has.
+    let (status, values) = served.api_as(Some(operator), "GET /api/log/values?last_s=0.5", None, None);
+    assert_eq!(status, 200, "{values}");
+    let column = |of: &Value| -> Vec<f64> {
+        of.as_array().expect("a column").iter().map(|value| value.as_f64().expect("a number")).collect()
+    };
+    let times = column(&values["times_s"]);
+    assert_eq!((times.len(), times.last()), (501, Some(&0.0)));
+    assert!(times.windows(2).all(|two| (two[1] - two[0] - 1e-3).abs() < 1e-9), "{times:?}");
+    let joints = values["joints"].as_array().expect("joints");
+    assert_eq!((joints.len(), values["state"].as_str()), (6, Some("HoldPos")));
+    let last = samples.last().expect("samples");
+    for (joint, then) in joints.iter().zip(&last.joints) {
+        let columns = ["position_rad", "commanded_rad", "error_rad", "velocity_rad_s", "torque_nm"]
+            .map(|key| column(&joint[key]));
+        assert!(columns.iter().all(|column| column.len() == times.len()));
+        // It rests since.
+        let [position, commanded, error, velocity, torque] = columns.map(|column| column[column.len() - 1]);
+        assert!(
+            (position - then.position).abs() < 1e-3 && (commanded - then.set_position).abs() < 1e-6,
+            "{joint}"
+        );
+        assert!(error.abs() < 2e-3 && velocity.abs() < 0.02 && (torque - then.torque).abs() < 2.0, "{joint}");
+    }
+    let (status, error) = served.api_as(Some(operator), "GET /api/log/values?last_s=61", None, None);
+    assert_eq!(
+        (status, error["value"].as_f64(), error["limit"].as_f64()),
+        (400, Some(61.0), Some(60.0)),
+        "{error}"
+    );
+    assert_eq!(served.api_as(Some(viewer), "GET /api/log/values", None, None).0, 403);
+
     // Nobody else reads or clears it.
     assert_eq!(served.api_as(Some(viewer), "GET /api/log", None, None).0, 403);
     let mut looks = served.session("bob", Some(viewer));

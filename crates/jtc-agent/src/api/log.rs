@@ -2,16 +2,18 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use agent_kit::api::Refusals;
+use agent_kit::api::{Asked, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::extract::State;
 use axum::http::{HeaderName, StatusCode, header};
 use axum::{Extension, Json};
+use jtc_host::error::Facts;
 use jtc_host::log::Account;
-use jtc_host::{ErrorKind, LinkError, Session};
+use jtc_host::{ErrorKind, JointSample, LinkError, Sample, Session};
+use jtc_wire::JOINTS;
 use serde_json::json;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::blocking;
 use super::error::Denials;
@@ -37,6 +39,77 @@ pub struct LogStatusObject {
 #[schema(value_type = String, format = Binary)]
 #[expect(dead_code, reason = "describes a body")]
 pub struct LogFile(Vec<u8>);
+
+/// What the log holds, tick by tick: 1000 rows a second, in columns of the same length. A value that is not known is null.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LogValues {
+    /// Time of each row, s, 0 at the last one.
+    pub times_s: Vec<f64>,
+    /// State of the controller in the last row.
+    pub state: String,
+    /// Base to wrist.
+    pub joints: Vec<LogJoint>,
+}
+
+/// A joint in the log.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct LogJoint {
+    /// Measured, rad.
+    pub position_rad: Vec<Option<f64>>,
+    /// Commanded, rad.
+    pub commanded_rad: Vec<Option<f64>>,
+    /// Commanded minus measured, of the same time, rad.
+    pub error_rad: Vec<Option<f64>>,
+    /// Measured, rad/s.
+    pub velocity_rad_s: Vec<Option<f64>>,
+    /// Commanded on the bus, N·m.
+    pub torque_nm: Vec<Option<f64>>,
+}
+
+impl LogValues {
+    /// The samples of the last start of the controller that lie within `last_s` of the last one.
+    fn of(samples: &[Sample], last_s: f64) -> Self {
+        let end = samples.last().map_or(0.0, |sample| sample.time_s);
+        let rows: Vec<&Sample> =
+            samples.iter().filter(|sample| (0.0..=last_s).contains(&(end - sample.time_s))).collect();
+        let joint = |j: usize| {
+            // Seven digits are more than an encoder has.
+            let column = |value: fn(&JointSample) -> f64| {
+                let known = |sample: &&Sample| {
+                    sample.joints.get(j).map(value).filter(|x| x.is_finite()).map(|x| (x * 1e7).round() / 1e7)
+                };
+                rows.iter().map(known).collect()
+            };
+            LogJoint {
+                position_rad: column(|joint| joint.position),
+                commanded_rad: column(|joint| joint.set_position),
+                error_rad: column(JointSample::position_error),
+                velocity_rad_s: column(|joint| joint.velocity),
+                torque_nm: column(|joint| joint.torque),
+            }
+        };
+        Self {
+            times_s: rows.iter().map(|sample| ((sample.time_s - end) * 1e6).round() / 1e6).collect(),
+            state: samples.last().map_or_else(String::new, |sample| sample.state.name().to_owned()),
+            joints: (0..JOINTS).map(joint).collect(),
+        }
+    }
+}
+
+/// How much of the log is wanted.
+#[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct LogWindow {
+    /// The last seconds of it.
+    #[serde(default = "window_default_s")]
+    #[param(minimum = 0.01, maximum = 60)]
+    last_s: f64,
+}
+
+fn window_default_s() -> f64 {
+    2.0
+}
 
 /// What the flight recorder does. It goes on with it.
 #[utoipa::path(
@@ -67,6 +140,46 @@ pub(super) async fn fetch(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
 ) -> Result<([(HeaderName, String); 2], Vec<u8>), ErrorObject> {
+    let file = told(&agent, &caller, written).await?;
+    let attached = format!("attachment; filename=\"{FILE}\"");
+    let headers = [
+        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
+        (header::CONTENT_DISPOSITION, attached),
+    ];
+    Ok((headers, file))
+}
+
+/// The last of what the log holds, as numbers: what a plot of a moment needs, at 1 kHz. It takes as long as the whole log; one at a time.
+#[utoipa::path(
+    get,
+    path = "/api/log/values",
+    operation_id = "get_log_values",
+    params(LogWindow),
+    responses((status = 200, description = "Columns of the same length", body = LogValues), Refusals, Denials)
+)]
+pub(super) async fn values(
+    State(agent): State<Agent>,
+    Extension(caller): Extension<Caller>,
+    Asked(LogWindow { last_s }): Asked<LogWindow>,
+) -> Result<Json<LogValues>, ErrorObject> {
+    if !(0.01..=60.0).contains(&last_s) {
+        let object =
+            ErrorObject::new("request", format!("last_s {last_s}: from 0.01 to 60"), "leave it out for 2 s");
+        let limit = if last_s > 60.0 { 60.0 } else { 0.01 };
+        return Err(object
+            .with(&Facts { value: Some(last_s), limit: Some(limit), ..Facts::default() })
+            .unreadable());
+    }
+    let last = move |account: &Account| Ok(LogValues::of(&account.replayed.samples(), last_s));
+    told(&agent, &caller, last).await.map(Json)
+}
+
+/// Reads the log, and makes of it what is asked for: for operators, one at a time.
+async fn told<T: Send + 'static>(
+    agent: &Agent,
+    caller: &Caller,
+    make: impl FnOnce(&Account) -> Result<T, ErrorObject> + Send + 'static,
+) -> Result<T, ErrorObject> {
     // Reading it holds up what it records.
     caller.operator()?;
     agent.note("log", json!({ "from": caller.peer.to_string() }));
@@ -85,18 +198,13 @@ pub(super) async fn fetch(
     let (log, room) = fetched.await??;
     drop(reader);
     let source = agent.port.clone();
-    let file = blocking(move || {
+    let made = blocking(move || {
         let account = Account::of(log, None, &source);
-        let file = if account.replayed.ticks.is_empty() { Err(empty()) } else { written(&account) };
+        let made = if account.replayed.ticks.is_empty() { Err(empty()) } else { make(&account) };
         drop(room);
-        file
+        made
     });
-    let attached = format!("attachment; filename=\"{FILE}\"");
-    let headers = [
-        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
-        (header::CONTENT_DISPOSITION, attached),
-    ];
-    Ok((headers, file.await??))
+    made.await?
 }
 
 /// The recording as bytes.

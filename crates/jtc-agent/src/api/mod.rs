@@ -291,7 +291,7 @@ fn described() -> OpenApiRouter<Agent> {
 /// What takes its time.
 fn slow() -> OpenApiRouter<Agent> {
     let plans = OpenApiRouter::new().routes(routes!(plans::plan)).layer(DefaultBodyLimit::max(PLAN_MAX));
-    plans.merge(OpenApiRouter::new().routes(routes!(log::fetch)))
+    plans.merge(OpenApiRouter::new().routes(routes!(log::fetch)).routes(routes!(log::values)))
 }
 
 /// The controller, as its last status has it, and who commands.

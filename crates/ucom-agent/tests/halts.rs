@@ -153,3 +153,19 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     assert_eq!(served.over(job)["stage"], "finished");
     assert_eq!(set("", 700).0, 200);
 }
+
+/// Messages that are late say so, however steadily they come.
+#[test]
+fn each_status_has_the_time_when_it_was_made() {
+    let served = Served::start(1);
+    let asked = || served.api("GET /api/status", None, None).1["at_ms"].as_u64().expect("a time");
+    let (before, mut times) = (asked(), Vec::new());
+    served.stream("/api/stream", |message| {
+        if message["kind"] == "status" {
+            times.push(message["at_ms"].as_u64().expect("a time"));
+        }
+        times.len() == 3
+    });
+    let after = asked();
+    assert!(times.is_sorted() && times.first() >= Some(&before) && times.last() <= Some(&after), "{times:?}");
+}

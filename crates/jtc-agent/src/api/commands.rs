@@ -42,15 +42,6 @@ pub struct Switch {
     pub on: bool,
 }
 
-/// Rates of the joints.
-#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct JogRequest {
-    /// rad/s, base to wrist. They hold for 200 ms: send them again in time, and zeros at the end.
-    #[schema(min_items = 6, max_items = 6)]
-    pub rates_rad_s: [f64; 6],
-}
-
 impl Agent {
     /// Has the end of the line of the client that commands do something that moves nothing.
     pub(super) async fn command<T, E>(
@@ -85,7 +76,7 @@ impl Agent {
     }
 
     /// Does it, and logs it whether or not somebody waits for the end of it.
-    async fn act<T, E>(
+    pub(super) async fn act<T, E>(
         &self,
         commander: &Commander,
         turn: Turn,
@@ -179,27 +170,6 @@ pub(super) async fn speed(
     }
     let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(percent) / 100.0);
     agent.command(&asker, "speed", set).await?;
-    Ok(StatusCode::NO_CONTENT)
-}
-
-/// Moves single joints as long as it is asked again and again.
-#[utoipa::path(
-    post,
-    path = "/api/jog",
-    params(LeaseKey, KnownHalt),
-    request_body = JogRequest,
-    responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
-)]
-pub(super) async fn jog(
-    State(agent): State<Agent>,
-    asker: Asker,
-    after: AskedAfter,
-    Body(JogRequest { rates_rad_s }): Body<JogRequest>,
-) -> Result<StatusCode, ErrorObject> {
-    let commander = agent.commander(&asker)?;
-    let turn = commander.turn()?;
-    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.0, now))?;
-    agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

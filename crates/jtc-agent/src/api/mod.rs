@@ -9,6 +9,7 @@ mod events;
 mod explain;
 mod foxglove;
 mod identity;
+mod jog;
 mod lease;
 mod log;
 mod maintain;
@@ -190,10 +191,15 @@ impl Agent {
         Ok(Json(SentObject { sent: command.name().to_owned(), halt }))
     }
 
+    /// Time since this agent began, ms.
+    fn now_ms(&self) -> u64 {
+        self.line.now().as_millis() as u64
+    }
+
     /// The controller, as its last status has it, and who commands.
     fn status(&self, caller: &Caller) -> StatusObject {
         let lost = self.line.lost();
-        let (status, lease, clients, last_halt) = self.line.with(|line, now| {
+        let (status, lease, clients, last_halt, at) = self.line.with(|line, now| {
             let name = |client| line.introduction(client).map(|client| client.name.clone());
             let lease = line.lease().map(|lease| LeaseObject {
                 holder: name(lease.holder).unwrap_or_default(),
@@ -202,11 +208,12 @@ impl Agent {
                 wanted_by: lease.wanted_by.and_then(name),
             });
             let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
-            (status, lease, line.clients(), line.last_halt())
+            (status, lease, line.clients(), line.last_halt(), now)
         });
         StatusObject {
             simulated: self.simulated,
             port: self.port.to_string(),
+            at_ms: at.as_millis() as u64,
             lost,
             age_ms: status.as_ref().map(|(age, _)| age.as_millis() as u64),
             controller: status
@@ -271,7 +278,7 @@ fn described() -> OpenApiRouter<Agent> {
         .routes(routes!(poses::put, poses::delete))
         .routes(routes!(commands::resume))
         .routes(routes!(maintain::speed, commands::speed))
-        .routes(routes!(commands::jog))
+        .routes(routes!(jog::jog))
         .routes(routes!(commands::teach))
         .routes(routes!(commands::gripper))
         .routes(routes!(maintain::clear))

@@ -15,6 +15,8 @@ pub struct StatusObject {
     pub simulated: bool,
     /// Name of the port.
     pub port: String,
+    /// Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+    pub at_ms: u64,
     /// Why the port is gone; missing while it is there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<String>,

@@ -303,6 +303,16 @@ impl SharedLine {
         self.ask(id, after, CALM_AGAIN, now)
     }
 
+    /// The client could ask for a jog, as far as others are concerned; one that insists behind a Stop waits on.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ask_to_move`](Self::ask_to_move).
+    pub fn could_jog(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
+        self.could_command(id, now)?;
+        self.is_calm(id, now, CALM_AGAIN)
+    }
+
     /// The client could ask for what may move the arm, as far as others are concerned.
     ///
     /// # Errors

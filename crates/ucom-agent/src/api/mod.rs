@@ -122,6 +122,7 @@ impl Agent {
         StatusObject {
             simulated: self.simulated,
             bus: self.bus.to_string(),
+            at_ms: now.as_millis() as u64,
             lost: self.shared.lost(),
             lease,
             role: caller.role,

@@ -11,6 +11,8 @@ pub struct StatusObject {
     pub simulated: bool,
     /// The bus.
     pub bus: String,
+    /// Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+    pub at_ms: u64,
     /// Why the bus is gone; missing while it is there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<String>,
@@ -86,6 +88,7 @@ impl StatusObject {
         Self {
             simulated: false,
             bus: String::new(),
+            at_ms: 0,
             lost: None,
             age_ms: picture.at.elapsed().as_millis() as u64,
             boards: picture.boards.iter().count(),

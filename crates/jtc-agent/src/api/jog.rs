@@ -1,0 +1,135 @@
+//! Jogging, for who has the lease: as long as somebody holds a key down, and sees what comes of it.
+use std::time::Duration;
+
+use agent_kit::api::{Asked, Body, Refusals};
+use agent_kit::gate::Asker;
+use agent_kit::halt::{AskedAfter, Halts as _, KnownHalt};
+use agent_kit::lease::LeaseKey;
+use axum::extract::{FromRequestParts, State};
+use axum::http::StatusCode;
+use axum::http::request::Parts;
+use jtc_host::error::Facts;
+use utoipa::{IntoParams, ToSchema};
+
+use super::error::Denials;
+use super::{Agent, ErrorObject};
+
+/// So old may be what a person saw when a jog arrives that was asked for by it.
+const SEEN_WITHIN: Duration = Duration::from_millis(500);
+/// So far may the time of what was seen be ahead: it was rounded, and sent before.
+const AHEAD: Duration = Duration::from_millis(100);
+
+/// Rates of the joints.
+#[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JogRequest {
+    /// rad/s, base to wrist. They hold for 200 ms: send them again in time, and zeros at the end.
+    #[schema(min_items = 6, max_items = 6)]
+    pub rates_rad_s: [f64; 6],
+}
+
+/// What the client knew when it asked for a jog.
+#[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct KnownToJog {
+    /// `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+    /// however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+    /// behind a halt of others.
+    asked_after: Option<u64>,
+    /// `at_ms` of the newest status that the person saw. Where this request arrives more than 500 ms behind it nothing moves.
+    /// Zeros, the end of jogging, are taken all the same.
+    as_of_ms: Option<u64>,
+}
+
+/// What the client knew; a halt that it does not name is taken before its body, which may be long on its way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JogAsked {
+    after: AskedAfter,
+    as_of_ms: Option<u64>,
+}
+
+impl FromRequestParts<Agent> for JogAsked {
+    type Rejection = ErrorObject;
+
+    async fn from_request_parts(parts: &mut Parts, agent: &Agent) -> Result<Self, ErrorObject> {
+        let last = agent.last_halt();
+        let Asked(KnownToJog { asked_after, as_of_ms }) = Asked::from_request_parts(parts, agent).await?;
+        let after = KnownHalt { asked_after }.among(last)?;
+        Ok(Self { after, as_of_ms })
+    }
+}
+
+/// A duration as it is compared.
+const fn ms(duration: Duration) -> u64 {
+    duration.as_millis() as u64
+}
+
+/// Why what was asked for by a status of `as_of_ms` moves nothing that arrived at `arrived_ms`.
+fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<ErrorObject> {
+    let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
+    if ahead > ms(AHEAD) {
+        let message = format!(
+            "as_of_ms {as_of_ms}: this agent began {arrived_ms} ms ago; it may have been started again"
+        );
+        let facts =
+            Facts { value: Some(as_of_ms as f64), limit: Some(arrived_ms as f64), ..Facts::default() };
+        return Some(
+            ErrorObject::new("request", message, "GET /api/status has at_ms").with(&facts).unreadable(),
+        );
+    }
+    (late > ms(SEEN_WITHIN)).then(|| {
+        let limit = ms(SEEN_WITHIN);
+        let message = format!(
+            "this jog comes {late} ms behind what the person saw, {limit} ms are allowed: nothing moves by it"
+        );
+        let facts = Facts { value: Some(late as f64), limit: Some(limit as f64), ..Facts::default() };
+        let next = "the connection is too slow for jogging: come nearer, or use a move";
+        ErrorObject::new("late", message, next).with(&facts)
+    })
+}
+
+/// Moves single joints as long as it is asked again and again.
+#[utoipa::path(
+    post,
+    path = "/api/jog",
+    params(LeaseKey, KnownToJog),
+    request_body = JogRequest,
+    responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
+)]
+pub(super) async fn jog(
+    State(agent): State<Agent>,
+    asker: Asker,
+    JogAsked { after, as_of_ms }: JogAsked,
+    Body(JogRequest { rates_rad_s }): Body<JogRequest>,
+) -> Result<StatusCode, ErrorObject> {
+    let commander = agent.commander(&asker)?;
+    let turn = commander.turn()?;
+    let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
+    // All of it is there now: its body may have come behind its head.
+    let arrived_ms = agent.now_ms();
+    if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
+        // A key that is held down behind a Stop has to be let go, too, where what it asks for comes late.
+        agent.line.with(|line, now| line.could_jog(commander.client, now))?;
+        return Err(late);
+    }
+    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.0, now))?;
+    agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jog_is_late_behind_what_was_seen_and_wrong_ahead_of_it() {
+        let code = |as_of, arrived| too_late(as_of, arrived).map(|error| error.code);
+        assert_eq!((code(1_000, 1_500), code(1_000, 1_501)), (None, Some("late")));
+        assert_eq!((code(1_100, 1_000), code(1_101, 1_000)), (None, Some("request")));
+        let facts = too_late(1_000, 1_700).map(|error| (error.facts.value, error.facts.limit));
+        assert_eq!(facts, Some((Some(700.0), Some(500.0))));
+        assert_eq!(code(u64::MAX, 0), Some("request"));
+        assert_eq!(code(0, u64::MAX), Some("late"));
+    }
+}

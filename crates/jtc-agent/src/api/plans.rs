@@ -77,6 +77,9 @@ pub struct KeepRequest {
     pub number: u16,
     /// What people are to call it: the first 64 characters.
     pub name: String,
+    /// In place of nothing: where the number has a trajectory already the plan is refused, and nothing is replaced.
+    #[serde(default)]
+    pub new: bool,
 }
 
 fn hundred() -> f64 {
@@ -183,6 +186,10 @@ pub(super) async fn plan(
     // It takes the computer's time, and may change what others run.
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
+    if let Some(KeepRequest { number, new: true, .. }) = request.keep {
+        // A plan takes its time.
+        agent.jobs.store.is_free(number).map_err(|e| ErrorObject::diagnosed(&e))?;
+    }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
         let next = "ask again when it is ready: one plan is made at a time";
         ErrorObject::new("busy", "another plan is being made", next)
@@ -317,8 +324,12 @@ fn kept(
 ) -> Result<PlanObject, ErrorObject> {
     let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
     let text = trajectory.to_exact_csv();
-    let keep = |KeepRequest { number, name }: &KeepRequest| {
-        let stored = agent.jobs.store.put(*number, &plain(name), &text, false);
+    let keep = |KeepRequest { number, name, new }: &KeepRequest| {
+        let (store, name) = (&agent.jobs.store, plain(name));
+        let stored = match new {
+            true => store.put_new(*number, &name, &text, false),
+            false => store.put(*number, &name, &text, false),
+        };
         stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
     };
     let kept = request.keep.as_ref().map(keep).transpose()?;

@@ -15,7 +15,7 @@ use super::arm::GivenObject;
 use super::error::Denials;
 use super::poses::pose_error;
 use super::{Agent, ErrorObject};
-use crate::jobs::{Course, Job, NUMBER_MAX, Order, run};
+use crate::jobs::{Course, Job, NUMBER_MAX, Order, Stored, run};
 use crate::line::Policy;
 
 /// A run of a trajectory that is kept.
@@ -25,6 +25,9 @@ pub struct RunRequest {
     /// Its number.
     #[schema(minimum = 1, maximum = 99)]
     pub trajectory: u16,
+    /// Digest of the trajectory that was looked at: where the number has another one by now nothing is sent.
+    #[serde(default)]
+    pub digest: Option<String>,
     /// Where the arm stands elsewhere it is moved to the first point, at half of the limits at most.
     #[serde(default)]
     pub approach: bool,
@@ -191,8 +194,15 @@ pub(super) async fn begin_run(
     after: AskedAfter,
     Body(request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let RunRequest { trajectory: number, approach, speed_percent, repeat, policy, accept_device_limits } =
-        request;
+    let RunRequest {
+        trajectory: number,
+        digest,
+        approach,
+        speed_percent,
+        repeat,
+        policy,
+        accept_device_limits,
+    } = request;
     within("repeat", f64::from(repeat), 1e6)?;
     within("speed_percent", speed_percent, 1000.0)?;
     let stored = agent.jobs.store.get(number).ok_or_else(|| {
@@ -205,6 +215,9 @@ pub(super) async fn begin_run(
         )
         .kind(ErrorKind::Usage)
     })?;
+    if digest.is_some_and(|digest| digest != stored.digest) {
+        return Err(replaced(&stored));
+    }
     let what = format!("run of trajectory {number}, {}", stored.name);
     let course = Course::Along(stored.trajectory.clone());
     begin(
@@ -214,6 +227,17 @@ pub(super) async fn begin_run(
         policy,
         Order { course, approach, speed_percent, repeat, accept_device_limits },
     )
+}
+
+/// Somebody has put something else under the number since.
+fn replaced(stored: &Stored) -> ErrorObject {
+    let Stored { number, name, digest, .. } = stored;
+    let message = format!(
+        "trajectory {number} was replaced since it was looked at: it is {name} now, with the digest {digest}; nothing was sent"
+    );
+    let next =
+        format!("look at it again: GET /api/trajectories/{number}/points has its points and its digest");
+    ErrorObject::new("replaced", message, next)
 }
 
 /// Moves the arm from where it stands to joint positions, a named pose or a pose of the flange: a job.

@@ -50,11 +50,13 @@ pub struct TrajectoryObject {
     pub duration_s: f64,
     /// What was derived or left out when it was read.
     pub notes: Vec<String>,
+    /// What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it.
+    pub digest: String,
 }
 
 impl From<&Stored> for TrajectoryObject {
     fn from(stored: &Stored) -> Self {
-        let Stored { number, name, trajectory, notes } = stored;
+        let Stored { number, name, trajectory, notes, digest } = stored;
         Self {
             number: *number,
             name: name.clone(),
@@ -62,8 +64,20 @@ impl From<&Stored> for TrajectoryObject {
             step_ms: trajectory.step_ms,
             duration_s: trajectory.duration_s(),
             notes: notes.clone(),
+            digest: digest.clone(),
         }
     }
+}
+
+/// What a trajectory may take the place of.
+#[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct PlaceRequest {
+    /// Of nothing: where the number has a trajectory already it is refused, and nothing is replaced.
+    #[serde(default)]
+    #[param(default = false)]
+    new: bool,
 }
 
 /// How much of a trajectory is shown.
@@ -90,6 +104,8 @@ pub struct PointsObject {
     pub name: String,
     /// s.
     pub duration_s: f64,
+    /// What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it.
+    pub digest: String,
     /// Times of the points, s.
     pub times_s: Vec<f64>,
     /// Where the joints are at each of them, from the base, rad.
@@ -99,7 +115,7 @@ pub struct PointsObject {
 impl PointsObject {
     /// So many points at most, which are two or more.
     fn new(stored: &Stored, most: usize) -> Self {
-        let Stored { number, name, trajectory, .. } = stored;
+        let Stored { number, name, trajectory, digest, .. } = stored;
         let count = trajectory.points.len();
         let (shown, steps) = (count.min(most), count.saturating_sub(1));
         let places = (0..shown).map(|k| k * steps / shown.saturating_sub(1).max(1));
@@ -113,6 +129,7 @@ impl PointsObject {
             number: *number,
             name: name.clone(),
             duration_s: trajectory.duration_s(),
+            digest: digest.clone(),
             times_s,
             positions_rad,
         }
@@ -126,6 +143,8 @@ pub struct CheckObject {
     pub passed: bool,
     /// s.
     pub duration_s: f64,
+    /// What was checked, in short: the digest of the trajectory.
+    pub digest: String,
     /// What is wrong, worst first.
     pub problems: Vec<ProblemObject>,
 }
@@ -152,8 +171,8 @@ pub struct ProblemObject {
     pub warning: bool,
 }
 
-impl From<&Verdict> for CheckObject {
-    fn from(verdict: &Verdict) -> Self {
+impl CheckObject {
+    fn new(verdict: &Verdict, digest: String) -> Self {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         let problems = verdict.problems.iter().map(|problem| ProblemObject {
             message: problem.to_string(),
@@ -164,7 +183,7 @@ impl From<&Verdict> for CheckObject {
             limit: finite(problem.limit),
             warning: problem.warning,
         });
-        Self { passed: verdict.is_ok(), duration_s: verdict.duration_s, problems: problems.collect() }
+        Self { passed: verdict.is_ok(), duration_s: verdict.duration_s, digest, problems: problems.collect() }
     }
 }
 
@@ -184,7 +203,7 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObjec
     put,
     path = "/api/trajectories/{number}",
     operation_id = "put_trajectory",
-    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99), PlaceRequest),
     request_body = TrajectoryRequest,
     responses((status = 200, description = "What is kept", body = TrajectoryObject), Refusals, Denials)
 )]
@@ -192,13 +211,14 @@ pub(super) async fn put(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     Number(number): Number<u16>,
+    Asked(place): Asked<PlaceRequest>,
     request: Request,
 ) -> Result<Json<TrajectoryObject>, ErrorObject> {
     // Only operators change what others may run.
     caller.operator()?;
     let own = agent.clone();
     let kept = read(&agent, request, move |request| {
-        let kept = keep(&own, number, request);
+        let kept = keep(&own, (number, place), request);
         let (from, why) = (caller.peer.to_string(), kept.as_ref().err().map(|error| error.message.clone()));
         own.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
         kept
@@ -206,9 +226,17 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-fn keep(agent: &Agent, number: u16, request: TrajectoryRequest) -> Result<TrajectoryObject, ErrorObject> {
+fn keep(
+    agent: &Agent,
+    (number, PlaceRequest { new }): (u16, PlaceRequest),
+    request: TrajectoryRequest,
+) -> Result<TrajectoryObject, ErrorObject> {
     let TrajectoryRequest { name, text, degrees } = request;
-    let stored = agent.jobs.store.put(number, &plain(&name), &text, degrees);
+    let (store, name) = (&agent.jobs.store, plain(&name));
+    let stored = match new {
+        true => store.put_new(number, &name, &text, degrees),
+        false => store.put(number, &name, &text, degrees),
+    };
     stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
 }
 
@@ -301,6 +329,7 @@ pub(super) async fn check(
     };
     let asked = agent.jobs.asker().call_in_turn(asked).await?;
     let (arm, options) = asked.map_err(|error| ErrorObject::of(&error))?;
+    let digest = stored.digest.clone();
     let start = stored.trajectory.points.first().map_or([0.0; 6], |point| point.position);
     let checked = blocking(move || {
         let checked = CheckedTrajectory::check(&stored.trajectory, &arm, &start, &options);
@@ -309,8 +338,8 @@ pub(super) async fn check(
     })
     .await?;
     match checked {
-        Ok(checked) => Ok(Json(CheckObject::from(checked.verdict()))),
-        Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::from(&*verdict))),
+        Ok(checked) => Ok(Json(CheckObject::new(checked.verdict(), digest))),
+        Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::new(&verdict, digest))),
         Err(error) => Err(ErrorObject::of(&error.into())),
     }
 }

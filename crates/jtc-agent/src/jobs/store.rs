@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use jtc_host::Trajectory;
 use jtc_host::file::FileError;
-use jtc_host::trajectory::{Loaded, POINTS_MAX};
+use jtc_host::trajectory::{Loaded, POINTS_MAX, Point};
+use sha2::{Digest as _, Sha256};
 
 use super::{PoseStore, PoseStoreError};
 
@@ -25,6 +26,8 @@ pub struct Stored {
     pub trajectory: Trajectory,
     /// What was derived or left out when it was read.
     pub notes: Vec<String>,
+    /// What is executed of it, in short: another text for any other points or another step, whatever its name is.
+    pub digest: String,
 }
 
 /// Why something is not kept.
@@ -33,6 +36,14 @@ pub enum StoreError {
     /// No such number.
     #[error("{0} is no number of a trajectory: 1 to {NUMBER_MAX} are")]
     Number(u16),
+    /// It was to be kept in place of nothing.
+    #[error("trajectory {number} is there already, {name}: nothing was replaced")]
+    Taken {
+        /// The number.
+        number: u16,
+        /// What has it.
+        name: String,
+    },
     /// Two files of one number: which of them is meant?
     #[error("{directory}: two files are trajectory {number}", directory = directory.display())]
     Twice {
@@ -67,6 +78,10 @@ impl host_kit::Diagnose for StoreError {
     fn diagnosis(&self) -> host_kit::Diagnosis {
         let (code, next) = match self {
             Self::Number(_) => ("number", format!("choose a number from 1 to {NUMBER_MAX}")),
+            Self::Taken { .. } => {
+                let next = "choose another number, or ask for it to be replaced: without `new`";
+                return host_kit::Diagnosis::new(host_kit::ErrorKind::Refused, "taken", next);
+            }
             Self::Twice { .. } => {
                 ("store", "remove the one that is not meant, or give it another number".into())
             }
@@ -142,6 +157,42 @@ impl Store {
     ///
     /// [`StoreError`]; what had this number before is kept then.
     pub fn put(&self, number: u16, name: &str, text: &str, degrees: bool) -> Result<Arc<Stored>, StoreError> {
+        self.keep((number, name), (text, degrees), false)
+    }
+
+    /// The same in place of nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError::Taken`], and those of [`put`](Self::put).
+    pub fn put_new(
+        &self,
+        number: u16,
+        name: &str,
+        text: &str,
+        degrees: bool,
+    ) -> Result<Arc<Stored>, StoreError> {
+        self.keep((number, name), (text, degrees), true)
+    }
+
+    /// Nothing has this number.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError::Taken`].
+    pub fn is_free(&self, number: u16) -> Result<(), StoreError> {
+        match self.get(number) {
+            Some(stored) => Err(StoreError::Taken { number, name: stored.name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    fn keep(
+        &self,
+        (number, name): (u16, &str),
+        (text, degrees): (&str, bool),
+        new: bool,
+    ) -> Result<Arc<Stored>, StoreError> {
         if !(1..=NUMBER_MAX).contains(&number) {
             return Err(StoreError::Number(number));
         }
@@ -154,6 +205,9 @@ impl Store {
         }
         let stored = Arc::new(Stored::new(number, name, loaded));
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        if new {
+            self.is_free(number)?;
+        }
         if let Some(directory) = &self.directory {
             let path = directory.join(format!("{number}-{}.csv", file_name(name)));
             let written = write(directory, &path, &stored.trajectory, number);
@@ -185,8 +239,22 @@ impl Store {
 impl Stored {
     fn new(number: u16, name: &str, loaded: Loaded) -> Self {
         let Loaded { trajectory, notes, .. } = loaded;
-        Self { number, name: name.to_owned(), trajectory, notes }
+        let digest = digest(&trajectory);
+        Self { number, name: name.to_owned(), trajectory, notes, digest }
     }
+}
+
+/// The first 64 bits of SHA-256 over step and points, as text.
+fn digest(trajectory: &Trajectory) -> String {
+    let mut hash = Sha256::new();
+    hash.update(trajectory.step_ms.to_le_bytes());
+    for Point { position, velocity, acceleration } in &trajectory.points {
+        for value in [position, velocity, acceleration].into_iter().flatten() {
+            // Both zeros are the same.
+            hash.update((value + 0.0).to_le_bytes());
+        }
+    }
+    hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Number and name of a file that holds a trajectory by number.
@@ -260,8 +328,46 @@ mod tests {
             again.get(7).expect("it is there").trajectory,
             store.get(7).expect("it is there").trajectory
         );
+        assert_eq!(
+            again.get(7).map(|kept| kept.digest.clone()),
+            store.get(7).map(|kept| kept.digest.clone())
+        );
         assert!(again.delete(7).expect("it can be written") && !again.delete(7).expect("it can be written"));
         assert_eq!(names(&Store::open(directory.path()).expect("its own files")).len(), 1);
+    }
+
+    #[test]
+    fn a_digest_is_that_of_what_is_executed_alone() {
+        let store = Store::in_memory();
+        let digest = |name: &str, text: &str, degrees| {
+            store.put(1, name, text, degrees).expect("a trajectory").digest.clone()
+        };
+        let first = digest("a", TEXT, false);
+        assert!(first.len() == 16 && first.chars().all(|c| c.is_ascii_hexdigit()), "{first}");
+        // Neither its name nor how its text is written is executed.
+        assert_eq!(digest("b", TEXT, true), first);
+        assert_eq!(digest("b", &TEXT.replace("0,0\n", "0.0,-0\n"), false), first);
+        // Points, their places and the time between them are.
+        for other in [
+            TEXT.replace("1,0,", "1,0.000001,"),
+            TEXT.replace("1,0,0", "1,0,0.000001"),
+            TEXT.replace("\n1,", "\n2,"),
+            format!("{TEXT}2,0,0,0,0,0,0\n"),
+        ] {
+            assert_ne!(digest("a", &other, false), first, "{other}");
+        }
+    }
+
+    #[test]
+    fn what_is_new_takes_the_place_of_nothing() {
+        let store = Store::in_memory();
+        store.put_new(7, "pick", TEXT, false).expect("it is free");
+        let error = store.put_new(7, "place", TEXT, false).expect_err("it is taken");
+        assert!(matches!(&error, StoreError::Taken { number: 7, name } if name == "pick"), "{error}");
+        assert_eq!(store.get(7).map(|kept| kept.name.clone()), Some("pick".to_owned()));
+        assert!(store.is_free(7).is_err() && store.is_free(8).is_ok());
+        store.put(7, "place", TEXT, false).expect("that is what is asked for");
+        assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
     }
 
     /// A disk that is full keeps what was there, also for the next agent; with room it takes the next one.

@@ -1,0 +1,100 @@
+//! What is run is what was looked at, and what is kept is replaced by whoever means to.
+mod common;
+
+use common::Served;
+use common::program::Program;
+use serde_json::{Value, json};
+
+/// A short motion of the base, so far.
+fn sway(far_rad: f64) -> String {
+    let rows = (0..=200).map(|i| {
+        let t = f64::from(i) * 0.01;
+        let q = far_rad * (1.0 - (std::f64::consts::PI * t).cos()) / 2.0;
+        format!("{t},{q},0,0,0,0,0\n")
+    });
+    format!("t,q1,q2,q3,q4,q5,q6\n{}", rows.collect::<String>())
+}
+
+/// Keeps one.
+fn put(served: &Served, place: &str, name: &str, far_rad: f64) -> (u16, Value) {
+    let body = json!({ "name": name, "text": sway(far_rad) });
+    served.api(&format!("PUT /api/trajectories/{place}"), None, Some(body))
+}
+
+fn digest(object: &Value) -> String {
+    object["digest"].as_str().unwrap_or_else(|| panic!("a digest in {object}")).to_owned()
+}
+
+fn get(served: &Served, request: &str) -> Value {
+    let (status, object) = served.api(&format!("GET {request}"), None, None);
+    assert_eq!(status, 200, "{object}");
+    object
+}
+
+#[test]
+fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    anna.recover();
+    let (status, kept) = put(&served, "7", "small", 0.1);
+    assert_eq!(status, 200, "{kept}");
+    let seen = digest(&kept);
+    // Wherever it is looked at it is the same.
+    assert_eq!(digest(&get(&served, "/api/trajectories")[0]), seen);
+    assert_eq!(digest(&get(&served, "/api/trajectories/7/points?most=2")), seen);
+    let check = get(&served, "/api/trajectories/7/check");
+    assert_eq!((digest(&check), &check["passed"]), (seen.clone(), &json!(true)), "{check}");
+    let run = |digest: &str| anna.ask("POST /api/runs", Some(json!({ "trajectory": 7, "digest": digest })));
+    let jobs = || get(&served, "/api/jobs").as_array().map(Vec::len);
+
+    // Somebody else puts another one there.
+    let (status, other) = put(&served, "7", "large", 0.4);
+    assert_eq!(status, 200, "{other}");
+    let before = jobs();
+    for wrong in [seen.as_str(), "", "0000000000000000"] {
+        let (status, error) = run(wrong);
+        assert_eq!((status, error["code"].as_str()), (409, Some("replaced")), "{error}");
+        assert!(error["message"].as_str().is_some_and(|m| m.contains("large")), "{error}");
+        assert!(error["next"].as_str().is_some_and(|n| n.contains("/api/trajectories/7/points")), "{error}");
+    }
+    assert_eq!(jobs(), before, "nothing was begun");
+    let (status, job) = run(&digest(&other));
+    assert_eq!(status, 202, "{job}");
+    assert_eq!(anna.over(job["number"].as_u64().expect("a number"))["stage"], "finished");
+    // The same points are the same, whatever they are called; and who names none runs what is there.
+    assert_eq!(digest(&put(&served, "7", "small again", 0.1).1), seen);
+    let (status, job) =
+        anna.ask("POST /api/runs", Some(json!({ "trajectory": 7, "approach": true, "digest": seen })));
+    assert_eq!(status, 202, "{job}");
+    assert_eq!(anna.over(job["number"].as_u64().expect("a number"))["stage"], "finished");
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
+    assert_eq!(anna.over(job)["stage"], "finished");
+}
+
+#[test]
+fn what_is_new_replaces_nothing() {
+    let served = Served::start(921_600);
+    let (status, kept) = put(&served, "7?new=true", "mine", 0.1);
+    assert_eq!(status, 200, "{kept}");
+    let (status, error) = put(&served, "7?new=true", "yours", 0.2);
+    assert_eq!((status, error["code"].as_str()), (409, Some("taken")), "{error}");
+    assert!(error["message"].as_str().is_some_and(|m| m.contains("mine")), "{error}");
+    let two = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0.2,-0.3,0,0.2,0\n";
+    let plan = |number: u16, new: bool| {
+        let keep = json!({ "number": number, "name": "planned", "new": new });
+        served.api("POST /api/plans", None, Some(json!({ "waypoints": two, "keep": keep })))
+    };
+    let (status, error) = plan(7, true);
+    assert_eq!((status, error["code"].as_str()), (409, Some("taken")), "{error}");
+    assert_eq!(digest(&get(&served, "/api/trajectories")[0]), digest(&kept));
+    assert_eq!(put(&served, "7?new=perhaps", "yours", 0.2).0, 400);
+    // Where nothing is it is kept, and replaced where that is asked for.
+    let (status, planned) = plan(8, true);
+    assert_eq!(status, 200, "{planned}");
+    assert_eq!(digest(&planned["kept"]), digest(&get(&served, "/api/trajectories/8/points")));
+    assert_eq!((put(&served, "8?new=false", "yours", 0.2).0, plan(7, false).0), (200, 200));
+    let list = get(&served, "/api/trajectories");
+    let names: Vec<Option<&str>> =
+        list.as_array().expect("a list").iter().map(|one| one["name"].as_str()).collect();
+    assert_eq!(names, [Some("planned"), Some("yours")]);
+}

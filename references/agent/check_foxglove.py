@@ -117,7 +117,10 @@ def check_motion(viewer, arm):
     """Commanded and measured while it moves; its service calls pause and stop."""
     number = arm.json("POST", "/api/runs", {"trajectory": 3, "repeat": 50})["number"]
     viewer.forget()
-    viewer.message("/jtc/status", lambda message: message["trajectory"] == "Execute")
+    try:
+        viewer.message("/jtc/status", lambda message: message["trajectory"] == "Execute")
+    except AssertionError as error:
+        raise AssertionError(arm.json("GET", f"/api/jobs/{number}"), arm.json("GET", "/api/status")) from error
     commanded = viewer.message("/joint_commands", lambda message: abs(message["position"][0]) > 0.05)["position"]
     measured = viewer.message("/joint_states", lambda message: math.dist(message["position"], commanded) < 0.05)
     halt = viewer.call("pause")
@@ -153,7 +156,8 @@ def check(jtc, directory):
                 arm.key = None
                 check_commanded(viewer, jtc, directory, agent)
                 arm.key = arm.json("POST", "/api/lease", {"name": "reference", "lasts_s": 60.0})["key"]
-                check_motion(viewer, arm)
+                with arm.renewing():
+                    check_motion(viewer, arm)
 
 
 if __name__ == "__main__":

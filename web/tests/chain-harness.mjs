@@ -111,6 +111,31 @@ export function image(bytes) {
   return Buffer.from(Array.from({ length: bytes }, (_, i) => (37 * i + 11) & 0xff));
 }
 
+const hex = (bytes) => Buffer.from(bytes).toString('hex').toUpperCase();
+const sum = (bytes) => bytes.reduce((a, b) => a + b, 0) & 0xff;
+
+/** The bytes from address 0 on as Intel HEX, of 16 bytes a record. */
+export function intelHex(bytes) {
+  const record = (address, kind, data) => {
+    const all = [data.length, address >> 8, address & 0xff, kind, ...data];
+    return `:${hex([...all, -sum(all) & 0xff])}\n`;
+  };
+  let text = '';
+  for (let at = 0; at < bytes.length; at += 16) text += record(at, 0, bytes.subarray(at, at + 16));
+  return `${text}:00000001FF\n`;
+}
+
+/** The same as Motorola's S-records. */
+export function sRecords(bytes) {
+  const record = (kind, address, data) => {
+    const all = [data.length + 3, address >> 8, address & 0xff, ...data];
+    return `S${kind}${hex([...all, ~sum(all) & 0xff])}\n`;
+  };
+  let text = record(0, 0, Buffer.from('app'));
+  for (let at = 0; at < bytes.length; at += 16) text += record(1, at, bytes.subarray(at, at + 16));
+  return `${text}${record(9, 0, [])}`;
+}
+
 export const EDGES = `[[program]]
 program_id = PROGRAM
 name = "neck"

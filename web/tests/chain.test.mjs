@@ -4,7 +4,7 @@ import { after, before, test } from 'node:test';
 
 import AxeBuilder from '@axe-core/playwright';
 
-import { card, EDGES, image, passes, stage, startBrowser, state, until } from './chain-harness.mjs';
+import { card, EDGES, image, intelHex, passes, sRecords, stage, startBrowser, state, until } from './chain-harness.mjs';
 
 let browser;
 before(async () => (browser = await startBrowser()));
@@ -82,6 +82,34 @@ test("the space bar stops, a viewer's too, and in a field it is a space", () =>
     await state(viewer).getByText('At rest').waitFor();
     await viewer.keyboard.press('Space');
     await viewer.getByText('Stop was sent. No board was running; boards 1 and 2 confirmed it.').waitFor();
+  }));
+
+test('boards that a page has started are stopped when it is loaded anew, and what was asked for before a Stop starts none', () =>
+  on({ boards: 2 }, async ({ agent, look }) => {
+    await agent.job('/api/init');
+    const page = await look();
+    await state(page).getByRole('button', { name: 'Run' }).click();
+    await page.getByRole('dialog').getByRole('switch').click();
+    await page.getByRole('dialog').getByRole('button', { name: 'Run all' }).click();
+    await state(page).getByText('2 boards are active').waitFor();
+    await page.reload();
+    await state(page).getByText('At rest').waitFor();
+    assert.deepEqual((await agent.ask('GET', '/api/boards')).body.filter((board) => board.active), []);
+    await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
+    // The request is long on its way, and a Stop comes before it.
+    let on;
+    await page.route('**/api/run*', async (route) => {
+      await new Promise((done) => (on = done));
+      await route.continue();
+    });
+    await state(page).getByRole('button', { name: 'Run' }).click();
+    await page.getByRole('dialog').getByRole('button', { name: 'Run all' }).click();
+    await until('it is under way', () => on);
+    await page.keyboard.press('Space');
+    await page.getByTestId('stop-words').getByText(/No board was running/).waitFor();
+    on();
+    await page.getByRole('alert').getByText(/stopped/i).first().waitFor();
+    assert.deepEqual((await agent.ask('GET', '/api/boards')).body.filter((board) => board.state === 'running'), []);
   }));
 
 test('a viewer sees no command', () =>
@@ -236,6 +264,55 @@ test('an update is checked, written with progress, and verified by reading back'
     await page.getByLabel('Another file').setInputFiles({ name: 'notes.hex', mimeType: 'text/plain', buffer: Buffer.from('no image') });
     await page.getByRole('button', { name: 'Check only' }).click();
     await page.getByRole('alert').getByText(/./).first().waitFor();
+  }));
+
+test('every option of an update is sent as it was chosen, and each form of a file is read', () =>
+  on({ boards: 2 }, async ({ agent, look }) => {
+    await agent.job('/api/init');
+    const page = await look();
+    await page.click('#tab-update');
+    const asked = [];
+    page.on('request', (request) => request.url().includes('/api/updates') && asked.push(JSON.parse(request.postData())));
+    const bytes = image(64);
+    const choose = (name, buffer) => page.getByLabel(/Choose a file|Another file/).setInputFiles({ name, mimeType: 'text/plain', buffer });
+    const check = async (words) => {
+      const count = asked.length;
+      for (const each of await page.getByRole('button', { name: /^Dismiss/ }).all()) await each.click();
+      await page.getByRole('button', { name: 'Check only' }).click();
+      await until('it was asked', () => asked.length > count);
+      await until('that is over', async () => (await agent.ask('GET', '/api/jobs')).body.every((job) => job.stage !== 'running'));
+      await page.getByText(words).filter({ visible: true }).first().waitFor();
+      return asked.at(-1);
+    };
+    await page.getByRole('group', { name: 'Boards to update' }).getByRole('button', { name: 'All' }).click();
+    await page.getByText('More options').click();
+    for (const [name, text] of [['app.hex', intelHex(bytes)], ['app.s19', sRecords(bytes)]]) {
+      await choose(name, Buffer.from(text));
+      const sent = await check('Board 1: Checks passed; nothing was written.');
+      assert.deepEqual(Object.keys(sent).filter((key) => ['format', 'addresses', 'date', 'second', 'expect_program_id'].includes(key)), []);
+      assert.equal(Buffer.from(sent.image, 'base64').toString(), text);
+      assert.deepEqual([sent.group, sent.start, sent.dry_run, sent.force, sent.accept_unverified], [false, false, true, false, false]);
+      const boards = (await agent.ask('GET', '/api/boards')).body.map(({ number, flash_number }) => ({ board: number, flash_number }));
+      assert.deepEqual(sent.boards, boards);
+    }
+    await choose('app.txt', Buffer.from(intelHex(bytes)));
+    await page.getByLabel('Form of the file').selectOption('hex');
+    await page.getByLabel('Addresses count').selectOption('byte');
+    await page.getByLabel(/Flash date/).fill('2026-01-02');
+    await page.getByLabel(/Program ID expected/).fill('0x4B3F');
+    for (const name of ['All at once, by broadcast', 'Also when boards run, or have this image already', 'Accept what cannot be verified', 'Only the boards that have these flash numbers']) await page.getByRole('switch', { name }).click();
+    const sent = await check(/Checks passed|Next: /);
+    assert.deepEqual([sent.format, sent.addresses, sent.date, sent.expect_program_id], ['hex', 'byte', '2026-01-02', 0x4b3f]);
+    assert.deepEqual([sent.group, sent.force, sent.accept_unverified, sent.boards], [true, true, true, [{ board: 1 }, { board: 2 }]]);
+    // A second image is for other boards than these: said before anything is written, and taken away again.
+    await page.getByLabel('Second image').setInputFiles({ name: 'data.bin', mimeType: 'application/octet-stream', buffer: bytes });
+    await until('it is read', () => page.getByRole('button', { name: 'Without a second image' }).isVisible());
+    assert.equal((await check(/Next: /)).second, bytes.toString('base64'));
+    await page.getByRole('button', { name: 'Without a second image' }).click();
+    assert.equal((await check(/Checks passed|Next: /)).second, undefined);
+    // The same name again, built anew: its new bytes.
+    await choose('app.txt', Buffer.from(intelHex(image(32))));
+    assert.equal(Buffer.from((await check(/Checks passed|Next: /)).image, 'base64').toString(), intelHex(image(32)));
   }));
 
 test('a doctor, jobs and events are shown', () =>

@@ -40,17 +40,22 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     await until('the simulated controller is there', () => existsSync(port));
     link = ['--port', port];
   }
-  const child = spawn(JTC, ['serve', ...link, '--listen', listen, '--token-file', tokenFile, '--json', ...extra], { cwd: dir, env });
-  let errors = '';
-  child.stderr.on('data', (data) => (errors += data));
-  const line = await new Promise((done, fail) => {
-    createInterface({ input: child.stdout }).once('line', done);
-    child.once('exit', (code) => fail(new Error(`jtc serve ended with ${code}: ${errors}`)));
-  });
-  const { url } = JSON.parse(line);
+  let [child, gone] = [undefined, undefined];
+  const begin = async (at) => {
+    child = spawn(JTC, ['serve', ...link, '--listen', at, '--token-file', tokenFile, '--json', ...extra], { cwd: dir, env });
+    const begun = child;
+    gone = new Promise((done) => begun.once('exit', done));
+    let errors = '';
+    begun.stderr.on('data', (data) => (errors += data));
+    const line = await new Promise((done, fail) => {
+      createInterface({ input: begun.stdout }).once('line', done);
+      begun.once('exit', (code) => fail(new Error(`jtc serve ended with ${code}: ${errors}`)));
+    });
+    return JSON.parse(line).url;
+  };
+  const url = await begin(listen);
   const tokens = readFileSync(tokenFile, 'utf8');
   const token = (role) => new RegExp(`${role} = "([^"]+)"`).exec(tokens)[1];
-  const gone = new Promise((done) => child.once('exit', done));
   return {
     url,
     dir,
@@ -60,6 +65,12 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     kill() {
       child.kill('SIGKILL');
       return gone;
+    },
+    /** Another one at its address. */
+    async again() {
+      child.kill('SIGKILL');
+      await gone;
+      await begin(new URL(url).host);
     },
     suspend: () => child.kill('SIGSTOP'),
     wake: () => child.kill('SIGCONT'),

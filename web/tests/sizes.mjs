@@ -5,7 +5,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const DIST = process.env.DIST ?? fileURLToPath(new URL('../dist/', import.meta.url));
-const FIRST_MOST = { 'index.html': 40_000, 'chain.html': 44_000 };
+const FIRST_MOST = { 'index.html': 44_000, 'chain.html': 44_000 };
 const ALL_MOST = 400_000;
 const gzipped = (path) => gzipSync(readFileSync(path), { level: 9 }).length;
 

@@ -153,3 +153,69 @@ on('a wrong token is said to be wrong, and a right one lets in', {}, async ({ ag
   await page.reload();
   await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
 });
+
+on('a Stop that nobody confirms says so, at once and as often as it is touched', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await state(page).getByText('Holding').waitFor();
+  const words = page.getByTestId('stop-words');
+  // What is opened later is loaded now.
+  await page.getByRole('button', { name: 'Nobody commands' }).click();
+  await page.getByRole('button', { name: 'Close' }).click();
+  // An earlier one, whose words are still shown.
+  await page.getByRole('button', { name: /STOP/ }).click();
+  await words.getByText(/Nothing was moving/).waitFor();
+  const seen = await page.evaluate(() => {
+    const seen = [];
+    new MutationObserver(() => seen.push(document.querySelector('[data-testid=stop-words]')?.innerText ?? '')).observe(document.body, { subtree: true, childList: true, characterData: true });
+    globalThis.seen = seen;
+  });
+  assert.equal(seen, undefined);
+  agent.suspend();
+  await page.getByRole('button', { name: /STOP/ }).click();
+  await page.waitForTimeout(500);
+  await page.getByRole('button', { name: /STOP/ }).click();
+  await words.getByText(/STOP NOT CONFIRMED\. Use the emergency stop/).waitFor();
+  await words.getByText(/STOP NOT SENT\. Use the emergency stop/).waitFor();
+  await page.waitForTimeout(3000);
+  assert.match(await words.innerText(), /STOP NOT SENT/);
+  const texts = [...new Set(await page.evaluate(() => globalThis.seen))];
+  assert.deepEqual(texts.filter((text) => !/NOT CONFIRMED|NOT SENT|being sent|Nothing was moving/.test(text)), []);
+  // In a dialog it is said beside the button there.
+  await page.getByRole('button', { name: 'Not known' }).click();
+  await page.getByRole('dialog').getByRole('alert').getByText(/STOP NOT SENT/).waitFor();
+  agent.wake();
+  await state(page).getByText('Holding').waitFor();
+});
+
+on('Pause touched twice is a pause', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look();
+  await state(page).getByText('Holding').waitFor();
+  await jtc(['example', 'motion', '-o', agent.dir]);
+  await page.click('#tab-run');
+  await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
+  await page.getByText('Passed the check').waitFor();
+  await page.getByRole('button', { name: /^Run/ }).click();
+  await state(page).getByText('Moving', { exact: true }).waitFor();
+  const box = await page.getByRole('button', { name: 'Pause' }).boundingBox();
+  for (let i = 0; i < 4; i += 1) {
+    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    await page.waitForTimeout(400);
+  }
+  await state(page).getByText('Paused', { exact: true }).waitFor();
+  assert.equal((await agent.ask('GET', '/api/status')).body.controller.trajectory, 'Pause');
+  // Said in whole, beside what is wrong.
+  await page.setViewportSize({ width: 360, height: 740 });
+  const [toasts, dock] = await Promise.all([page.getByRole('region', { name: 'Messages' }).boundingBox(), page.locator('footer').boundingBox()]);
+  assert.ok(toasts.y + toasts.height <= dock.y, JSON.stringify({ toasts, dock }));
+});
+
+on('an address with a token that is none shows the page all the same', {}, async ({ agent, look }) => {
+  await recover(agent);
+  const page = await look({ token: '%E0%A4%A' });
+  await page.getByRole('dialog').getByText(/not accepted/).waitFor();
+  // On this computer nobody needs a token to stop, and a wrong one keeps nobody from it.
+  await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).click();
+  await until('it was sent', async () => (await agent.ask('GET', '/api/status')).body.last_halt === 1);
+});

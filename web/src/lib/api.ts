@@ -49,7 +49,14 @@ export interface Ask {
   within?: number;
   /** Outlives the page: for what is sent while it closes. */
   keepalive?: boolean;
+  /** Waits for no other request: Stop, Pause, and what a key is held for. */
+  ahead?: boolean;
+  /** Without the token. */
+  bare?: boolean;
 }
+
+/** So many requests are open at once beside those that go ahead: a browser opens six to one agent, and lets the next wait without a word. */
+export const OPEN_MAX = 3;
 
 type Fetch = (input: string, init: RequestInit) => Promise<Response>;
 
@@ -84,8 +91,16 @@ export function problemOf(status: number, text: string): Problem {
   return { code: `http-${status}`, message: text.trim() || `The agent answered ${status}.`, next: 'Try again.' };
 }
 
+interface Waiting {
+  reads: boolean;
+  go(): void;
+  drop(): void;
+}
+
 /** A client of an agent's API. */
 export class Api {
+  #open = 0;
+  #waiting: Waiting[] = [];
   readonly #token: () => string | undefined;
   readonly #key: () => string | undefined;
   readonly #fetch: Fetch;
@@ -96,10 +111,38 @@ export class Api {
     this.#fetch = fetch ?? ((input, init) => globalThis.fetch(input, init));
   }
 
+  /** What waits for its turn and is no question is not sent any more. */
+  recall(): void {
+    const commands = this.#waiting.filter((each) => !each.reads);
+    this.#waiting = this.#waiting.filter((each) => each.reads);
+    for (const command of commands) command.drop();
+  }
+
   /** Sends, and returns the answer as it came. Throws ApiError for everything else. */
   async send(method: string, path: string, ask: Ask = {}): Promise<Response> {
+    if (ask.ahead || ask.keepalive) return this.#send(method, path, ask);
+    if (this.#open >= OPEN_MAX) await this.#turn(method === 'GET');
+    else this.#open += 1;
+    try {
+      return await this.#send(method, path, ask);
+    } finally {
+      // Whoever is next has this place.
+      const next = this.#waiting.shift();
+      if (next) next.go();
+      else this.#open -= 1;
+    }
+  }
+
+  #turn(reads: boolean): Promise<void> {
+    return new Promise((go, fail) => {
+      const drop = () => fail(new ApiError(0, { code: 'stopped', message: 'A Stop came before it was sent; nothing was sent.', next: 'Ask for it again.' }));
+      this.#waiting.push({ reads, go, drop });
+    });
+  }
+
+  async #send(method: string, path: string, ask: Ask): Promise<Response> {
     const headers: Record<string, string> = {};
-    const token = this.#token();
+    const token = ask.bare ? undefined : this.#token();
     const key = this.#key();
     if (token) headers['Authorization'] = `Bearer ${token}`;
     if (key && method !== 'GET') headers['Lease-Key'] = key;

@@ -153,20 +153,19 @@ export class Connection<S extends BaseStatus> {
   #take(message: { kind: string }): void {
     if (message.kind === 'events') {
       const events = message as unknown as EventsMessage;
-      this.#know(events.agent);
+      if (!this.#know(events.agent)) return;
       this.#after = events.last;
       this.#handlers.events(events);
     } else if (message.kind === 'status') {
       const status = message as unknown as S;
-      this.#know(status.agent);
-      this.#handlers.status(status);
+      if (this.#know(status.agent)) this.#handlers.status(status);
     } else {
       this.#handlers.other?.(message);
     }
   }
 
-  /** Another agent counts its events anew: what it has is asked for from the beginning. */
-  #know(agent: string): void {
+  /** Another agent counts its events anew: what it has is asked for from the beginning, and this message is not taken. */
+  #know(agent: string): boolean {
     const other = this.#agent !== undefined && this.#agent !== agent;
     this.#agent = agent;
     if (other && this.#after !== undefined) {
@@ -175,7 +174,9 @@ export class Connection<S extends BaseStatus> {
       this.#around.never(this.#timer);
       this.#timer = this.#around.later(() => this.#open(), 0);
       this.#enter('waiting');
+      return false;
     }
+    return true;
   }
 
   #gone(opened: boolean): void {

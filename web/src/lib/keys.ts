@@ -7,7 +7,7 @@ export interface Focused {
   isContentEditable?: boolean;
 }
 
-const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'number', 'date', 'time', '']);
+const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'date', 'time', '']);
 
 /** Whether keys are text here. Buttons, sliders and switches take no text: there the space bar stops, and Enter presses. */
 export function takesText(element: Focused | null | undefined): boolean {

@@ -1,8 +1,12 @@
 // What every page has: connection, token, lease, Stop, messages, events. Free of what the agent drives.
+import { getContext, setContext } from 'svelte';
+
 import { Api, ApiError, type Ask, type Problem } from './api.ts';
 import { type BaseStatus, browser, Connection, type Entry, type EventsMessage, type Phase } from './connection.ts';
 import { deviceKind } from './keys.ts';
 import { Lease, type LeasePhase, type Policy, RENEW_MS } from './lease.ts';
+import { Lateness } from './lateness.ts';
+import { device, tab } from './storage.ts';
 import { applyTheme, savedTheme, type Theme } from './theme.ts';
 import { tokenIn, TokenStore } from './token.ts';
 
@@ -21,6 +25,8 @@ export interface SessionStatus extends BaseStatus {
   age_ms?: number | null;
   lost?: string | null;
   simulated?: boolean;
+  /** The agent's own time when this was made, ms. */
+  at_ms?: number | undefined;
 }
 
 export interface Toast {
@@ -34,7 +40,8 @@ export interface Toast {
 }
 
 export interface Line {
-  number: number;
+  /** This page's own: agents count anew when they are started. */
+  id: number;
   unix_s: number;
   text: string;
   tone: 'info' | 'good' | 'warn' | 'error';
@@ -50,28 +57,54 @@ export interface StopState {
   text: string;
 }
 
+/** What a page's words need to know of what it drives. */
+export interface Driven {
+  /** `arm` or `chain`. */
+  thing: string;
+  /** What works for everybody who may look, a sentence. */
+  works: string;
+  /** What may be done with a viewer's token. */
+  viewerMay: string;
+  /** What becomes of what runs when this browser goes: what the agent knows, the usual first, with the words that end the sentence `left`. */
+  policies: readonly [[Policy, string], ...[Policy, string][]];
+  left: string;
+}
+
 /** What becomes of the words of an event. */
-export type Describe = (entry: Entry) => Omit<Line, 'number' | 'unix_s'> | undefined;
+export type Describe = (entry: Entry) => Omit<Line, 'id' | 'unix_s'> | undefined;
 
 /** Somebody has to have touched the page within this time, or something of ours has to be going on, for the lease to be renewed, ms. */
 const IN_USE_MS = 120_000;
 const LINES_MAX = 400;
+/** A Stop that was not sent is spoken of for so long at least, ms. */
+const FAILED_MS = 20_000;
 /** Status values older than this are not those of now, ms. */
 const OLD_MS = 1500;
 
 function load(name: string): string | null {
-  return localStorage.getItem(`openjtc-${name}`);
+  return device.getItem(`openjtc-${name}`);
 }
 
 function save(name: string, value: string): void {
-  localStorage.setItem(`openjtc-${name}`, value);
+  device.setItem(`openjtc-${name}`, value);
+}
+
+const KEY = Symbol('session');
+
+/** For the components that every page has. */
+export function provideSession<S extends SessionStatus>(session: Session<S>): void {
+  setContext(KEY, session);
+}
+
+export function useSession(): Session<SessionStatus> {
+  return getContext<Session<SessionStatus>>(KEY);
 }
 
 export class Session<S extends SessionStatus> {
   readonly api: Api;
   readonly lease: Lease;
   readonly connection: Connection<S>;
-  readonly tokens = new TokenStore(sessionStorage, localStorage);
+  readonly tokens = new TokenStore(tab, device);
 
   phase = $state<Phase>('connecting');
   /** Messages arrive. */
@@ -98,27 +131,38 @@ export class Session<S extends SessionStatus> {
 
   /** Something that this page has begun goes on. */
   isBusy: () => boolean = () => false;
+  /** Nothing runs that would be left to itself without a lease: else the lease lapses, and its policy is what becomes of that. */
+  isAtRest: () => boolean = () => false;
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
   readonly #messageHandlers: ((message: { kind: string }) => void)[] = [];
   readonly #lossHandlers: (() => void)[] = [];
-  #describe: Describe;
+  readonly #missedHandlers: (() => void)[] = [];
+  readonly #lateness = new Lateness();
+  readonly of: Driven;
+  readonly #describe: Describe;
   #touched = 0;
   #toastId = 0;
+  #lineId = 0;
+  /** When the last status came, and how much later than it should have. */
+  #statusAt = -Infinity;
+  #late = 0;
   #halt = 0;
   #known = -1;
   #agent = '';
   #lostAt = performance.now();
   #probing = false;
+  /** The token of which it was said that it is not accepted; empty: none. */
+  #refused: string | undefined;
 
-  /** `policies` are those that the agent knows, the usual one first. */
-  constructor(describe: Describe, policies: readonly [Policy, ...Policy[]] = ['pause', 'stop', 'continue']) {
+  constructor(describe: Describe, of: Driven) {
     this.#describe = describe;
-    const saved = load('policy') as Policy | null;
-    this.policy = saved !== null && policies.includes(saved) ? saved : policies[0];
+    this.of = of;
+    const saved = load('policy');
+    this.policy = of.policies.find(([policy]) => policy === saved)?.[0] ?? of.policies[0][0];
     const { token, rest } = tokenIn(location.hash);
     if (token) {
-      this.tokens.set(token, this.tokens.isRemembered());
+      this.tokens.use(token);
       history.replaceState(null, '', location.pathname + location.search + rest);
     }
     this.hasToken = this.tokens.get() !== undefined;
@@ -170,6 +214,11 @@ export class Session<S extends SessionStatus> {
     this.#lossHandlers.push(handler);
   }
 
+  /** Called when events were missed: what goes on is to be asked for. */
+  onMissed(handler: () => void): void {
+    this.#missedHandlers.push(handler);
+  }
+
   start(): void {
     applyTheme(this.theme);
     this.connection.start();
@@ -181,7 +230,10 @@ export class Session<S extends SessionStatus> {
     document.addEventListener('visibilitychange', () => {
       if (!document.hidden) this.connection.hurry();
     });
-    addEventListener('pagehide', () => void this.lease.release(true).catch(() => {}));
+    addEventListener('pagehide', () => {
+      // What runs is not left to itself: without a word the lease lapses, and what becomes of it is what was chosen.
+      if (this.isAtRest()) void this.lease.release(true).catch(() => {});
+    });
   }
 
   setTheme(theme: Theme): void {
@@ -221,44 +273,75 @@ export class Session<S extends SessionStatus> {
     return shown === undefined ? undefined : Math.max(shown, this.#halt);
   }
 
-  /** Stops, ahead of all else. Tried again where the network drops it. */
+  /** The agent's time, as near as this page knows it: a command that names it is refused where it comes late. */
+  get agentTime(): number | undefined {
+    return this.#lateness.agentTime(performance.now());
+  }
+
+  /**
+   * Stops, ahead of all else; tried again where the network drops it. What became of it is in `stopState`, which is that of the last touch alone: as long as
+   * nobody has confirmed it, it says so.
+   */
   async stop(): Promise<void> {
     const at = performance.now();
+    this.api.recall();
     this.stopState = { phase: 'sending', at, answered: 0, text: 'Stop is being sent' };
-    for (let attempt = 0; ; attempt += 1) {
+    const enter = (phase: StopState['phase'], text: string) => {
+      if (this.stopState.at === at) this.stopState = { phase, at, answered: performance.now(), text };
+    };
+    for (let attempt = 1; ; attempt += 1) {
       try {
-        const sent = await this.api.json<{ halt?: number }>('POST', '/api/stop', { within: 1500 });
+        const sent = await this.#halting('/api/stop', 1500);
         this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
-        if (this.stopState.at === at) this.stopState = { phase: 'sent', at, answered: performance.now(), text: 'Stop was sent' };
+        enter('sent', 'Stop was sent');
         return;
       } catch (error) {
         const problem = error instanceof ApiError ? error : undefined;
-        if (problem?.isNoConnection && attempt < 4 && this.stopState.at === at) {
+        const why = problem?.problem.message ?? 'It was not sent.';
+        if (problem?.isNoConnection && attempt < 5 && this.stopState.at === at) {
+          enter('failed', `STOP NOT CONFIRMED. Use the emergency stop. ${why} It is tried again.`);
           await new Promise((done) => setTimeout(done, 150));
           continue;
         }
-        if (this.stopState.at !== at) return;
-        const why = problem?.problem.message ?? 'it was not sent';
-        this.stopState = { phase: 'failed', at, answered: performance.now(), text: `STOP NOT SENT: ${why} Use the emergency stop.` };
-        if (problem?.wantsToken) this.asksToken = 'Stop from this device needs a token, too.';
+        enter('failed', `STOP NOT SENT. Use the emergency stop. ${why}`);
+        if (problem?.wantsToken && this.stopState.at === at) this.asksToken = 'Stop from this device needs a token, too.';
         return;
       }
     }
   }
 
+  /** Nothing more is said of the last Stop, unless it is still being sent. */
+  forgetStop(): void {
+    if (this.stopState.phase !== 'sending') this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
+  }
+
   /** Pauses; needs no lease. */
   async pause(): Promise<boolean> {
-    return (await this.attempt('Pause', () => this.api.json<{ halt?: number }>('POST', '/api/pause', { within: 3000 }), (sent) => {
+    return (await this.attempt('Pause', () => this.#halting('/api/pause', 3000), (sent) => {
       this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
     })) !== undefined;
   }
 
+  /** Stop and Pause; a token that is not accepted any more does not keep anybody from them who needs none. */
+  async #halting(path: string, within: number): Promise<{ halt?: number } | undefined> {
+    try {
+      return await this.api.json<{ halt?: number }>('POST', path, { within, ahead: true });
+    } catch (error) {
+      if (!(error instanceof ApiError) || error.status !== 401 || !this.hasToken) throw error;
+      return this.api.json<{ halt?: number }>('POST', path, { within, ahead: true, bare: true }).catch(() => {
+        throw error;
+      });
+    }
+  }
+
   /**
-   * Sends a command, with the lease; what may move also says what this page showed when it was asked for. Returns the answer, or undefined where it was
-   * refused: why is a message on the page then.
+   * Sends a command, with the lease; what may move also says what this page showed when it was asked for, which is now, or `after` for a later part of the same
+   * wish. Returns the answer, or undefined where it was refused: why is a message on the page then.
    */
-  async command<T = unknown>(what: string, method: string, path: string, ask: Ask & { moves?: boolean; quiet?: boolean } = {}): Promise<{ value: T } | undefined> {
-    const after = ask.moves ? this.askedAfter : undefined;
+  async command<T = unknown>(
+    what: string, method: string, path: string, ask: Ask & { moves?: boolean; after?: number | undefined; quiet?: boolean } = {},
+  ): Promise<{ value: T } | undefined> {
+    const after = ask.moves ? (ask.after ?? this.askedAfter) : undefined;
     const query = after === undefined ? ask.query : { ...ask.query, asked_after: after };
     const act = async (): Promise<{ value: T }> => {
       const had = this.lease.phase === 'held';
@@ -326,7 +409,14 @@ export class Session<S extends SessionStatus> {
   }
 
   #take(status: S): void {
+    if (this.status?.agent !== status.agent) {
+      // Another agent counts its Stops anew, and its time.
+      this.#halt = 0;
+      this.#lateness.forget();
+    }
     this.status = status;
+    this.#statusAt = performance.now();
+    this.#late = status.at_ms === undefined ? 0 : this.#lateness.take(status.at_ms, this.#statusAt);
     if (this.role !== status.role) this.role = status.role;
     const holder = status.lease?.holder;
     if (this.holder !== holder) this.holder = holder;
@@ -347,12 +437,13 @@ export class Session<S extends SessionStatus> {
       if (entry.number <= this.#known) continue;
       const isNew = !isFirst || Date.now() / 1000 - entry.unix_s < 2;
       const words = this.#describe(entry);
-      if (words) fresh.push({ number: entry.number, unix_s: entry.unix_s, ...words });
+      if (words) fresh.push({ id: (this.#lineId += 1), unix_s: entry.unix_s, ...words });
       for (const handler of this.#eventHandlers) handler(entry, isNew);
     }
     this.#known = Math.max(this.#known, message.last);
     if (message.missed && !isFirst) {
-      fresh.unshift({ number: message.last, unix_s: Date.now() / 1000, text: 'Some events are not kept any more.', tone: 'warn', of: 'agent' });
+      fresh.unshift({ id: (this.#lineId += 1), unix_s: Date.now() / 1000, text: 'Some events are not kept any more.', tone: 'warn', of: 'agent' });
+      for (const handler of this.#missedHandlers) handler();
     }
     if (fresh.length > 0) this.lines = [...this.lines, ...fresh].slice(-LINES_MAX);
   }
@@ -362,7 +453,7 @@ export class Session<S extends SessionStatus> {
     this.connection.check();
     const live = this.connection.isLive;
     const status = this.status;
-    const age = (status?.age_ms ?? Infinity) + this.connection.silence;
+    const age = (status?.age_ms ?? Infinity) + (performance.now() - this.#statusAt) + this.#late;
     const fresh = live && status !== undefined && !status.lost && age < OLD_MS;
     if (live !== this.live) {
       this.live = live;
@@ -372,6 +463,8 @@ export class Session<S extends SessionStatus> {
       this.fresh = fresh;
       if (!fresh) for (const handler of this.#lossHandlers) handler();
     }
+    // Said long enough after the connection is back; a job that begins ends it at once.
+    if (this.stopState.phase === 'failed' && live && performance.now() - this.stopState.answered > FAILED_MS) this.forgetStop();
     const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
     if (lostFor !== this.lostFor) this.lostFor = lostFor;
   }
@@ -379,7 +472,7 @@ export class Session<S extends SessionStatus> {
   async #renew(): Promise<void> {
     if (this.lease.phase === 'none' || document.hidden) return;
     const inUse = performance.now() - this.#touched < IN_USE_MS || this.isBusy();
-    if (inUse || this.lease.phase === 'waiting') {
+    if (inUse) {
       const had = this.lease.phase;
       const held = await this.lease.renew();
       if (had === 'held' && !held && this.connection.isLive) {
@@ -399,7 +492,10 @@ export class Session<S extends SessionStatus> {
     } catch (error) {
       if (error instanceof ApiError && !error.isNoConnection) {
         this.denied = error.problem;
-        if (error.wantsToken) {
+        // Asked once for each token: whoever closes that finds it beside the state.
+        const token = this.tokens.get() ?? '';
+        if (error.wantsToken && this.#refused !== token) {
+          this.#refused = token;
           this.asksToken ??= this.hasToken
             ? `This token was not accepted. ${error.problem.message}`
             : 'Looking at this agent from here needs a token.';

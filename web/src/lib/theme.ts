@@ -1,25 +1,34 @@
 // Light, dark, or as the system has it.
 
+import { device } from './storage.ts';
+
 export type Theme = 'auto' | 'light' | 'dark';
 
 const NAME = 'openjtc-theme';
+const system = matchMedia('(prefers-color-scheme: dark)');
+let chosen = savedTheme();
 
 export function savedTheme(): Theme {
-  const saved = localStorage.getItem(NAME);
+  const saved = device.getItem(NAME);
   return saved === 'light' || saved === 'dark' ? saved : 'auto';
 }
 
+/** From now on, and as the system changes. */
 export function applyTheme(theme: Theme): void {
-  if (theme === 'auto') {
-    localStorage.removeItem(NAME);
-    delete document.documentElement.dataset.theme;
-  } else {
-    localStorage.setItem(NAME, theme);
-    document.documentElement.dataset.theme = theme;
-  }
+  chosen = theme;
+  if (theme === 'auto') device.removeItem(NAME);
+  else device.setItem(NAME, theme);
+  show();
 }
 
 /** Whether the page is dark now. */
 export function isDark(theme: Theme): boolean {
-  return theme === 'dark' || (theme === 'auto' && matchMedia('(prefers-color-scheme: dark)').matches);
+  return theme === 'dark' || (theme === 'auto' && system.matches);
 }
+
+function show(): void {
+  document.documentElement.dataset.theme = isDark(chosen) ? 'dark' : 'light';
+}
+
+system.addEventListener('change', show);
+show();

@@ -1,20 +1,25 @@
 // The token of this browser: from the address (#token=…), from this session, or remembered on this device.
 
-const NAME = 'openjtc-token';
+import type { Store } from './storage.ts';
 
-export interface Store {
-  getItem(name: string): string | null;
-  setItem(name: string, value: string): void;
-  removeItem(name: string): void;
-}
+const NAME = 'openjtc-token';
 
 /** The token in the fragment of an address, and the fragment without it. */
 export function tokenIn(hash: string): { token: string | undefined; rest: string } {
   const parts = hash.replace(/^#/, '').split('&').filter(Boolean);
   const own = parts.find((part) => part.startsWith('token='));
   const rest = parts.filter((part) => part !== own).join('&');
-  const token = own ? decodeURIComponent(own.slice('token='.length)).trim() : undefined;
+  const token = own ? decoded(own.slice('token='.length)).trim() : undefined;
   return { token: token || undefined, rest: rest ? `#${rest}` : '' };
+}
+
+/** As it is where it is no address: it is a token that nobody accepts then. */
+function decoded(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
 }
 
 /** Where the token is kept. */
@@ -33,6 +38,11 @@ export class TokenStore {
 
   isRemembered(): boolean {
     return this.#device.getItem(NAME) !== null;
+  }
+
+  /** For this tab alone: what the device remembers stays. */
+  use(token: string): void {
+    this.#session.setItem(NAME, token);
   }
 
   set(token: string, remember: boolean): void {

@@ -1,7 +1,9 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { address, Api, ApiError, problemOf } from '../../src/lib/api.ts';
+import { address, Api, ApiError, OPEN_MAX, problemOf } from '../../src/lib/api.ts';
+import { Lateness } from '../../src/lib/lateness.ts';
+import { guarded } from '../../src/lib/storage.ts';
 import { tokenIn, TokenStore } from '../../src/lib/token.ts';
 
 function answering(status: number, text: string) {
@@ -52,6 +54,7 @@ test('the token in the fragment is taken out of it', () => {
   assert.deepEqual(tokenIn('#token=ab_c-d&x=1'), { token: 'ab_c-d', rest: '#x=1' });
   assert.deepEqual(tokenIn('#token=abc'), { token: 'abc', rest: '' });
   assert.deepEqual(tokenIn(''), { token: undefined, rest: '' });
+  assert.deepEqual(tokenIn('#token=%E0%A4%A'), { token: '%E0%A4%A', rest: '' });
 });
 
 test('a token is remembered where it was asked for, and only there', () => {
@@ -67,4 +70,55 @@ test('a token is remembered where it was asked for, and only there', () => {
   assert.equal(new TokenStore(memory(), device).get(), 'b');
   store.forget();
   assert.equal(store.get(), undefined);
+});
+
+test('so many requests are open at once, a Stop beside them, and commands that wait are dropped by it', async () => {
+  const open: { path: string; answer: () => void }[] = [];
+  const api = new Api(() => undefined, () => undefined, (path) => new Promise((done) => open.push({ path, answer: () => done(new Response('{}')) })));
+  const reads = Array.from({ length: OPEN_MAX + 1 }, (_, i) => api.get(`/read/${i}`));
+  const command = api.json('POST', '/command');
+  void api.json('POST', '/stop', { ahead: true });
+  await Promise.resolve();
+  assert.deepEqual(open.map(({ path }) => path), [...Array.from({ length: OPEN_MAX }, (_, i) => `/read/${i}`), '/stop']);
+  api.recall();
+  await assert.rejects(command, (error: unknown) => error instanceof ApiError && error.problem.code === 'stopped');
+  for (let i = 0; i <= OPEN_MAX + 1; i += 1) {
+    open[i]?.answer();
+    await new Promise((done) => setImmediate(done));
+  }
+  await Promise.all(reads);
+  assert.equal(open.at(-1)?.path, `/read/${OPEN_MAX}`);
+  // Every place is free again.
+  const more = Array.from({ length: OPEN_MAX }, () => api.get('/more'));
+  await new Promise((done) => setImmediate(done));
+  for (const each of open.filter(({ path }) => path === '/more')) each.answer();
+  assert.equal((await Promise.all(more)).length, OPEN_MAX);
+});
+
+test('messages that all come late are as late as they are, beside the soonest', () => {
+  const lateness = new Lateness();
+  assert.equal(lateness.agentTime(0), undefined);
+  // The agent began 500 ms after this page; its messages take 20 ms, one 45, then 3 s.
+  assert.equal(lateness.take(0, 520), 0);
+  assert.equal(lateness.take(1000, 1545), 25);
+  assert.equal(lateness.take(2000, 5500), 2980);
+  assert.equal(lateness.agentTime(6520), 6000);
+  // A clock that is slower by 100 ppm is not taken for lateness: what was long ago does not count.
+  let [most, now] = [0, 10_000];
+  const slow = new Lateness();
+  for (let i = 0; i < 4000; i += 1, now += 5000) most = Math.max(most, slow.take(now * (1 - 1e-4), now));
+  assert.ok(most < 100, `${most} ms`);
+  lateness.forget();
+  assert.equal(lateness.agentTime(0), undefined);
+});
+
+test('a browser that keeps nothing is a page that forgets', () => {
+  const store = guarded(() => {
+    throw new DOMException('denied', 'SecurityError');
+  });
+  assert.equal(store.getItem('a'), null);
+  store.setItem('a', '1');
+  assert.equal(store.getItem('a'), '1');
+  store.removeItem('a');
+  assert.equal(store.getItem('a'), null);
 });

@@ -121,7 +121,7 @@ const board = (over: Partial<BoardObject>): BoardObject => ({
   number: 1, state: 'running', heartbeat: 'alive', status: [], active: false, application: true, errors: 0, frames_per_s: 0, ...over,
 });
 const status = (over: Partial<Status> = {}): Status => ({
-  simulated: false, bus: 'can0', age_ms: 0, boards: 1, load_percent: 0, received: 0, sent: 0, foreign_frames: 0, is_master: true,
+  simulated: false, bus: 'can0', age_ms: 0, at_ms: 0, last_halt: 0, boards: 1, load_percent: 0, received: 0, sent: 0, foreign_frames: 0, is_master: true,
   competing_master: false, shared_numbers: [], role: 'operator', agent: 'a', last_event: 0, ...over,
 });
 

@@ -2,20 +2,20 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { Jogger } from '../../src/lib/arm/jog.ts';
-import { History } from '../../src/lib/arm/history.ts';
+import { History } from '../../src/lib/history.ts';
 import { figuresOf, overlay } from '../../src/lib/arm/trial.ts';
 
 function setUp(send: (rates: number[]) => Promise<unknown> = () => Promise.resolve()) {
   const sent: number[][] = [];
-  const firsts: boolean[] = [];
   let [tick, time, refusals] = [undefined as (() => void) | undefined, 0, 0];
   const jogger = new Jogger({
-    send: (rates, first) => {
+    send: (rates) => {
       sent.push(rates);
-      firsts.push(first);
       return send(rates);
     },
-    refused: () => (refusals += 1),
+    refused: (_, after) => {
+      if (!after) refusals += 1;
+    },
     every: (act) => ((tick = act), 1),
     never: () => (tick = undefined),
     now: () => time,
@@ -26,11 +26,11 @@ function setUp(send: (rates: number[]) => Promise<unknown> = () => Promise.resol
     tick?.();
     await new Promise((done) => setImmediate(done));
   };
-  return { jogger, sent, firsts, pass, runs: () => tick !== undefined, refusals: () => refusals };
+  return { jogger, sent, pass, sleep: (ms: number) => (time += ms), runs: () => tick !== undefined, refusals: () => refusals };
 }
 
 test('rates as long as it is held, zeros once when it is let go', async () => {
-  const { jogger, sent, firsts, pass, runs } = setUp();
+  const { jogger, sent, pass, runs } = setUp();
   jogger.press(3, -0.1);
   await pass();
   await pass();
@@ -38,8 +38,17 @@ test('rates as long as it is held, zeros once when it is let go', async () => {
   jogger.release();
   await pass();
   assert.deepEqual(sent, [[0, 0, -0.1, 0, 0, 0], [0, 0, -0.1, 0, 0, 0], [0, 0, -0.1, 0, 0, 0], [0, 0, 0, 0, 0, 0]]);
-  assert.deepEqual(firsts, [true, false, false, false]);
   assert.ok(!runs());
+});
+
+test('a page that was suspended does not jog on', async () => {
+  const { jogger, sent, pass, sleep } = setUp();
+  jogger.press(2, 0.1);
+  await pass();
+  sleep(2000);
+  await pass();
+  assert.ok(!jogger.isHeld);
+  assert.deepEqual(sent.at(-1), [0, 0, 0, 0, 0, 0]);
 });
 
 test('what is refused is not asked for on', async () => {

@@ -349,6 +349,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/log/values": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The last of what the log holds, as numbers: what a plot of a moment needs, at 1 kHz. It takes as long as the whole log; one at a time. */
+        get: operations["get_log_values"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/moves": {
         parameters: {
             query?: never;
@@ -754,6 +771,8 @@ export interface components {
         };
         /** @description What a check found. */
         CheckObject: {
+            /** @description What was checked, in short: the digest of the trajectory. */
+            digest: string;
             /**
              * Format: double
              * @description s.
@@ -1264,6 +1283,8 @@ export interface components {
         KeepRequest: {
             /** @description What people are to call it: the first 64 characters. */
             name: string;
+            /** @description In place of nothing: where the number has a trajectory already the plan is refused, and nothing is replaced. */
+            new?: boolean;
             /**
              * Format: u-int16
              * @description Its number, in place of what has it.
@@ -1327,6 +1348,19 @@ export interface components {
          * @description A recording in MCAP with the log in it, as `jtc log fetch` writes it.
          */
         LogFile: string;
+        /** @description A joint in the log. */
+        LogJoint: {
+            /** @description Commanded, rad. */
+            commanded_rad: (number | null)[];
+            /** @description Commanded minus measured, of the same time, rad. */
+            error_rad: (number | null)[];
+            /** @description Measured, rad. */
+            position_rad: (number | null)[];
+            /** @description Commanded on the bus, N·m. */
+            torque_nm: (number | null)[];
+            /** @description Measured, rad/s. */
+            velocity_rad_s: (number | null)[];
+        };
         /** @description What the flight recorder does. */
         LogStatusObject: {
             /**
@@ -1336,6 +1370,15 @@ export interface components {
             blocks: number;
             /** @description In words: it records, or why it has stopped. */
             state: string;
+        };
+        /** @description What the log holds, tick by tick: 1000 rows a second, in columns of the same length. A value that is not known is null. */
+        LogValues: {
+            /** @description Base to wrist. */
+            joints: components["schemas"]["LogJoint"][];
+            /** @description State of the controller in the last row. */
+            state: string;
+            /** @description Time of each row, s, 0 at the last one. */
+            times_s: number[];
         };
         /** @description A joint: where it is, and its limits. */
         ModelJoint: {
@@ -1533,6 +1576,8 @@ export interface components {
         };
         /** @description A trajectory to draw. */
         PointsObject: {
+            /** @description What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it. */
+            digest: string;
             /**
              * Format: double
              * @description s.
@@ -1648,6 +1693,8 @@ export interface components {
             accept_device_limits?: boolean;
             /** @description Where the arm stands elsewhere it is moved to the first point, at half of the limits at most. */
             approach?: boolean;
+            /** @description Digest of the trajectory that was looked at: where the number has another one by now nothing is sent. */
+            digest?: string | null;
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: u-int32
@@ -1747,6 +1794,11 @@ export interface components {
             age_ms?: number | null;
             /** @description Which agent this is, by a number that it was given at its start. */
             agent: string;
+            /**
+             * Format: u-int64
+             * @description Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+             */
+            at_ms: number;
             /** @description How many clients are on the line. */
             clients: number;
             controller?: components["schemas"]["ControllerObject"] | null;
@@ -1777,6 +1829,8 @@ export interface components {
         };
         /** @description A trajectory that is kept. */
         TrajectoryObject: {
+            /** @description What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it. */
+            digest: string;
             /**
              * Format: double
              * @description s.
@@ -1849,7 +1903,9 @@ export type LeaseObject = components['schemas']['LeaseObject'];
 export type LeaseRequest = components['schemas']['LeaseRequest'];
 export type LeaseState = components['schemas']['LeaseState'];
 export type LogFile = components['schemas']['LogFile'];
+export type LogJoint = components['schemas']['LogJoint'];
 export type LogStatusObject = components['schemas']['LogStatusObject'];
+export type LogValues = components['schemas']['LogValues'];
 export type ModelJoint = components['schemas']['ModelJoint'];
 export type ModelLink = components['schemas']['ModelLink'];
 export type ModelObject = components['schemas']['ModelObject'];
@@ -2244,8 +2300,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -2374,8 +2431,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -3587,10 +3645,16 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
+                /**
+                 * @description `at_ms` of the newest status that the person saw. Where this request arrives more than 500 ms behind it nothing moves.
+                 *     Zeros, the end of jogging, are taken all the same.
+                 */
+                as_of_ms?: number;
             };
             header: {
                 /** @description Key of the lease */
@@ -4422,12 +4486,133 @@ export interface operations {
             };
         };
     };
+    get_log_values: {
+        parameters: {
+            query?: {
+                /** @description The last seconds of it. */
+                last_s?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Columns of the same length */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogValues"];
+                };
+            };
+            /** @description What was asked cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The token is missing or none of this agent's */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The request takes too long, or more than it may */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused: another client commands, something else is going on, a check or the controller forbids it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description More than may be sent at once */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The body is no JSON */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description What was asked for is none */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Too many wrong tokens came */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description Something went wrong on the way */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+            /** @description The port is gone, or the controller is silent */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorObject"];
+                };
+            };
+        };
+    };
     move_to: {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -5305,8 +5490,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -5557,8 +5743,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -5681,8 +5868,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -6427,8 +6615,9 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `last_halt` of the status that the client looked at. Where a Stop or a Pause has come since then, nothing moves, however long this
-                 *     request was on its way. Missing: it is refused within 3 s behind a Stop or a Pause of others.
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
                  */
                 asked_after?: number;
             };
@@ -6616,7 +6805,10 @@ export interface operations {
     };
     put_trajectory: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Of nothing: where the number has a trajectory already it is refused, and nothing is replaced. */
+                new?: boolean;
+            };
             header?: never;
             path: {
                 /** @description 1 to 99 */

@@ -3,9 +3,11 @@ import { getContext, setContext } from 'svelte';
 
 import { ApiError } from '../api.ts';
 import type { AngleUnit } from '../format.ts';
-import { Session } from '../session.svelte.ts';
-import { History } from './history.ts';
+import { type Driven, provideSession, Session } from '../session.svelte.ts';
+import { History } from '../history.ts';
+import { device } from '../storage.ts';
 import type { ArmModel } from './kinematics.ts';
+import { freeNumber } from './numbers.ts';
 import type { ArmEntry, Controller, InfoObject, JobObject, PayloadObject, Points, Pose, ProblemObject, Status, TrajectoryObject } from './types.ts';
 import { eventWords, isMoving, isPaused, jobWords, stateWords, type StateWords, whatStopDid } from './words.ts';
 
@@ -45,14 +47,26 @@ export interface Preview {
 
 export type Tab = 'state' | 'run' | 'jog' | 'teach' | 'arm' | 'plots' | 'log';
 
+const DRIVEN: Driven = {
+  thing: 'arm',
+  works: 'Pause and Stop work.',
+  viewerMay: 'look, pause and stop',
+  policies: [
+    ['pause', 'pauses on its path'],
+    ['stop', 'is stopped'],
+    ['continue', 'goes on to its end'],
+  ],
+  left: 'When this browser goes in a motion (closed, hidden for 10 s, network gone), the motion',
+};
+
 const KEY = Symbol('arm');
 
 export class ArmPage {
-  readonly session = new Session<Status>((entry) => eventWords((entry as ArmEntry).event));
+  readonly session = new Session<Status>((entry) => eventWords((entry as ArmEntry).event), DRIVEN);
   readonly history = new History(COLUMNS, ROWS);
 
   tab = $state<Tab>('state');
-  unit = $state<AngleUnit>(localStorage.getItem('openjtc-unit') === 'rad' ? 'rad' : 'deg');
+  unit = $state<AngleUnit>(device.getItem('openjtc-unit') === 'rad' ? 'rad' : 'deg');
   /** As of the last status that was read out; undefined: nothing that is known is of now. */
   controller = $state.raw<Controller | undefined>(undefined);
   /** For the picture and the plots: each status. */
@@ -70,13 +84,17 @@ export class ArmPage {
   /** The joint that somebody points at, from 1. */
   pointed = $state<number | undefined>(undefined);
   explained = $state<string | undefined>(undefined);
-  stopWords = $state('');
+  /** What the last Stop that was sent did. */
+  #did = $state('');
+  readonly stopWords = $derived.by(() => {
+    const { phase, text } = this.session.stopState;
+    return phase === 'idle' ? '' : phase === 'sent' ? this.#did || `${text}.` : text;
+  });
 
   readonly #frames: ((controller: Controller | undefined) => void)[] = [];
   #read = 0;
   #agent = '';
   #stop: { at: number; state: string | undefined; moved: boolean; job: boolean } | undefined;
-  #stopTimer: ReturnType<typeof setTimeout> | undefined;
 
   readonly words = $derived.by<StateWords | undefined>(() => {
     if (!this.controller) return undefined;
@@ -90,6 +108,8 @@ export class ArmPage {
     this.session.onStatus((status) => this.#take(status));
     this.session.onEvent((entry, isNew) => this.#receive(entry as ArmEntry, isNew));
     this.session.onLoss(() => this.#lose());
+    this.session.onMissed(() => void this.readJobs());
+    this.session.isAtRest = () => this.session.fresh && !this.isRunning && this.latest?.state !== 'Teaching' && !isMoving(this.latest) && !isPaused(this.latest);
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
 
@@ -101,7 +121,7 @@ export class ArmPage {
 
   setUnit(unit: AngleUnit): void {
     this.unit = unit;
-    localStorage.setItem('openjtc-unit', unit);
+    device.setItem('openjtc-unit', unit);
   }
 
   /** Measured positions, or undefined where one is not known. */
@@ -111,34 +131,37 @@ export class ArmPage {
   }
 
   async stop(): Promise<void> {
+    // Before all else; the words come after.
+    const sent = this.session.stop();
     const controller = this.latest;
     const moved = isMoving(controller) || isPaused(controller) || this.words?.tone === 'move';
-    this.#stop = { at: performance.now(), state: controller?.state, moved, job: this.isRunning };
-    this.stopWords = 'Stop is being sent';
-    await this.session.stop();
-    const state = this.session.stopState;
-    this.stopWords = state.phase === 'failed' ? state.text : 'Stop was sent.';
-    if (state.phase === 'failed') this.#stop = undefined;
-    else this.#wordStop();
+    this.#stop = { at: this.session.stopState.at, state: controller?.state, moved, job: this.isRunning };
+    this.#did = '';
+    await sent;
+    this.#wordStop();
   }
 
   #wordStop(): void {
-    const stop = this.#stop;
-    if (!stop || this.session.stopState.phase !== 'sent') return;
+    const [stop, { phase, at }] = [this.#stop, this.session.stopState];
+    if (!stop || phase !== 'sent' || at !== stop.at) return;
     const controller = this.latest;
     const since = performance.now() - stop.at;
     const waits = isMoving(controller) || (stop.state === 'Teaching' && controller?.state === 'Teaching') || since < 150;
-    this.stopWords = stop.job && !stop.moved ? 'Stop was sent: the job ends before anything moves.' : whatStopDid(stop.state, stop.moved, controller, since);
+    this.#did = stop.job && !stop.moved ? 'Stop was sent: the job ends before anything moves.' : whatStopDid(stop.state, stop.moved, controller, since);
     if (!waits || since > 4000) {
       this.#stop = undefined;
-      clearTimeout(this.#stopTimer);
-      this.#stopTimer = setTimeout(() => (this.stopWords = ''), 8000);
+      setTimeout(() => {
+        if (this.session.stopState.at === at) this.session.forgetStop();
+      }, 8000);
     }
   }
 
   #take(status: Status): void {
     if (status.agent !== this.#agent) {
       this.#agent = status.agent;
+      // Its jobs are others; what is going on now is asked for.
+      this.course = undefined;
+      this.#stop = undefined;
       void this.refresh();
     }
     const controller = this.session.fresh ? (status.controller ?? undefined) : undefined;
@@ -183,6 +206,8 @@ export class ArmPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
+        // What a Stop did is shown until somebody goes on.
+        if (isNew && !this.#stop) this.session.forgetStop();
         this.course = {
           number: event.job, what: event.what, client: event.client, phase: '', stage: 'begun', progress: 0, duration_s: 0, runs: 0,
           own: this.session.leasePhase === 'held' && event.client === this.session.name,
@@ -273,10 +298,21 @@ export class ArmPage {
     });
   }
 
+  /** A number for a new trajectory, by what is kept now; one that somebody else takes meanwhile is refused with `new`. */
+  async freeNumber(): Promise<number> {
+    await this.readTrajectories();
+    return freeNumber(this.trajectories);
+  }
+
   readJobs(): Promise<void> {
     return this.#quietly(async () => {
       const jobs = await this.session.api.get<JobObject[]>('/api/jobs');
       this.lastJob = jobs.filter((job) => job.stage !== 'running').at(-1);
+      const [course, runs] = [this.course, jobs.find((job) => job.stage === 'running')];
+      if (course && course.stage !== 'ended' && jobs.some((job) => job.number === course.number && job.stage !== 'running')) course.stage = 'ended';
+      if (runs && course?.number !== runs.number) {
+        this.course = { number: runs.number, what: runs.what, client: runs.client, phase: '', stage: 'begun', progress: 0, duration_s: 0, runs: 0, own: false };
+      }
     });
   }
 
@@ -289,6 +325,7 @@ export class ArmPage {
 
 export function provideArm(arm: ArmPage): void {
   setContext(KEY, arm);
+  provideSession(arm.session);
 }
 
 export function useArm(): ArmPage {

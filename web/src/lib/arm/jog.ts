@@ -4,12 +4,14 @@
 export const PERIOD_MS = 90;
 /** A request without an answer for so long is not waited for, ms. */
 const LATE_MS = 1000;
+/** A page that was suspended for so long does not know whether the key is still held, ms. */
+const ASLEEP_MS = 450;
 
 export interface JogLine {
-  /** Sends rates; resolves when they were taken. `first`: the person has just touched. */
-  send(rates: number[], first: boolean): Promise<unknown>;
-  /** It was refused, and is not asked for on. */
-  refused(error: unknown): void;
+  /** Sends rates; resolves when they were taken. Zeros end a jog, and are for whoever it is. */
+  send(rates: number[]): Promise<unknown>;
+  /** It was refused, and is not asked for on; `after`: the key had been let go by then. */
+  refused(error: unknown, after: boolean): void;
   every(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
   now(): number;
@@ -20,6 +22,7 @@ export class Jogger {
   #timer: unknown;
   #open = 0;
   #sentAt = 0;
+  #ticked = 0;
   #turn = 0;
   readonly #line: JogLine;
 
@@ -38,8 +41,9 @@ export class Jogger {
     rates[joint - 1] = rate;
     this.#rates = rates;
     this.#turn += 1;
-    this.#send(true);
-    this.#timer = this.#line.every(() => this.#send(false), PERIOD_MS);
+    this.#ticked = this.#line.now();
+    this.#send();
+    this.#timer = this.#line.every(() => this.#tick(), PERIOD_MS);
   }
 
   /** The key is let go, the pointer lost, the window left, the connection gone. Without a pressed key nothing is sent. */
@@ -50,7 +54,7 @@ export class Jogger {
   }
 
   #zeros(): void {
-    void this.#line.send(new Array<number>(6).fill(0), false).catch(() => {
+    void this.#line.send(new Array<number>(6).fill(0)).catch(() => {
       // Rates hold for 200 ms only: without an answer the arm stops by itself.
     });
   }
@@ -62,7 +66,15 @@ export class Jogger {
     this.#timer = undefined;
   }
 
-  #send(first: boolean): void {
+  #tick(): void {
+    const now = this.#line.now();
+    const asleep = now - this.#ticked > ASLEEP_MS;
+    this.#ticked = now;
+    if (asleep) this.release();
+    else this.#send();
+  }
+
+  #send(): void {
     const rates = this.#rates;
     if (!rates) return;
     // One request at a time: the agent refuses a second one, and a slow line does not fill with old ones.
@@ -70,7 +82,7 @@ export class Jogger {
     const turn = this.#turn;
     this.#open += 1;
     this.#sentAt = this.#line.now();
-    this.#line.send(rates, first).then(
+    this.#line.send(rates).then(
       () => {
         this.#open -= 1;
         // Let go while these rates were on their way: zeros may have overtaken them, or were refused because of them.
@@ -78,9 +90,10 @@ export class Jogger {
       },
       (error: unknown) => {
         this.#open -= 1;
-        if (turn !== this.#turn) return;
-        this.#end();
-        this.#line.refused(error);
+        if (turn === this.#turn) {
+          this.#end();
+          this.#line.refused(error, false);
+        } else if (!this.#rates) this.#line.refused(error, true);
       },
     );
   }

@@ -2,7 +2,7 @@
 
 export const NUMBER_MAX = 99;
 
-/** The lowest that nothing has; the highest where all are taken: it is replaced. */
+/** The lowest that nothing has; the highest where all are taken, and the agent refuses it. */
 export function freeNumber(kept: readonly { number: number }[]): number {
   const taken = new Set(kept.map((each) => each.number));
   for (let number = 1; number <= NUMBER_MAX; number += 1) if (!taken.has(number)) return number;

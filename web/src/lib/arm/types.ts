@@ -3,13 +3,14 @@ import type { ControllerObject, Happening, PageObject, PointsObject, PoseObject,
 import type { Entry } from '../connection.ts';
 
 export type {
-  ArmObject, BoundObject, CheckObject, DoctorObject, Happening, InfoObject, JobObject, JointObject, JointPlan, JointResult, LogStatusObject,
+  ArmObject, BoundObject, CheckObject, DoctorObject, Happening, InfoObject, JobObject, JointObject, JointPlan, JointResult, LogStatusObject, LogValues,
   PayloadObject, PlanObject, PlanRequest, ProblemObject, ResultObject, SettingObject, SpeedObject, TrajectoryObject,
 } from './api-types.ts';
 
 export type Controller = ControllerObject;
 export type Status = StatusObject;
-export type Points = PointsObject;
+/** Of a kept trajectory; of what only this page knows there is no digest. */
+export type Points = Omit<PointsObject, 'digest'> & { digest?: string };
 export type Pose = PoseObject;
 export type Page = PageObject;
 

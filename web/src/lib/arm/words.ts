@@ -1,9 +1,7 @@
 // What the controller reports, in words: what is, why, and what leads on.
 import type { Controller, Happening } from './types.ts';
 import { count, duration } from '../format.ts';
-
-/** A state's colour and shape; each shape is another one, for those who do not see colours. */
-export type Tone = 'off' | 'hold' | 'move' | 'pause' | 'teach' | 'error' | 'lost';
+import type { EventTone, Tone } from '../tone.ts';
 
 export type Step = 'recover' | 'defaults' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
 
@@ -130,8 +128,6 @@ export function whatStopDid(before: string | undefined, wasMoving: boolean, now:
 export function jobWords(what: string): string {
   return what.charAt(0).toUpperCase() + what.slice(1);
 }
-
-export type EventTone = 'info' | 'good' | 'warn' | 'error';
 
 /** An event in words; undefined: not worth a line. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {

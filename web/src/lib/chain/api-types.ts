@@ -454,10 +454,20 @@ export interface components {
         ErrorObject: {
             /** @description Short name, for programs. */
             code: string;
+            /**
+             * Format: double
+             * @description What is allowed.
+             */
+            limit?: number | null;
             /** @description What was wrong, for people. */
             message: string;
             /** @description What helps. */
             next: string;
+            /**
+             * Format: double
+             * @description What was found, in the unit of the message.
+             */
+            value?: number | null;
         };
         /** @description An event. */
         EventObject: {
@@ -850,6 +860,11 @@ export interface components {
         SentObject: {
             /**
              * Format: u-int64
+             * @description Its number: `last_halt` until the next.
+             */
+            halt: number;
+            /**
+             * Format: u-int64
              * @description Number of the last event before it: what came of it follows.
              */
             last_event: number;
@@ -865,6 +880,11 @@ export interface components {
             age_ms: number;
             /** @description Which agent this is, by a number that it was given at its start. */
             agent: string;
+            /**
+             * Format: u-int64
+             * @description Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+             */
+            at_ms: number;
             /** @description Boards that are known. */
             boards: number;
             /** @description The bus. */
@@ -884,6 +904,11 @@ export interface components {
              * @description Number of the last event.
              */
             last_event: number;
+            /**
+             * Format: u-int64
+             * @description Number of the last Stop, 0 before the first: `asked_after` of what is asked for now.
+             */
+            last_halt: number;
             lease?: components["schemas"]["LeaseObject"] | null;
             /**
              * Format: double
@@ -1251,7 +1276,14 @@ export interface operations {
     };
     set_input: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -1380,7 +1412,14 @@ export interface operations {
     };
     set_outputs: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -1505,7 +1544,14 @@ export interface operations {
     };
     set_parameter: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -1634,7 +1680,14 @@ export interface operations {
     };
     reset_board: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -1757,7 +1810,14 @@ export interface operations {
     };
     start_board: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -2325,7 +2385,14 @@ export interface operations {
     };
     init: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -3076,7 +3143,14 @@ export interface operations {
     };
     run: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;
@@ -3458,7 +3532,14 @@ export interface operations {
     };
     update: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
+                 *     however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
+                 *     behind a halt of others.
+                 */
+                asked_after?: number;
+            };
             header: {
                 /** @description Key of the lease */
                 "Lease-Key": string;

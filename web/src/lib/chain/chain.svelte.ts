@@ -1,10 +1,9 @@
 // What the page of a chain knows: bus, boards, values, jobs. Components read it, and ask by it.
 import { getContext, setContext } from 'svelte';
 
-import { History } from '../arm/history.ts';
+import { History } from '../history.ts';
 import { ApiError } from '../api.ts';
-import type { Policy } from '../lease.ts';
-import { Session } from '../session.svelte.ts';
+import { type Driven, provideSession, Session } from '../session.svelte.ts';
 import type { BoardObject, BoardsMessage, ChainEntry, Happening, JobObject, Status, Values, ValuesMessage } from './types.ts';
 import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, stoppedWords } from './words.ts';
 
@@ -16,10 +15,16 @@ const READ_MS = 120;
 const OLD_MS = 900;
 const TICK_MS = 250;
 
-export const POLICIES: [Policy, string][] = [
-  ['stop', 'are stopped'],
-  ['continue', 'go on with the inputs that they have'],
-];
+const DRIVEN: Driven = {
+  thing: 'chain',
+  works: 'Stop works.',
+  viewerMay: 'look and stop',
+  policies: [
+    ['stop', 'are stopped'],
+    ['continue', 'go on with the inputs that they have'],
+  ],
+  left: 'When this browser goes (closed, hidden for 10 s, network gone), boards that it has started',
+};
 
 /** A job as its events report it. */
 export interface Course {
@@ -49,7 +54,7 @@ const KEY = Symbol('chain');
 const BEAT_MS = 150;
 
 export class ChainPage {
-  readonly session: Session<Status> = new Session<Status>((entry) => eventWords((entry as ChainEntry).event), ['stop', 'continue']);
+  readonly session: Session<Status> = new Session<Status>((entry) => eventWords((entry as ChainEntry).event), DRIVEN);
 
   tab = $state<Tab>('boards');
   chosen = $state<number | undefined>(undefined);
@@ -60,8 +65,13 @@ export class ChainPage {
   values = $state.raw<ReadonlyMap<number, { values: Values; at: number }>>(new Map());
   course = $state<Course | undefined>(undefined);
   jobs = $state.raw<JobObject[]>([]);
-  stopWords = $state('');
-  stopFailed = $state(false);
+  /** What the last Stop that was sent did, as the boards have confirmed it or have not. */
+  #did = $state<{ text: string; failed: boolean }>({ text: '', failed: false });
+  readonly stopWords = $derived.by(() => {
+    const { phase, text } = this.session.stopState;
+    return phase === 'sending' || phase === 'failed' ? text : this.#did.text;
+  });
+  readonly stopFailed = $derived(this.session.stopState.phase === 'failed' || (this.session.stopState.phase !== 'sending' && this.#did.failed));
   question = $state<Question | undefined>(undefined);
   /** performance.now(), a few times a second: for ages. */
   now = $state(performance.now());
@@ -93,6 +103,8 @@ export class ChainPage {
     this.session.onEvent((entry, isNew) => this.#happened((entry as ChainEntry).event, isNew));
     this.session.onMessage((message) => this.#receive(message));
     this.session.onLoss(() => this.#lose());
+    this.session.onMissed(() => void this.readJobs());
+    this.session.isAtRest = () => this.known && !this.runs && !this.isRunning;
     // Boards that this page commands are stopped when its lease lapses: it lasts for as long as they run and the page is looked at.
     this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
   }
@@ -123,38 +135,38 @@ export class ChainPage {
     return this.#traces.get(number)?.history;
   }
 
-  /** A command for a board or the chain; what was refused is a message on the page. */
-  async command<T = unknown>(what: string, method: string, path: string, body?: unknown): Promise<{ value: T } | undefined> {
+  /** A command for a board or the chain; what was refused is a message on the page. `ends`: it makes nothing move, and is done behind a Stop, too. */
+  async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
     // Boards answer one after the other, and a job that goes on first ends what it has begun.
-    return this.session.command<T>(what, method, path, body === undefined ? { within: 30_000 } : { body, within: 30_000 });
+    // Behind a Stop that this page had not shown nothing is done, however late it comes.
+    return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, within: 30_000 });
   }
 
   scan(): void {
-    void this.command('Scan', 'POST', '/api/scan');
+    void this.command('Scan', 'POST', '/api/scan', undefined, true);
   }
 
   cancel(): void {
     const job = this.course;
-    if (job) void this.command(`Cancel ${jobWords(job.what).toLowerCase()}`, 'DELETE', `/api/jobs/${job.number}`);
+    if (job) void this.command(`Cancel ${jobWords(job.what).toLowerCase()}`, 'DELETE', `/api/jobs/${job.number}`, undefined, true);
   }
 
   async stop(): Promise<void> {
-    const at = performance.now();
-    this.#stop = { at, ran: this.runs || this.isRunning || !this.known };
+    // Before all else; the words come after.
+    const sent = this.session.stop();
+    const at = this.session.stopState.at;
     this.halts += 1;
-    this.stopFailed = false;
-    this.stopWords = 'Stop is being sent';
+    this.#stop = { at, ran: this.runs || this.isRunning || !this.known };
+    this.#say('', false);
+    await sent;
+    if (this.session.stopState.phase !== 'sent' || this.#stop?.at !== at) return;
+    const updates = this.isRunning && this.course?.what === 'update';
+    this.#say(updates ? 'Stop was sent to all boards; they are asked when the update is over. Cancel ends the update.' : 'Stop was sent to all boards; each is being asked.', false);
+  }
+
+  #say(text: string, failed: boolean): void {
     clearTimeout(this.#stopTimer);
-    await this.session.stop();
-    const state = this.session.stopState;
-    if (state.phase === 'failed') {
-      this.#stop = undefined;
-      this.stopFailed = true;
-      this.stopWords = state.text;
-    } else if (this.#stop?.at === at) {
-      const updates = this.isRunning && this.course?.what === 'update';
-      this.stopWords = updates ? 'Stop was sent to all boards; they are asked when the update is over. Cancel ends the update.' : 'Stop was sent to all boards; each is being asked.';
-    }
+    this.#did = { text, failed };
   }
 
   #wordStop(event: Extract<Happening, { kind: 'stopped' }>): void {
@@ -162,11 +174,9 @@ export class ChainPage {
     if (!this.#stop && !failed) return;
     const took = this.#stop?.ran && !failed && event.boards.length > 0 ? ` ${((performance.now() - this.#stop.at) / 1000).toFixed(1)} s.` : '';
     this.#stop = undefined;
-    this.stopWords = text + took;
-    this.stopFailed = failed;
+    this.#say(text + took, failed);
     if (failed) this.session.toast({ tone: 'error', title: 'Not stopped', text: why });
-    clearTimeout(this.#stopTimer);
-    if (!failed) this.#stopTimer = setTimeout(() => (this.stopWords = ''), 12_000);
+    else this.#stopTimer = setTimeout(() => this.#say('', false), 12_000);
   }
 
   #take(status: Status): void {
@@ -243,7 +253,10 @@ export class ChainPage {
     switch (event.kind) {
       case 'begun':
         // What a Stop did is shown until somebody goes on.
-        if (isNew && !this.#stop) this.stopWords = '';
+        if (isNew && !this.#stop) {
+          this.#say('', false);
+          this.session.forgetStop();
+        }
         this.course = {
           number: event.job, what: event.what, client: event.client, over: false, progress: undefined, notes: [],
           own: this.session.leasePhase === 'held' && event.client === this.session.name,
@@ -296,6 +309,8 @@ export class ChainPage {
   async readJobs(): Promise<void> {
     try {
       this.jobs = await this.session.api.get<JobObject[]>('/api/jobs');
+      const course = this.course;
+      if (course && !course.over && this.jobs.some((job) => job.number === course.number && job.stage !== 'running')) course.over = true;
     } catch (error) {
       if (!(error instanceof ApiError)) throw error;
     }
@@ -327,6 +342,7 @@ export class ChainPage {
 
 export function provideChain(chain: ChainPage): void {
   setContext(KEY, chain);
+  provideSession(chain.session);
 }
 
 export function useChain(): ChainPage {

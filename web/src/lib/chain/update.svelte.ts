@@ -32,6 +32,8 @@ export function word(text: string): number | undefined {
 
 class UpdateForm {
   boards = $state<number[]>([]);
+  /** The flash numbers that these had when they were chosen: whoever has their number when it is sent has to have these. */
+  #flash = new Map<number, number>();
   image = $state.raw<Picked | undefined>(undefined);
   second = $state.raw<Picked | undefined>(undefined);
   format = $state<'' | 'bin' | 'hex' | 'srec'>('');
@@ -44,12 +46,24 @@ class UpdateForm {
   force = $state(false);
   unverified = $state(false);
 
-  request(flashOf: (board: number) => number | null | undefined, dryRun: boolean): UpdateRequest | undefined {
+  choose(boards: readonly number[], flashOf: (board: number) => number | null | undefined): void {
+    for (const board of boards) {
+      const flash = flashOf(board);
+      if (!this.boards.includes(board) && flash != null) this.#flash.set(board, flash);
+    }
+    this.boards = [...boards].sort((a, b) => a - b);
+    for (const board of this.#flash.keys()) if (!boards.includes(board)) this.#flash.delete(board);
+  }
+
+  request(dryRun: boolean): UpdateRequest | undefined {
     if (!this.image || this.boards.length === 0) return undefined;
     const expected = word(this.programId);
     const format = this.format || formatOf(this.image.name);
     return {
-      boards: this.boards.map((board) => ({ board, ...(this.checkFlash && flashOf(board) != null ? { flash_number: flashOf(board)! } : {}) })),
+      boards: this.boards.map((board) => {
+        const flash_number = this.#flash.get(board);
+        return { board, ...(this.checkFlash && flash_number !== undefined ? { flash_number } : {}) };
+      }),
       image: this.image.base64,
       ...(this.second ? { second: this.second.base64 } : {}),
       ...(format ? { format } : {}),

@@ -1,6 +1,6 @@
 // What boards and bus report, in words: what is, why, and what leads on.
-import type { Tone } from '../arm/words.ts';
 import { count } from '../format.ts';
+import type { EventTone, Tone } from '../tone.ts';
 import type { BoardObject, Happening, JobObject, Status } from './types.ts';
 
 export function hex(value: number | null | undefined, digits = 2): string {
@@ -199,8 +199,6 @@ export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran
   }
   return { text: done || 'Stop was sent. No board was running.', failed: false, why: '' };
 }
-
-export type EventTone = 'info' | 'good' | 'warn' | 'error';
 
 /** An event in words; undefined: not worth a line. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {

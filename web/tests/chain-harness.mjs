@@ -6,9 +6,7 @@ import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { fileURLToPath } from 'node:url';
 
-import { ended, open, until } from './harness.mjs';
-
-export { ended, passes, startBrowser, until } from './harness.mjs';
+import { asking, ended, until } from './harness.mjs';
 
 const UCOM = process.env.UCOM ?? fileURLToPath(new URL('../../target/debug/ucom', import.meta.url));
 
@@ -59,13 +57,7 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
       await gone;
       rmSync(dir, { recursive: true, force: true });
     },
-    async ask(method, path, body, key) {
-      const headers = { Authorization: `Bearer ${token('operator')}`, 'Content-Type': 'application/json' };
-      if (key) headers['Lease-Key'] = key;
-      const response = await fetch(url + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
-      const text = await response.text();
-      return { status: response.status, body: text ? JSON.parse(text) : undefined };
-    },
+    ask: asking(url, token('operator')),
     /** Does a job as another client, which then lets the lease go: what it has started runs on. */
     async job(path, body = {}) {
       const grant = await agent.ask('POST', '/api/lease', { name: 'test', policy: 'continue', lasts_s: 60 });
@@ -78,30 +70,6 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
     board: async (number) => (await agent.ask('GET', `/api/boards/${number}`)).body,
   };
   return agent;
-}
-
-/** An agent with its page, for one test; `look` opens it in a browser of its own. */
-export async function stage(browser, options = {}) {
-  const agent = await startChain(options);
-  const contexts = [];
-  return {
-    agent,
-    async look({ token = 'operator', ...rest } = {}) {
-      const word = token === 'none' ? '' : `#token=${agent[token] ?? token}`;
-      const page = await open(browser, `${agent.url}/${word}`, rest);
-      contexts.push(page.context());
-      return page;
-    },
-    async end() {
-      for (const context of contexts) await context.close();
-      await agent.end();
-    },
-  };
-}
-
-/** What the page says of the bus. */
-export function state(page) {
-  return page.locator('section[aria-label="State"]');
 }
 
 export const card = (page, number) => page.getByRole('button', { name: new RegExp(`^Board ${number} `) });

@@ -10,7 +10,10 @@ import { fileURLToPath } from 'node:url';
 import { chromium } from 'playwright-core';
 
 /** Pictures of pages in which a test has failed. */
-const PICTURES = fileURLToPath(new URL('./out/', import.meta.url));
+const FAILED = fileURLToPath(new URL('./out/', import.meta.url));
+/** Those of the docs, which say what they are called. */
+const PICTURES = fileURLToPath(new URL('../pictures/', import.meta.url));
+const SHOWN = readFileSync(new URL('../../docs/dashboard.md', import.meta.url), 'utf8');
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/debug/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
@@ -81,13 +84,18 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
       await gone;
       rmSync(dir, { recursive: true, force: true });
     },
-    async ask(method, path, body, key) {
-      const headers = { Authorization: `Bearer ${token('operator')}`, 'Content-Type': 'application/json' };
-      if (key) headers['Lease-Key'] = key;
-      const response = await fetch(url + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
-      const text = await response.text();
-      return { status: response.status, body: text ? JSON.parse(text) : undefined };
-    },
+    ask: asking(url, token('operator')),
+  };
+}
+
+/** Requests to an agent with a token; status and body of the answer. */
+export function asking(url, token) {
+  return async (method, path, body, key) => {
+    const headers = { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' };
+    if (key) headers['Lease-Key'] = key;
+    const response = await fetch(url + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+    const text = await response.text();
+    return { status: response.status, body: text ? JSON.parse(text) : undefined };
   };
 }
 
@@ -109,9 +117,13 @@ export async function startMortal() {
   return { browser: await chromium.connect(server.wsEndpoint()), kill: () => server.kill() };
 }
 
+/** Takes a picture for the docs where PICTURES is set and they show one of this name. */
+export async function picture(page, name) {
+  if (process.env.PICTURES && SHOWN.includes(`/${name}.png`)) await page.screenshot({ path: join(PICTURES, `${name}.png`) });
+}
+
 /** An agent with its page, for one test; `look` opens it in a browser of its own. */
-export async function stage(browser, options = {}) {
-  const agent = await startAgent(options);
+export function stage(browser, agent) {
   const contexts = [];
   return {
     agent,
@@ -124,7 +136,7 @@ export async function stage(browser, options = {}) {
     /** What each page shows, for whoever looks for the reason of a failure. */
     async picture(name) {
       for (const [i, context] of contexts.entries()) {
-        for (const page of context.pages()) await page.screenshot({ path: join(PICTURES, `${name}-${i}.png`), fullPage: true }).catch(() => {});
+        for (const page of context.pages()) await page.screenshot({ path: join(FAILED, `${name}-${i}.png`), fullPage: true }).catch(() => {});
       }
     },
     async end() {
@@ -135,14 +147,14 @@ export async function stage(browser, options = {}) {
 }
 
 /** Does it on a stage of its own, and takes a picture where it fails. */
-export function staged(browser) {
+export function staged(browser, start = startAgent) {
   return (name, options, act) =>
     test(name, async () => {
-      const scene = await stage(browser(), options);
+      const scene = stage(browser(), await start(options));
       try {
         await act(scene);
       } catch (error) {
-        mkdirSync(PICTURES, { recursive: true });
+        mkdirSync(FAILED, { recursive: true });
         await scene.picture(name.replace(/[^a-z0-9]+/gi, '-').slice(0, 50));
         throw error;
       } finally {

@@ -1,16 +1,14 @@
 // How the page looks, and that everyone can use it: each tab is read by axe, in light and dark, from a phone to a large screen. The pictures
 // in pictures/ are taken where PICTURES is set.
 import assert from 'node:assert/strict';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before } from 'node:test';
-import { fileURLToPath } from 'node:url';
 
 import { AxeBuilder } from '@axe-core/playwright';
 
-import { commanding, ended, jtc, recover, staged, startBrowser, state, until } from './harness.mjs';
+import { commanding, ended, jtc, picture, recover, staged, startBrowser, state, until } from './harness.mjs';
 
-const PICTURES = fileURLToPath(new URL('../pictures/', import.meta.url));
 const TABS = ['state', 'run', 'jog', 'teach', 'arm', 'plots', 'log'];
 const SIZES = [[360, 740], [800, 1180], [1400, 900]];
 let browser;
@@ -72,10 +70,7 @@ for (const colorScheme of ['light', 'dark']) {
         await page.waitForTimeout(500);
         await reads(page, `${tab} at ${width} px, ${colorScheme}`);
         await fits(page, `${tab} at ${width} px, ${colorScheme}`);
-        if (process.env.PICTURES) {
-          mkdirSync(PICTURES, { recursive: true });
-          if (['state', 'jog', 'plots'].includes(tab)) await page.screenshot({ path: join(PICTURES, `${tab}-${width}-${colorScheme}.png`) });
-        }
+        await picture(page, `${tab}-${width}-${colorScheme}`);
       }
       await page.context().close();
     }
@@ -103,7 +98,7 @@ on('dialogs, errors and a lost connection can be read by everyone', {}, async ({
   await agent.kill();
   await page.getByText('No connection', { exact: true }).first().waitFor();
   await reads(page, 'lost');
-  if (process.env.PICTURES) await page.screenshot({ path: join(PICTURES, 'lost-800-light.png') });
+  await picture(page, 'lost-800-light');
   report();
 });
 
@@ -121,18 +116,18 @@ on('a motion and its preview', {}, async ({ agent, look }) => {
   await page.locator('#panel').getByRole('button', { name: 'Show' }).first().click();
   await page.waitForTimeout(500);
   await reads(page, 'refused');
-  if (process.env.PICTURES) await page.screenshot({ path: join(PICTURES, 'refused-1400-dark.png') });
+  await picture(page, 'refused-1400-dark');
   await page.emulateMedia({ colorScheme: 'light' });
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
   await page.getByText('Passed the check').waitFor();
   await page.getByLabel('Time in the preview, s').fill('2.4');
   await page.waitForTimeout(500);
   await reads(page, 'preview');
-  if (process.env.PICTURES) await page.screenshot({ path: join(PICTURES, 'preview-1400-light.png') });
+  await picture(page, 'preview-1400-light');
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();
   await page.waitForTimeout(4000);
   await reads(page, 'moving');
-  if (process.env.PICTURES) await page.screenshot({ path: join(PICTURES, 'run-1400-light.png') });
+  await picture(page, 'run-1400-light');
   report();
 });

@@ -167,6 +167,13 @@ on('a key that was let go before the lease came moves nothing, nor does one that
   await page.mouse.move(box.x + 20, box.y + 400);
   await until('it rests', async () => !(await moves(agent)), 5000);
   await page.mouse.up();
+  // Another key at once, by the same mouse.
+  const other = await page.getByRole('button', { name: 'Joint 2, positive' }).boundingBox();
+  await page.mouse.move(other.x + 20, other.y + 20);
+  await page.mouse.down();
+  await until('it moves', () => moves(agent));
+  await page.mouse.up();
+  await until('it rests', async () => !(await moves(agent)), 5000);
   // A line on which all is late moves nothing that nobody holds any more.
   const before = await joints(agent);
   const late = [];
@@ -272,7 +279,17 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   assert.ok(await page.getByRole('button', { name: 'Temperature' }).isDisabled());
   await page.getByRole('button', { name: 'Live again' }).click();
   await page.getByLabel(/^Kp/).fill('7000');
+  // What is typed while the arm is read is not what was set.
+  let read;
+  await page.route('**/api/arm', async (route) => {
+    if (route.request().method() === 'GET') await new Promise((done) => (read = done));
+    await route.continue().catch(() => {});
+  });
   await page.locator('#panel').getByRole('button', { name: 'Set', exact: true }).click();
+  await until('it is read', () => read);
+  await page.getByLabel(/^Kp/).fill('3');
+  read();
+  await page.unrouteAll({ behavior: 'wait' });
   await until('the controller has them', async () => /kp = 7000/.test((await agent.ask('GET', '/api/arm')).body.text));
   const test = page.getByRole('button', { name: 'Test', exact: true });
   await until('it can be tested', () => test.isEnabled());

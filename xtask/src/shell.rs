@@ -186,7 +186,7 @@ impl Drop for Scratch {
     }
 }
 
-/// Files below `directory` with one of these extensions, sorted; build output and hidden directories left out.
+/// Files below `directory` with one of these extensions, sorted; build output, installed packages and hidden directories left out.
 pub fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut waiting = vec![directory.to_owned()];
@@ -197,7 +197,7 @@ pub fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
             let name = entry.file_name();
             let name = name.to_string_lossy();
             if path.is_dir() {
-                if name != "target" && !name.starts_with('.') {
+                if name != "target" && name != "node_modules" && !name.starts_with('.') {
                     waiting.push(path);
                 }
             } else if path.extension().is_some_and(|e| extensions.iter().any(|wanted| e == *wanted)) {

@@ -53,10 +53,16 @@ export interface Ask {
   ahead?: boolean;
   /** Without the token. */
   bare?: boolean;
+  /** Makes nothing move: a Stop leaves it in its turn. */
+  ends?: boolean;
+  /** Is given up where a Stop needs its connection. */
+  yields?: boolean;
 }
 
 /** So many requests are open at once beside those that go ahead: a browser opens six to one agent, and lets the next wait without a word. */
 export const OPEN_MAX = 3;
+/** A command that has waited for its turn so long is not sent any more, ms: whoever asked for it looks at something else by then. */
+export const WAIT_MAX_MS = 2000;
 
 type Fetch = (input: string, init: RequestInit) => Promise<Response>;
 
@@ -92,15 +98,36 @@ export function problemOf(status: number, text: string): Problem {
 }
 
 interface Waiting {
-  reads: boolean;
+  /** A question, or what makes nothing move. */
+  stays: boolean;
   go(): void;
-  drop(): void;
+  drop(why: string): void;
+}
+
+/** No answer came, or not the whole of it. */
+function unreached(error: unknown): ApiError {
+  const late = error instanceof DOMException && error.name === 'TimeoutError';
+  return new ApiError(0, {
+    code: late ? 'timeout' : 'no-connection',
+    message: late ? 'The agent did not answer in time.' : 'The agent cannot be reached.',
+    cause: 'The agent has ended, or the network to it is interrupted.',
+    next: 'Check the network and that the agent runs. The emergency stop works without either.',
+  });
+}
+
+async function textOf(response: Response): Promise<string> {
+  try {
+    return await response.text();
+  } catch (error) {
+    throw unreached(error);
+  }
 }
 
 /** A client of an agent's API. */
 export class Api {
   #open = 0;
   #waiting: Waiting[] = [];
+  #yielding = new Set<AbortController>();
   readonly #token: () => string | undefined;
   readonly #key: () => string | undefined;
   readonly #fetch: Fetch;
@@ -111,17 +138,19 @@ export class Api {
     this.#fetch = fetch ?? ((input, init) => globalThis.fetch(input, init));
   }
 
-  /** What waits for its turn and is no question is not sent any more. */
-  recall(): void {
-    const commands = this.#waiting.filter((each) => !each.reads);
-    this.#waiting = this.#waiting.filter((each) => each.reads);
-    for (const command of commands) command.drop();
+  /** What waits for its turn and may move something is not sent any more, and what yields makes room. */
+  recall(why: string): void {
+    const commands = this.#waiting.filter((each) => !each.stays);
+    this.#waiting = this.#waiting.filter((each) => each.stays);
+    for (const command of commands) command.drop(why);
+    for (const request of this.#yielding) request.abort();
+    this.#yielding.clear();
   }
 
   /** Sends, and returns the answer as it came. Throws ApiError for everything else. */
   async send(method: string, path: string, ask: Ask = {}): Promise<Response> {
     if (ask.ahead || ask.keepalive) return this.#send(method, path, ask);
-    if (this.#open >= OPEN_MAX) await this.#turn(method === 'GET');
+    if (this.#open >= OPEN_MAX) await this.#turn(method === 'GET' || ask.ends === true);
     else this.#open += 1;
     try {
       return await this.#send(method, path, ask);
@@ -133,10 +162,17 @@ export class Api {
     }
   }
 
-  #turn(reads: boolean): Promise<void> {
+  #turn(stays: boolean): Promise<void> {
     return new Promise((go, fail) => {
-      const drop = () => fail(new ApiError(0, { code: 'stopped', message: 'A Stop came before it was sent; nothing was sent.', next: 'Ask for it again.' }));
-      this.#waiting.push({ reads, go, drop });
+      const own: Waiting = { stays, go, drop: (why) => fail(new ApiError(0, { code: 'not-sent', message: `${why}; nothing was sent.`, next: 'Ask for it again.' })) };
+      this.#waiting.push(own);
+      if (stays) return;
+      setTimeout(() => {
+        const at = this.#waiting.indexOf(own);
+        if (at < 0) return;
+        this.#waiting.splice(at, 1);
+        own.drop('Other requests took too long');
+      }, WAIT_MAX_MS);
     });
   }
 
@@ -152,26 +188,24 @@ export class Api {
       init.body = JSON.stringify(ask.body);
     }
     if (ask.keepalive) init.keepalive = true;
-    init.signal = AbortSignal.timeout(ask.within ?? 15_000);
+    const late = AbortSignal.timeout(ask.within ?? 15_000);
+    const own = ask.yields ? new AbortController() : undefined;
+    if (own) this.#yielding.add(own);
+    init.signal = own ? AbortSignal.any([late, own.signal]) : late;
     let response: Response;
     try {
       response = await this.#fetch(address(path, ask.query), init);
     } catch (error) {
-      const late = error instanceof DOMException && error.name === 'TimeoutError';
-      throw new ApiError(0, {
-        code: late ? 'timeout' : 'no-connection',
-        message: late ? 'The agent did not answer in time.' : 'The agent cannot be reached.',
-        cause: 'The agent has ended, or the network to it is interrupted.',
-        next: 'Check the network and that the agent runs. The emergency stop works without either.',
-      });
+      throw unreached(error);
+    } finally {
+      if (own) this.#yielding.delete(own);
     }
-    if (!response.ok) throw new ApiError(response.status, problemOf(response.status, await response.text()));
+    if (!response.ok) throw new ApiError(response.status, problemOf(response.status, await textOf(response)));
     return response;
   }
 
   async json<T>(method: string, path: string, ask: Ask = {}): Promise<T> {
-    const response = await this.send(method, path, ask);
-    const text = await response.text();
+    const text = await textOf(await this.send(method, path, ask));
     return (text === '' ? undefined : JSON.parse(text)) as T;
   }
 

@@ -76,6 +76,10 @@ export type Describe = (entry: Entry) => Omit<Line, 'id' | 'unix_s'> | undefined
 /** Somebody has to have touched the page within this time, or something of ours has to be going on, for the lease to be renewed, ms. */
 const IN_USE_MS = 120_000;
 const LINES_MAX = 400;
+/** The agent's time is asked for so often until it is known, ms. */
+const PROBE_MS = 1000;
+/** What may move something is not sent where the lease took longer, ms. */
+const LEASE_MAX_MS = 3000;
 /** A Stop that was not sent is spoken of for so long at least, ms. */
 const FAILED_MS = 20_000;
 /** Status values older than this are not those of now, ms. */
@@ -111,6 +115,8 @@ export class Session<S extends SessionStatus> {
   live = $state(false);
   /** What is driven answers the agent. */
   fresh = $state(false);
+  /** Messages come steadily, and this much too late, s; 0 where that is not why nothing is known of now. */
+  late = $state(0);
   /** s without connection, whole. */
   lostFor = $state(0);
   status = $state.raw<S | undefined>(undefined);
@@ -133,6 +139,8 @@ export class Session<S extends SessionStatus> {
   isBusy: () => boolean = () => false;
   /** Nothing runs that would be left to itself without a lease: else the lease lapses, and its policy is what becomes of that. */
   isAtRest: () => boolean = () => false;
+  /** What the last Stop did, as the page words it; empty: nothing is said. */
+  saysOfStop: () => { text: string; failed: boolean } = () => ({ text: this.stopState.text, failed: this.stopState.phase === 'failed' });
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
   readonly #messageHandlers: ((message: { kind: string }) => void)[] = [];
@@ -141,6 +149,9 @@ export class Session<S extends SessionStatus> {
   readonly #lateness = new Lateness();
   readonly of: Driven;
   readonly #describe: Describe;
+  #probes = 0;
+  /** Stops that are being sent, or tried again. */
+  #stopping = 0;
   #touched = 0;
   #toastId = 0;
   #lineId = 0;
@@ -224,6 +235,7 @@ export class Session<S extends SessionStatus> {
     this.connection.start();
     setInterval(() => this.#look(), 200);
     setInterval(() => void this.#renew(), RENEW_MS);
+    setInterval(() => void this.#probeTime(), PROBE_MS);
     const touch = () => (this.#touched = performance.now());
     for (const event of ['pointerdown', 'keydown', 'wheel']) addEventListener(event, touch, { passive: true, capture: true });
     addEventListener('online', () => this.connection.hurry());
@@ -232,7 +244,7 @@ export class Session<S extends SessionStatus> {
     });
     addEventListener('pagehide', () => {
       // What runs is not left to itself: without a word the lease lapses, and what becomes of it is what was chosen.
-      if (this.isAtRest()) void this.lease.release(true).catch(() => {});
+      if (this.lease.phase === 'waiting' || this.isAtRest()) void this.lease.release(true).catch(() => {});
     });
   }
 
@@ -284,11 +296,20 @@ export class Session<S extends SessionStatus> {
    */
   async stop(): Promise<void> {
     const at = performance.now();
-    this.api.recall();
+    this.api.recall('A Stop came before it was sent');
     this.stopState = { phase: 'sending', at, answered: 0, text: 'Stop is being sent' };
     const enter = (phase: StopState['phase'], text: string) => {
       if (this.stopState.at === at) this.stopState = { phase, at, answered: performance.now(), text };
     };
+    this.#stopping += 1;
+    try {
+      await this.#tryToStop(at, enter);
+    } finally {
+      this.#stopping -= 1;
+    }
+  }
+
+  async #tryToStop(at: number, enter: (phase: StopState['phase'], text: string) => void): Promise<void> {
     for (let attempt = 1; ; attempt += 1) {
       try {
         const sent = await this.#halting('/api/stop', 1500);
@@ -312,7 +333,7 @@ export class Session<S extends SessionStatus> {
 
   /** Nothing more is said of the last Stop, unless it is still being sent. */
   forgetStop(): void {
-    if (this.stopState.phase !== 'sending') this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
+    if (this.#stopping === 0) this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
   }
 
   /** Pauses; needs no lease. */
@@ -328,8 +349,8 @@ export class Session<S extends SessionStatus> {
       return await this.api.json<{ halt?: number }>('POST', path, { within, ahead: true });
     } catch (error) {
       if (!(error instanceof ApiError) || error.status !== 401 || !this.hasToken) throw error;
-      return this.api.json<{ halt?: number }>('POST', path, { within, ahead: true, bare: true }).catch(() => {
-        throw error;
+      return this.api.json<{ halt?: number }>('POST', path, { within, ahead: true, bare: true }).catch((second: unknown) => {
+        throw second instanceof ApiError && second.isNoConnection ? second : error;
       });
     }
   }
@@ -343,9 +364,13 @@ export class Session<S extends SessionStatus> {
   ): Promise<{ value: T } | undefined> {
     const after = ask.moves ? (ask.after ?? this.askedAfter) : undefined;
     const query = after === undefined ? ask.query : { ...ask.query, asked_after: after };
+    const asked = performance.now();
     const act = async (): Promise<{ value: T }> => {
       const had = this.lease.phase === 'held';
       await this.lease.take();
+      if (ask.moves && performance.now() - asked > LEASE_MAX_MS) {
+        throw new ApiError(0, { code: 'not-sent', message: 'The lease came too late for it; nothing was sent.', next: 'Ask for it again.' });
+      }
       try {
         return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
       } catch (error) {
@@ -459,12 +484,18 @@ export class Session<S extends SessionStatus> {
       this.live = live;
       if (!live) this.#lostAt = performance.now() - Math.min(this.connection.silence, 10_000);
     }
+    const late = live && !fresh && this.#late > OLD_MS ? Math.round(this.#late / 1000) : 0;
+    if (late !== this.late) this.late = late;
     if (fresh !== this.fresh) {
       this.fresh = fresh;
-      if (!fresh) for (const handler of this.#lossHandlers) handler();
+      if (!fresh) {
+        // Whoever asked for what still waits has seen something else.
+        this.api.recall('The connection was lost');
+        for (const handler of this.#lossHandlers) handler();
+      }
     }
-    // Said long enough after the connection is back; a job that begins ends it at once.
-    if (this.stopState.phase === 'failed' && live && performance.now() - this.stopState.answered > FAILED_MS) this.forgetStop();
+    // Said long enough, and what was to be stopped rests; a job that begins ends it at once.
+    if (this.stopState.phase === 'failed' && performance.now() - this.stopState.answered > FAILED_MS && this.isAtRest()) this.forgetStop();
     const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
     if (lostFor !== this.lostFor) this.lostFor = lostFor;
   }
@@ -480,6 +511,21 @@ export class Session<S extends SessionStatus> {
       } else if (had === 'waiting' && held) {
         this.toast({ tone: 'good', title: 'You command now', text: 'The lease is here.' });
       }
+    }
+  }
+
+  /** Asks for the agent's time, so that a delay which all messages have is seen. */
+  async #probeTime(): Promise<void> {
+    if (!this.live || document.hidden) return;
+    this.#probes += 1;
+    // Often until it is known, and then now and then.
+    if (this.#probes > 4 && this.#probes % 5 !== 0) return;
+    const [sent, agent] = [performance.now(), this.status?.agent];
+    try {
+      const { at_ms } = await this.api.json<{ at_ms?: number }>('GET', '/api/status', { ahead: true, yields: true, within: 4000 });
+      if (at_ms !== undefined && this.status?.agent === agent) this.#lateness.probe(sent, at_ms);
+    } catch (error) {
+      if (!(error instanceof ApiError)) throw error;
     }
   }
 

@@ -80,8 +80,8 @@ test('so many requests are open at once, a Stop beside them, and commands that w
   void api.json('POST', '/stop', { ahead: true });
   await Promise.resolve();
   assert.deepEqual(open.map(({ path }) => path), [...Array.from({ length: OPEN_MAX }, (_, i) => `/read/${i}`), '/stop']);
-  api.recall();
-  await assert.rejects(command, (error: unknown) => error instanceof ApiError && error.problem.code === 'stopped');
+  api.recall('A Stop came before it was sent');
+  await assert.rejects(command, (error: unknown) => error instanceof ApiError && error.problem.code === 'not-sent');
   for (let i = 0; i <= OPEN_MAX + 1; i += 1) {
     open[i]?.answer();
     await new Promise((done) => setImmediate(done));
@@ -110,6 +110,32 @@ test('messages that all come late are as late as they are, beside the soonest', 
   assert.ok(most < 100, `${most} ms`);
   lateness.forget();
   assert.equal(lateness.agentTime(0), undefined);
+});
+
+test('a delay that all messages have is seen by what is asked, and clocks that stood still are no delay', () => {
+  // The agent's clock is this one; whatever is sent takes 3 s.
+  const late = new Lateness();
+  for (let now = 10_000; now < 40_000; now += 500) {
+    const found = late.take(now - 3000, now);
+    if (now % 5000 === 0) late.probe(now - 6000, now - 3000);
+    if (now >= 21_000) assert.equal(found, 6000, `${now}`);
+  }
+  // 10 ms each way, and one question that waited for a second.
+  const good = new Lateness();
+  for (let now = 10_000; now < 60_000; now += 500) {
+    const found = good.take(now - 10, now);
+    if (now % 5000 === 0) good.probe(now - (now === 30_000 ? 1020 : 20), now - 10);
+    assert.ok(found <= 20, `${now}: ${found}`);
+  }
+  // The agent's computer sleeps for a minute, later this one does.
+  for (const slept of [60_000, -60_000]) {
+    for (let now = 60_000; now < 90_000; now += 500) {
+      good.take(now - 10 - slept, now);
+      if (now % 5000 === 0) good.probe(now - 20, now - 10 - slept);
+    }
+    assert.ok(good.take(90_000 - 10 - slept, 90_000) <= 20);
+    assert.ok(Math.abs((good.agentTime(90_000) ?? 0) - (90_000 - slept)) <= 20);
+  }
 });
 
 test('a browser that keeps nothing is a page that forgets', () => {

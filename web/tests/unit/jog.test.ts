@@ -16,6 +16,7 @@ function setUp(send: (rates: number[]) => Promise<unknown> = () => Promise.resol
     refused: (_, after) => {
       if (!after) refusals += 1;
     },
+    slept: () => {},
     every: (act) => ((tick = act), 1),
     never: () => (tick = undefined),
     now: () => time,

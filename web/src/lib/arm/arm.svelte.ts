@@ -108,6 +108,7 @@ export class ArmPage {
     this.session.onStatus((status) => this.#take(status));
     this.session.onEvent((entry, isNew) => this.#receive(entry as ArmEntry, isNew));
     this.session.onLoss(() => this.#lose());
+    this.session.saysOfStop = () => ({ text: this.stopWords, failed: this.session.stopState.phase === 'failed' });
     this.session.onMissed(() => void this.readJobs());
     this.session.isAtRest = () => this.session.fresh && !this.isRunning && this.latest?.state !== 'Teaching' && !isMoving(this.latest) && !isPaused(this.latest);
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';

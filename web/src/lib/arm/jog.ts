@@ -12,6 +12,8 @@ export interface JogLine {
   send(rates: number[]): Promise<unknown>;
   /** It was refused, and is not asked for on; `after`: the key had been let go by then. */
   refused(error: unknown, after: boolean): void;
+  /** The page was suspended while a key was held, and it counts as let go. */
+  slept(): void;
   every(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
   now(): number;
@@ -23,6 +25,8 @@ export class Jogger {
   #open = 0;
   #sentAt = 0;
   #ticked = 0;
+  #ending = false;
+  #again = false;
   #turn = 0;
   readonly #line: JogLine;
 
@@ -54,9 +58,22 @@ export class Jogger {
   }
 
   #zeros(): void {
-    void this.#line.send(new Array<number>(6).fill(0)).catch(() => {
-      // Rates hold for 200 ms only: without an answer the arm stops by itself.
-    });
+    // One at a time, and one more behind what may have overtaken it.
+    if (this.#ending) {
+      this.#again = true;
+      return;
+    }
+    this.#ending = true;
+    this.#again = false;
+    this.#line
+      .send(new Array<number>(6).fill(0))
+      .catch(() => {
+        // Rates hold for 200 ms only: without an answer the arm stops by itself.
+      })
+      .finally(() => {
+        this.#ending = false;
+        if (this.#again && !this.#rates) this.#zeros();
+      });
   }
 
   #end(): void {
@@ -70,8 +87,10 @@ export class Jogger {
     const now = this.#line.now();
     const asleep = now - this.#ticked > ASLEEP_MS;
     this.#ticked = now;
-    if (asleep) this.release();
-    else this.#send();
+    if (asleep) {
+      this.release();
+      this.#line.slept();
+    } else this.#send();
   }
 
   #send(): void {

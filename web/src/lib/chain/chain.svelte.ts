@@ -50,6 +50,9 @@ export type Tab = 'boards' | 'board' | 'update' | 'doctor' | 'jobs' | 'log';
 /** What is asked before it is done. */
 export type Question = { what: 'init' } | { what: 'run' } | { what: 'reset'; board: number };
 
+/** States of boards that nothing is lost of without somebody who commands. */
+const AT_REST = new Set(['exloader', 'programming']);
+
 const KEY = Symbol('chain');
 const BEAT_MS = 150;
 
@@ -84,6 +87,8 @@ export class ChainPage {
   readonly #traces = new Map<number, { names: string; history: History; last: number }>();
   #read = 0;
   #agent = '';
+  /** Its boards were sent by this agent. */
+  #boardsKnown = false;
   #stop: { at: number; ran: boolean } | undefined;
   #stopTimer: ReturnType<typeof setTimeout> | undefined;
 
@@ -103,8 +108,10 @@ export class ChainPage {
     this.session.onEvent((entry, isNew) => this.#happened((entry as ChainEntry).event, isNew));
     this.session.onMessage((message) => this.#receive(message));
     this.session.onLoss(() => this.#lose());
+    this.session.saysOfStop = () => ({ text: this.stopWords, failed: this.stopFailed });
     this.session.onMissed(() => void this.readJobs());
-    this.session.isAtRest = () => this.known && !this.runs && !this.isRunning;
+    // One that is lost may run.
+    this.session.isAtRest = () => this.known && this.#boardsKnown && !this.isRunning && this.boards.every((board) => AT_REST.has(board.state));
     // Boards that this page commands are stopped when its lease lapses: it lasts for as long as they run and the page is looked at.
     this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
   }
@@ -139,7 +146,7 @@ export class ChainPage {
   async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
     // Boards answer one after the other, and a job that goes on first ends what it has begun.
     // Behind a Stop that this page had not shown nothing is done, however late it comes.
-    return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, within: 30_000 });
+    return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, ends, within: 30_000 });
   }
 
   scan(): void {
@@ -159,7 +166,11 @@ export class ChainPage {
     this.#stop = { at, ran: this.runs || this.isRunning || !this.known };
     this.#say('', false);
     await sent;
-    if (this.session.stopState.phase !== 'sent' || this.#stop?.at !== at) return;
+    if (this.#stop?.at !== at) return;
+    if (this.session.stopState.phase !== 'sent') {
+      this.#stop = undefined;
+      return;
+    }
     const updates = this.isRunning && this.course?.what === 'update';
     this.#say(updates ? 'Stop was sent to all boards; they are asked when the update is over. Cancel ends the update.' : 'Stop was sent to all boards; each is being asked.', false);
   }
@@ -186,6 +197,9 @@ export class ChainPage {
       if (other) {
         this.course = undefined;
         this.found = undefined;
+        this.#stop = undefined;
+        this.#boardsKnown = false;
+        this.#say('', false);
         this.#newest.clear();
         this.values = new Map();
       }
@@ -201,6 +215,7 @@ export class ChainPage {
   }
 
   #takeBoards(boards: BoardObject[]): void {
+    this.#boardsKnown = true;
     const at = performance.now();
     const before = new Map(this.views.map((view) => [view.board.number, view]));
     this.views = boards.map((board) => {

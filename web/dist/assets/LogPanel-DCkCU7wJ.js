@@ -1,1 +1,0 @@
-import{K as e,N as t,Y as n,j as r,ot as i}from"./session.svelte-Ck2svvuT.js";import a from"./EventsCard-DLnbNYea.js";import{t as o}from"./ReportLinks-B7W96a0P.js";var s=t(`<div class="stack"><!> <!></div>`);function c(t){var c=s(),l=e(c);o(l,{});var u=n(l,2);a(u,{}),i(c),r(t,c)}export{c as default};

@@ -9,8 +9,9 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::class::HostFrame;
 
-/// Most bytes of a frame on their way at once.
-const AHEAD: usize = 256;
+/// Most bytes of a frame on their way at once: 256 (J-05), less what the end of a byte and of a hand-over may be taken for, early by a byte
+/// each time that the system holds one up.
+const AHEAD: usize = 250;
 /// Silence behind an abandoned frame: the 5 ms of J-03, and as much as adapters may take off it.
 const GAP: Duration = Duration::from_millis(8);
 /// Rests of frames up to this are sent before a Stop: it takes no longer than the gap would.
@@ -98,8 +99,12 @@ impl Outbox {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
-        if self.urgent.is_some() {
-            return Some(now.max(self.free_at.saturating_sub(line_time(AHEAD - PIECE, self.baud))));
+        if let Some(urgent) = &self.urgent {
+            // One that is abandoned for it is so when there would be room for a piece of it.
+            let needed =
+                urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
+            let ahead = AHEAD.saturating_sub(needed);
+            return Some(now.max(self.free_at.saturating_sub(line_time(ahead, self.baud))));
         }
         let left = self.writing.as_ref().map(|w| w.outgoing.frame.bytes.len() - w.at)?;
         let ahead = AHEAD - left.min(PIECE);
@@ -116,22 +121,24 @@ impl Outbox {
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
-            if let Some(writing) = self.writing.take_if(|writing| writing.at > 0) {
-                let rest = &writing.outgoing.frame.bytes[writing.at..];
-                if rest.len() > SHORT {
-                    self.silent_until = self.free_at.max(now) + GAP;
-                    passed.push(Passed::Abandoned(writing.outgoing));
-                    return (bytes, passed);
-                }
-                bytes.extend(rest);
-                passed.push(Passed::Written(writing.outgoing));
+            let rest = self.rest();
+            if rest.is_some_and(|rest| rest > SHORT) {
+                self.silent_until = self.free_at.max(now) + GAP;
+                passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
+                return (bytes, passed);
             }
-            // A piece of a frame may be ahead of it, no more.
-            if queued <= AHEAD
-                && let Some(urgent) = self.urgent.take()
-            {
-                bytes.extend(&urgent.frame.bytes);
-                passed.push(Passed::Written(urgent));
+            // A piece of a frame may be ahead of it, no more. What is written before there is room comes no sooner.
+            let needed =
+                self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
+            if queued == 0 || needed <= room {
+                if let Some(writing) = self.writing.take_if(|writing| writing.at > 0) {
+                    bytes.extend(&writing.outgoing.frame.bytes[writing.at..]);
+                    passed.push(Passed::Written(writing.outgoing));
+                }
+                if let Some(urgent) = self.urgent.take() {
+                    bytes.extend(&urgent.frame.bytes);
+                    passed.push(Passed::Written(urgent));
+                }
             }
         } else if let Some(writing) = &mut self.writing {
             let left = writing.outgoing.frame.bytes.len() - writing.at;
@@ -168,6 +175,12 @@ impl Outbox {
             self.silent_until = self.free_at.max(now) + GAP;
         }
         Some((writing.outgoing, writing.at > 0))
+    }
+
+    /// Bytes that are left of a frame that has been begun.
+    fn rest(&self) -> Option<usize> {
+        let writing = self.writing.as_ref().filter(|writing| writing.at > 0)?;
+        Some(writing.outgoing.frame.bytes.len() - writing.at)
     }
 
     /// The frame that has been begun, and how much of it was written.

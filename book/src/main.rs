@@ -1,0 +1,48 @@
+//! Makes the HTML book of docs/: `openjtc-book ROOT OUT`.
+//!
+//! mdbook does the work; what it does not know is that docs/ is a part of a repository. Links that lead out of docs/ are resolved here
+//! ([`outside`]): pictures are copied, and files that can be read become pages of the book's last part.
+#![forbid(unsafe_code)]
+
+mod links;
+mod outside;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use mdbook_driver::MDBook;
+use mdbook_driver::config::Config;
+
+fn main() -> Result<()> {
+    let words: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [root, out] = words.as_slice() else {
+        bail!(
+            "usage: openjtc-book ROOT OUT: the root of the repository, and the folder that the book is written to"
+        );
+    };
+    let root = root.canonicalize().with_context(|| root.display().to_string())?;
+    std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+    let out = out.canonicalize()?;
+    ensure!(!root.starts_with(&out), "{} holds the repository, and would be emptied", out.display());
+    make(&root, &out)
+}
+
+fn make(root: &Path, out: &Path) -> Result<()> {
+    let mut config = Config::from_disk(root.join("book/book.toml")).context("book/book.toml")?;
+    config.build.build_dir = out.to_owned();
+    let mut book = MDBook::load_with_config(root.join("book"), config).context("docs/SUMMARY.md")?;
+    let pictures = outside::resolve(root, &mut book.book)?;
+    book.build()?;
+    for picture in &pictures {
+        let to = out.join(outside::FOLDER).join(picture);
+        std::fs::create_dir_all(to.parent().context("a picture in no folder")?)?;
+        std::fs::copy(root.join(picture), &to).with_context(|| picture.display().to_string())?;
+    }
+    let pages = book.book.chapters().count();
+    println!(
+        "{pages} pages, {} pictures of other folders: {}",
+        pictures.len(),
+        out.join("index.html").display()
+    );
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! Links that lead out of docs/: to files of the repository.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::path::{Component, Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use mdbook_driver::book::{Book, BookItem, Chapter};
+
+use crate::links::rewritten;
+
+/// Folder of the book that files from outside docs/ are in.
+pub const FOLDER: &str = "repository";
+
+/// Extensions of pictures, which are copied as they are.
+const PICTURES: [&str; 4] = ["png", "svg", "jpg", "gif"];
+
+/// Gives every link that leads out of docs/ a target in the book, with a page for each file that is no picture. Returns the pictures, as
+/// paths from the root of the repository.
+pub fn resolve(root: &Path, book: &mut Book) -> Result<BTreeSet<PathBuf>> {
+    let mut files = BTreeSet::new();
+    let mut failed = None;
+    book.for_each_chapter_mut(|chapter| {
+        let Some(page) = chapter.source_path.clone() else { return };
+        let from = Path::new("docs").join(page);
+        chapter.content = rewritten(&chapter.content, |target| {
+            let (path, anchor) = split(target)?;
+            let file = joined(from.parent()?, path)?;
+            if file.starts_with("docs") {
+                return None;
+            }
+            if !root.join(&file).is_file() {
+                failed.get_or_insert(format!(
+                    "{}: {target} is no file: a page links to files only",
+                    from.display()
+                ));
+                return None;
+            }
+            let up = "../".repeat(from.components().count().saturating_sub(2));
+            let to = format!("{up}{FOLDER}/{}{anchor}", shown(&file).display());
+            files.insert(file);
+            Some(to)
+        });
+    });
+    if let Some(failed) = failed {
+        bail!(failed);
+    }
+    let (pictures, texts): (BTreeSet<_>, BTreeSet<_>) = files.into_iter().partition(|file| is_picture(file));
+    if !texts.is_empty() {
+        book.push_item(BookItem::PartTitle("Files of the repository".into()));
+    }
+    for file in &texts {
+        book.push_item(BookItem::Chapter(chapter(root, file, &texts)?));
+    }
+    Ok(pictures)
+}
+
+/// The page of a file.
+fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapter> {
+    let name = file.display().to_string();
+    let text = std::fs::read_to_string(root.join(file)).with_context(|| name.clone())?;
+    let content = if file.extension() == Some(OsStr::new("md")) {
+        let up = "../".repeat(file.components().count());
+        rewritten(&text, |target| {
+            let (path, anchor) = split(target)?;
+            let file = joined(file.parent()?, path)?;
+            match file.strip_prefix("docs") {
+                Ok(page) => Some(format!("{up}{}{anchor}", page.display())),
+                Err(_) if pages.contains(&file) => {
+                    Some(format!("{up}{FOLDER}/{}{anchor}", shown(&file).display()))
+                }
+                // What it names is in the repository, and not in the book.
+                Err(_) => Some(String::new()),
+            }
+        })
+    } else {
+        let kind = file.extension().and_then(OsStr::to_str).unwrap_or("text");
+        format!("# {name}\n\n````{kind}\n{text}\n````\n")
+    };
+    Ok(Chapter::new(&name, content, Path::new(FOLDER).join(shown(file)), Vec::new()))
+}
+
+/// How a file is named in the book: pictures as they are, a page for everything else.
+fn shown(file: &Path) -> PathBuf {
+    if is_picture(file) || file.extension() == Some(OsStr::new("md")) {
+        return file.to_owned();
+    }
+    let mut name = file.as_os_str().to_owned();
+    name.push(".md");
+    PathBuf::from(name)
+}
+
+fn is_picture(file: &Path) -> bool {
+    file.extension().and_then(OsStr::to_str).is_some_and(|ending| PICTURES.contains(&ending))
+}
+
+/// Path and anchor (with its `#`) of a target that is a file; `None` for addresses and places on the same page.
+fn split(target: &str) -> Option<(&str, &str)> {
+    let at = target.find('#').unwrap_or(target.len());
+    let (path, anchor) = target.split_at(at);
+    (!path.is_empty() && !path.contains("://") && !path.starts_with("mailto:")).then_some((path, anchor))
+}
+
+/// `path` seen from `folder`, from the root of the repository; `None` where it leads out of that.
+fn joined(folder: &Path, path: &str) -> Option<PathBuf> {
+    let mut whole = PathBuf::new();
+    for part in folder.join(path).components() {
+        match part {
+            Component::Normal(name) => whole.push(name),
+            Component::ParentDir => {
+                if !whole.pop() {
+                    return None;
+                }
+            }
+            Component::CurDir => {}
+            Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    Some(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_followed_from_the_folder_of_their_page() {
+        assert_eq!(joined(Path::new("docs"), "../arms/avena.toml"), Some("arms/avena.toml".into()));
+        assert_eq!(joined(Path::new("docs"), "arm.md"), Some("docs/arm.md".into()));
+        assert_eq!(joined(Path::new("docs"), "../../elsewhere"), None);
+    }
+
+    #[test]
+    fn addresses_are_no_files() {
+        assert_eq!(split("https://example.org/a"), None);
+        assert_eq!(split("#place"), None);
+        assert_eq!(split("arm.md#place"), Some(("arm.md", "#place")));
+    }
+
+    #[test]
+    fn files_get_pages_and_pictures_stay() {
+        assert_eq!(shown(Path::new("arms/avena.toml")), Path::new("arms/avena.toml.md"));
+        assert_eq!(shown(Path::new("references/README.md")), Path::new("references/README.md"));
+        assert_eq!(shown(Path::new("web/a.png")), Path::new("web/a.png"));
+    }
+}

@@ -1,11 +1,13 @@
 //! What the tests and benchmarks of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain,
-//! documents that show what commands print, the data of an existing arm, a clock, and requests to agents.
+//! documents that show what commands print, pages whose commands are run, the data of an existing arm, a clock, and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
 pub mod existing;
 pub mod http;
 pub mod page;
+#[cfg(unix)]
+pub mod transcript;
 pub mod written;
 
 use std::fs::read_dir;

@@ -48,6 +48,11 @@ impl Page {
         let _ = write!(self.text, "## {title}\n\n");
     }
 
+    /// A text as it is.
+    pub fn text(&mut self, text: &str) {
+        self.text += text;
+    }
+
     /// A case: what somebody did wrong, the command, and what it printed.
     pub fn case(&mut self, title: &str, command: &str, printed: &Printed) {
         self.text += &block(title, command, printed);
@@ -91,6 +96,33 @@ impl Page {
             self.file.display(),
             self.name,
             self.text
+        );
+    }
+}
+
+/// Compares `docs/FILE` with this text, or writes it with `UPDATE_DOCS=1`.
+///
+/// # Panics
+/// When the document is another one, with the first line that differs and how to write it again.
+pub fn whole(file: &str, text: &str) {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).join(file);
+    if updating() {
+        std::fs::write(&path, text).expect("the document can be written");
+        return;
+    }
+    let old = std::fs::read_to_string(&path).unwrap_or_default();
+    if old != text {
+        let (mut old, mut new, mut line) = (old.lines(), text.lines(), 1);
+        let (was, is) = loop {
+            match (old.next(), new.next()) {
+                (was, is) if was == is && was.is_some() => line += 1,
+                differ => break differ,
+            }
+        };
+        panic!(
+            "docs/{file} is old, first at line {line}:\n  document: {}\n  code:     {}\nwrite it again: run this test with UPDATE_DOCS=1",
+            was.unwrap_or_default(),
+            is.unwrap_or_default()
         );
     }
 }

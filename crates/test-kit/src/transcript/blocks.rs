@@ -1,0 +1,180 @@
+//! The fenced blocks of a page, and the comments that say how each is run.
+
+use std::ops::Range;
+
+/// What a block holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Commands behind `$ `, each with what it prints.
+    Console,
+    /// Commands alone.
+    Sh,
+    /// A text that is typed where a program runs.
+    Text,
+}
+
+/// A block that a run of the page has to do something about.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// What it holds.
+    pub kind: Kind,
+    /// Line of its fence, from 1.
+    pub line: usize,
+    /// Its lines without the fences, as bytes of the page.
+    pub body: Range<usize>,
+    /// The text between the fences.
+    pub text: String,
+    /// What the comment directly above it says, part by part.
+    notes: Vec<String>,
+    /// The program that the page is about, where it names one.
+    page: Option<String>,
+}
+
+impl Block {
+    /// What stands behind `key:` in its comment.
+    pub fn note(&self, key: &str) -> Option<&str> {
+        self.notes.iter().find_map(|note| note.strip_prefix(key)?.strip_prefix(':')).map(str::trim)
+    }
+
+    /// Whether its comment has these words.
+    pub fn says(&self, words: &str) -> bool {
+        self.notes.iter().any(|note| note == words)
+    }
+
+    /// The program whose tests run it.
+    pub fn program(&self) -> Option<&str> {
+        self.note("program").or(self.page.as_deref())
+    }
+}
+
+/// A comment of one line.
+fn comment(line: &str) -> Option<&str> {
+    line.trim().strip_prefix("<!--")?.strip_suffix("-->").map(str::trim)
+}
+
+/// The blocks of a page in their order. Those that tests write themselves, between `<!-- … begin -->` and `<!-- … end -->`, are left out, and
+/// so are texts that nobody types.
+pub fn blocks(page: &str) -> Vec<Block> {
+    let named = page.lines().filter_map(comment).find_map(|text| text.strip_prefix("commands:"));
+    let named = named.map(|name| name.trim().to_owned());
+    let (mut found, mut generated, mut at) = (Vec::new(), false, 0);
+    let mut above = "";
+    let mut open: Option<(&str, usize, usize, Vec<String>)> = None;
+    for (line, text) in (1..).zip(page.split_inclusive('\n')) {
+        let trimmed = text.trim();
+        match &open {
+            None => {
+                if let Some(words) = comment(trimmed) {
+                    generated = words.ends_with(" begin") || (generated && !words.ends_with(" end"));
+                }
+                if let Some(kind) = trimmed.strip_prefix("```") {
+                    let notes = comment(above).unwrap_or_default().split(';');
+                    let notes = notes.map(|note| note.trim().to_owned()).filter(|note| !note.is_empty());
+                    open = Some((kind, line, at + text.len(), notes.collect()));
+                }
+            }
+            Some(_) if trimmed == "```" => {
+                let (kind, line, begin, notes) = open.take().expect("it is open");
+                let kind = match kind {
+                    "console" => Some(Kind::Console),
+                    "sh" => Some(Kind::Sh),
+                    "text" if notes.iter().any(|note| note.starts_with("typed:")) => Some(Kind::Text),
+                    _ => None,
+                };
+                if let Some(kind) = kind.filter(|_| !generated) {
+                    let text = page[begin..at].to_owned();
+                    found.push(Block { kind, line, body: begin..at, text, notes, page: named.clone() });
+                }
+            }
+            Some(_) => {}
+        }
+        if !trimmed.is_empty() {
+            above = trimmed;
+        }
+        at += text.len();
+    }
+    found
+}
+
+/// A command of a block and what the page says that it prints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// What is typed; empty where a block goes on with what a program prints that runs already.
+    pub command: String,
+    /// The lines below it.
+    pub shown: Vec<String>,
+}
+
+impl Block {
+    /// Its commands. A line behind `> ` goes on with the command above it.
+    pub fn steps(&self) -> Vec<Step> {
+        let mut steps: Vec<Step> = Vec::new();
+        for line in self.text.lines() {
+            let command = match self.kind {
+                Kind::Console => line.strip_prefix("$ "),
+                Kind::Sh => Some(line).filter(|line| !line.trim().is_empty()),
+                Kind::Text => Some(line),
+            };
+            match (command, steps.last_mut()) {
+                (Some(command), _) => steps.push(Step { command: command.to_owned(), shown: Vec::new() }),
+                (None, _) if self.kind == Kind::Sh => {}
+                (None, Some(step)) if step.shown.is_empty() && (line == ">" || line.starts_with("> ")) => {
+                    step.command += "\n";
+                    step.command += line[1..].strip_prefix(" ").unwrap_or_default();
+                }
+                (None, Some(step)) => step.shown.push(line.to_owned()),
+                (None, None) => steps.push(Step { command: String::new(), shown: vec![line.to_owned()] }),
+            }
+        }
+        steps
+    }
+}
+
+/// The text of a console block with these steps.
+pub fn written(steps: &[Step]) -> String {
+    let mut text = String::new();
+    for step in steps {
+        for (n, line) in step.command.lines().enumerate() {
+            text += if n == 0 { "$ " } else { "> " };
+            text += line;
+            text.truncate(text.trim_end_matches(' ').len());
+            text.push('\n');
+        }
+        for line in &step.shown {
+            text += line;
+            text.push('\n');
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: &str = "<!-- commands: jtc -->\n# A\n\n<!-- not run: needs a port -->\n```sh\njtc status\n```\n\n\
+                        <!-- terminal: sim; in tests: --speed max -->\n```console\n$ cat > a <<END\n> b\n> END\n$ jtc x\nc\n$ d\n```\n\n\
+                        <!-- a begin -->\n```console\n$ e\n```\n<!-- a end -->\n```toml\nf\n```\n";
+
+    #[test]
+    fn blocks_have_the_notes_above_them() {
+        let found = blocks(PAGE);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert_eq!(found[0].note("not run"), Some("needs a port"));
+        assert_eq!((found[0].line, found[0].program()), (5, Some("jtc")));
+        assert_eq!(
+            (found[1].note("terminal"), found[1].note("in tests")),
+            (Some("sim"), Some("--speed max"))
+        );
+        assert_eq!(&PAGE[found[1].body.clone()], found[1].text);
+    }
+
+    #[test]
+    fn steps_are_commands_with_what_they_print() {
+        let steps = blocks(PAGE)[1].steps();
+        let commands: Vec<&str> = steps.iter().map(|step| step.command.as_str()).collect();
+        assert_eq!(commands, ["cat > a <<END\nb\nEND", "jtc x", "d"]);
+        assert_eq!(steps[1].shown, ["c"]);
+        assert_eq!(written(&steps), blocks(PAGE)[1].text);
+    }
+}

@@ -1,0 +1,319 @@
+//! Pages whose commands are run: what a person types who follows a page, and what it shows that is printed.
+//!
+//! A page is followed from top to bottom in a folder of its own. Fenced blocks of the kind `console` (commands behind `$ `, output below)
+//! and `sh` (commands alone) are run by the tests of the program that the page names with a comment, `<!-- commands: jtc -->`. Each command has to
+//! succeed, unless the next one is `echo $?`, and to print what the page shows, where a line `...` stands for any number of lines. A comment
+//! directly above a block says more, parted by semicolons:
+//!
+//! - `not run: REASON`: left out, and counted with its reason.
+//! - `numbers vary`: numbers are not compared, but for those of joints and boards.
+//! - `terminal: NAME`: typed in a terminal of its own; the last command goes on. Where the block shows no command, the terminal is waited for
+//!   until it has printed these lines. `Ctrl-C` beside it interrupts that program first.
+//! - `in tests: WORDS`: options behind the last command, so that a test takes no longer than it has to.
+//! - `typed: NAME`: the lines of a `text` block are typed where the program of that terminal runs.
+//! - `program: NAME`: another program than the page's runs it.
+//!
+//! `/tmp/jtc` and other places in `/tmp` lie in the page's folder, and a port that a program is given by `in tests` (`127.0.0.1:0`) takes the
+//! place of the one that the page shows. `UPDATE_DOCS=1` writes what the commands print into the page, where it has changed.
+
+mod blocks;
+mod compare;
+mod terminal;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+pub use blocks::{Block, Kind, Step, blocks};
+use compare::same;
+use terminal::Terminal;
+
+/// What was done of a page.
+#[derive(Debug, Default)]
+pub struct Followed {
+    /// Commands that were run.
+    pub commands: usize,
+    /// Reasons of blocks that were not.
+    pub left_out: Vec<String>,
+    /// What the page does not say as it is.
+    pub wrong: Vec<String>,
+}
+
+/// Follows every page that has blocks of this program, beside each other: README.md and those of docs/. `programs` is the folder of the
+/// program.
+///
+/// # Panics
+/// When a page shows something else than its commands print, with the first lines that differ of each block; when there is no such page.
+pub fn follow_all(program: &str, programs: &Path) {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let docs = std::fs::read_dir(root.join("docs")).expect("docs/");
+    let mut pages: Vec<PathBuf> = docs.map(|entry| entry.expect("an entry").path()).collect();
+    pages.push(root.join("README.md"));
+    pages.retain(|page| page.extension().is_some_and(|ending| ending == "md"));
+    pages.sort();
+    let about = |page: &PathBuf| {
+        let text = std::fs::read_to_string(page).expect("a page");
+        blocks(&text).iter().any(|block| block.program() == Some(program))
+    };
+    pages.retain(about);
+    assert!(!pages.is_empty(), "no page is about {program}");
+    let followed: Vec<(PathBuf, Followed)> = std::thread::scope(|scope| {
+        let start = |page: PathBuf| scope.spawn(move || (page.clone(), follow(&page, program, programs)));
+        let threads: Vec<_> = pages.into_iter().map(start).collect();
+        threads.into_iter().map(|thread| thread.join().expect("it is followed to its end")).collect()
+    });
+    let mut wrong = Vec::new();
+    for (page, done) in followed {
+        let name = page.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        println!("{name}: {} commands run, {} blocks not", done.commands, done.left_out.len());
+        done.left_out.iter().for_each(|reason| println!("  not run: {reason}"));
+        wrong.extend(done.wrong.into_iter().map(|text| format!("{name}, {text}")));
+    }
+    assert!(
+        wrong.is_empty(),
+        "pages do not say what their commands print; look at the difference, then write it again with UPDATE_DOCS=1\n\n{}",
+        wrong.join("\n\n")
+    );
+}
+
+/// Follows one page, and writes it again where that is asked for.
+pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
+    let text = std::fs::read_to_string(page).expect("a page");
+    let mut run = Run::new(programs, page);
+    let mut new = text.clone();
+    // From behind, so that places stay where they are.
+    let mut changed = Vec::new();
+    for block in blocks(&text).iter().filter(|block| block.program() == Some(program)) {
+        if let Some(reason) = block.note("not run") {
+            run.done.left_out.push(format!("line {}: {reason}", block.line));
+        } else if let Some(steps) = run.block(block) {
+            changed.push((block.body.clone(), blocks::written(&steps)));
+        }
+    }
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        for (place, text) in changed.into_iter().rev() {
+            new.replace_range(place, &text);
+        }
+        if new != text {
+            std::fs::write(page, new).expect("the page can be written");
+        }
+        // A command that fails is wrong on any page.
+        run.done.wrong.retain(|text| text.contains("exit code"));
+    }
+    std::mem::take(&mut run.done)
+}
+
+/// A page that is being followed.
+struct Run {
+    folder: PathBuf,
+    programs: PathBuf,
+    terminals: BTreeMap<String, Terminal>,
+    /// Those in which a program has taken the place of the shell.
+    taken: BTreeSet<String>,
+    /// What the page has in place of what there is.
+    places: Vec<(String, String)>,
+    done: Followed,
+}
+
+/// The terminal that a page types in where it names none.
+const OWN: &str = "";
+
+impl Run {
+    fn new(programs: &Path, page: &Path) -> Self {
+        let name = page.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let folder = std::env::temp_dir().join(format!("page-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let folder = folder.canonicalize().expect("a folder");
+        let places = vec![("/tmp/".to_owned(), format!("{}/", folder.display()))];
+        let (terminals, taken, done) = (BTreeMap::new(), BTreeSet::new(), Followed::default());
+        Self { folder, programs: programs.to_owned(), terminals, taken, places, done }
+    }
+
+    fn terminal(&mut self, name: &str) -> &mut Terminal {
+        let new = || Terminal::new(&self.folder, &self.programs, &["JTC_", "UCOM_"]);
+        self.terminals.entry(name.to_owned()).or_insert_with(new)
+    }
+
+    /// What is typed for what the page shows.
+    fn real(&self, shown: &str) -> String {
+        self.places.iter().fold(shown.to_owned(), |text, (page, real)| text.replace(page, real))
+    }
+
+    /// What the page shows of what was printed.
+    fn on_page(&self, line: &str) -> String {
+        let line =
+            self.places.iter().rev().fold(line.to_owned(), |text, (page, real)| text.replace(real, page));
+        line.trim_end().to_owned()
+    }
+
+    /// Runs a block; its steps with what they print, where the page shows something else.
+    fn block(&mut self, block: &Block) -> Option<Vec<Step>> {
+        if let Some(name) = block.note("typed") {
+            for step in block.steps() {
+                let line = self.real(&step.command);
+                self.terminal(name).type_line(&line);
+            }
+            return None;
+        }
+        let mut steps = block.steps();
+        if steps.is_empty() {
+            // A page that is being written.
+            steps.push(Step { command: String::new(), shown: Vec::new() });
+        }
+        let name = block.note("terminal").unwrap_or(OWN).to_owned();
+        let mut changed = false;
+        for n in 0..steps.len() {
+            let next = steps.get(n + 1).map(|step| step.command.clone());
+            let step = &mut steps[n];
+            let goes_on = name != OWN && next.is_none();
+            let printed = if step.command.is_empty() || (goes_on && !step.command.starts_with("export ")) {
+                self.go_on(block, &name, step)
+            } else {
+                let (printed, code) = {
+                    let command = self.real(&step.command);
+                    self.terminal(&name).run(&command)
+                };
+                self.done.commands += 1;
+                let looked_at = next.is_some_and(|next| next.starts_with("echo $?"));
+                if code != 0 && !looked_at {
+                    let text = format!(
+                        "line {}: `{}`: exit code {code}\n{}",
+                        block.line,
+                        step.command,
+                        printed.join("\n")
+                    );
+                    self.done.wrong.push(text);
+                }
+                printed.iter().map(|line| self.on_page(line)).collect()
+            };
+            if block.kind == Kind::Console && !same(&step.shown, &printed, block.says("numbers vary")) {
+                self.done.wrong.push(difference(block, step, &printed));
+                step.shown = printed;
+                changed = true;
+            }
+        }
+        changed.then_some(steps)
+    }
+
+    /// Starts what goes on, or waits for what it prints later: its lines so far.
+    fn go_on(&mut self, block: &Block, name: &str, step: &Step) -> Vec<String> {
+        let (varying, shown) = (block.says("numbers vary"), step.shown.clone());
+        let starts = !step.command.is_empty();
+        if starts {
+            // Whatever ran there has been ended by whoever types something else.
+            if !self.taken.insert(name.to_owned()) {
+                self.terminals.remove(name);
+            }
+            let extra = block.note("in tests").map_or(String::new(), |words| format!(" {words}"));
+            let command = format!("{}{extra}", self.real(&step.command));
+            self.terminal(name).start(&command);
+            self.done.commands += 1;
+        } else if block.says("Ctrl-C") {
+            self.terminal(name).interrupt();
+        }
+        let Some(last) = shown.iter().rfind(|line| !line.is_empty()).cloned() else {
+            // A page that is being written: what comes soon.
+            let mut printed = Vec::new();
+            while std::env::var_os("UPDATE_DOCS").is_some()
+                && let Some(line) = self.terminal(name).line(Duration::from_secs(6))
+            {
+                printed.push(self.on_page(&line));
+            }
+            return printed;
+        };
+        let places = std::cell::RefCell::new(self.places.clone());
+        let is_last = |line: &str| {
+            // The port that it was given in place of the page's.
+            if let (Some(port), Some(real)) = (port(&shown.join("\n")), port(line))
+                && starts
+                && port != real
+            {
+                places.borrow_mut().push((port, real));
+            }
+            let places = places.borrow();
+            let line =
+                places.iter().rev().fold(line.to_owned(), |text, (page, real)| text.replace(real, page));
+            same(std::slice::from_ref(&last), &[line], varying)
+        };
+        let printed = self.terminal(name).lines_until(is_last);
+        self.places = places.into_inner();
+        let printed: Vec<String> = printed.iter().map(|line| self.on_page(line)).collect();
+        if starts {
+            return printed;
+        }
+        // What came meanwhile, and is not shown, is nobody's business.
+        let from = printed.iter().position(|line| same(&shown[..1], std::slice::from_ref(line), varying));
+        printed[from.unwrap_or(0)..].to_vec()
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        self.terminals.clear();
+        std::fs::remove_dir_all(&self.folder).ok();
+    }
+}
+
+/// The first port of this computer in a text, with its colon.
+fn port(text: &str) -> Option<String> {
+    let (_, rest) = text.split_once("127.0.0.1:")?;
+    let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+    (digits > 0).then(|| format!(":{}", &rest[..digits]))
+}
+
+fn difference(block: &Block, step: &Step, printed: &[String]) -> String {
+    format!(
+        "line {}: `{}`\n--- the page shows\n{}\n--- it prints\n{}",
+        block.line,
+        step.command,
+        step.shown.join("\n"),
+        printed.join("\n")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page in a file of its own, followed.
+    fn followed(name: &str, text: &str) -> Followed {
+        let page = std::env::temp_dir().join(format!("{name}-{}.md", std::process::id()));
+        std::fs::write(&page, text).expect("a file");
+        let done = follow(&page, "sh", Path::new("/bin"));
+        std::fs::remove_file(&page).ok();
+        done
+    }
+
+    #[test]
+    fn commands_are_run_in_order_and_in_one_folder() {
+        let page = "<!-- commands: sh -->\n```sh\nexport WORD=there\necho $WORD > /tmp/a\n```\n```console\n$ cat a\nthere\n$ false\n$ echo $?\n1\n```\n\
+                    <!-- not run: it would never end -->\n```sh\nsleep 1000000\n```\n";
+        let done = followed("in-order", page);
+        assert!(done.wrong.is_empty(), "{:?}", done.wrong);
+        assert_eq!((done.commands, done.left_out.len()), (5, 1));
+    }
+
+    #[test]
+    fn a_page_that_is_wrong_is_found() {
+        let wrong = |text: &str| followed("wrong", &format!("<!-- commands: sh -->\n{text}")).wrong;
+        assert_eq!(wrong("```console\n$ echo a\nb\n```\n").len(), 1);
+        assert_eq!(wrong("```console\n$ false\n```\n").len(), 1);
+        assert_eq!(wrong("```console\n$ echo joint 1\njoint 2\n```\n").len(), 1);
+        assert_eq!(wrong("```sh\nno-such-command\n```\n").len(), 1);
+        assert_eq!(wrong("<!-- numbers vary -->\n```console\n$ echo 1.5 s\n7 s\n```\n").len(), 0);
+    }
+
+    #[test]
+    fn what_goes_on_is_typed_to_and_ended() {
+        let page = "<!-- commands: sh -->\n<!-- terminal: other -->\n```console\n$ sed -u s/a/b/\n```\n<!-- typed: other -->\n```text\ncat\n```\n\
+                    <!-- terminal: other -->\n```console\ncbt\n```\n";
+        let done = followed("goes-on", page);
+        assert!(done.wrong.is_empty(), "{:?}", done.wrong);
+    }
+
+    #[test]
+    fn another_port_takes_the_place_of_the_pages() {
+        assert_eq!(port("ready: http://127.0.0.1:8780 (SIMULATED)").as_deref(), Some(":8780"));
+        assert_eq!(port("ready: 127.0.0.1:"), None);
+    }
+}

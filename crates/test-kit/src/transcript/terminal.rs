@@ -1,0 +1,123 @@
+//! A terminal of the person who follows a page: a shell, and what it prints.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Longest wait for a line: what never comes takes that long, everything else as long as it takes.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// What the shell prints behind each command, before its exit code. No command prints it.
+const END: &str = "\u{1}end of the command ";
+
+/// A shell, or the program that has taken its place.
+pub struct Terminal {
+    child: Child,
+    stdin: ChildStdin,
+    lines: Receiver<String>,
+}
+
+impl Terminal {
+    /// A shell in this folder. `programs` is looked through first for commands; variables that begin with one of `without` are not there.
+    pub fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
+        let mut shell = Command::new("bash");
+        shell.args(["--norc", "--noprofile"]).current_dir(folder);
+        for (name, _) in std::env::vars().filter(|(name, _)| without.iter().any(|w| name.starts_with(w))) {
+            shell.env_remove(name);
+        }
+        let path = std::env::var("PATH").unwrap_or_default();
+        let state = folder.join(".home");
+        std::fs::create_dir_all(&state).expect("a home");
+        // Where agents leave what only their user may read.
+        std::fs::set_permissions(&state, std::os::unix::fs::PermissionsExt::from_mode(0o700))
+            .expect("rights");
+        shell.env("PATH", format!("{}:{path}", programs.display())).env("COLUMNS", "100");
+        for name in ["HOME", "XDG_RUNTIME_DIR", "XDG_STATE_HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"] {
+            shell.env(name, &state);
+        }
+        shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = shell.spawn().expect("bash starts");
+        let mut stdin = child.stdin.take().expect("stdin");
+        let out = child.stdout.take().expect("stdout");
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(out).split(b'\n') {
+                let Ok(line) = line else { break };
+                if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
+                    break;
+                }
+            }
+        });
+        // Both streams in one, as on a screen.
+        writeln!(stdin, "exec 2>&1").expect("bash reads");
+        Self { child, stdin, lines }
+    }
+
+    /// Runs a command to its end: what it printed, and its exit code.
+    ///
+    /// # Panics
+    /// When it does not end.
+    pub fn run(&mut self, command: &str) -> (Vec<String>, i32) {
+        // The command has no stdin: it would read what is typed next. The subshell sets `$?` for the next command.
+        let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
+        self.type_line(&typed);
+        let mut printed = Vec::new();
+        loop {
+            let Some(line) = self.line(PATIENCE) else {
+                panic!("`{command}` does not end within {PATIENCE:?}; it printed\n{}", printed.join("\n"))
+            };
+            // Behind a line that does not end, too.
+            if let Some((before, code)) = line.split_once(END) {
+                printed.extend(Some(before.to_owned()).filter(|before| !before.is_empty()));
+                return (printed, code.trim().parse().expect("a code"));
+            }
+            printed.push(line);
+        }
+    }
+
+    /// Has a command take the place of the shell, and go on.
+    pub fn start(&mut self, command: &str) {
+        self.type_line(&format!("exec {command}"));
+    }
+
+    /// Types a line.
+    pub fn type_line(&mut self, line: &str) {
+        writeln!(self.stdin, "{line}").expect("it reads what is typed");
+    }
+
+    /// The next line; `None` when none comes within this time, or any more.
+    pub fn line(&mut self, within: Duration) -> Option<String> {
+        match self.lines.recv_timeout(within) {
+            Ok(line) => Some(line),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
+        }
+    }
+
+    /// The lines up to one that is `last`, with it; all that came where it does not.
+    pub fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
+        let (end, mut printed) = (Instant::now() + PATIENCE, Vec::new());
+        while let Some(left) = end.checked_duration_since(Instant::now()) {
+            let Some(line) = self.line(left) else { break };
+            let ends = last(&line);
+            printed.push(line);
+            if ends {
+                break;
+            }
+        }
+        printed
+    }
+
+    /// Ctrl-C, to the program that has taken the place of the shell.
+    pub fn interrupt(&self) {
+        Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().expect("kill");
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}

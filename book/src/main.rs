@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod links;
+mod made;
 mod outside;
 
 use std::path::{Path, PathBuf};
@@ -39,10 +40,7 @@ fn make(root: &Path, out: &Path) -> Result<()> {
         std::fs::copy(root.join(picture), &to).with_context(|| picture.display().to_string())?;
     }
     let pages = book.book.chapters().count();
-    println!(
-        "{pages} pages, {} pictures of other folders: {}",
-        pictures.len(),
-        out.join("index.html").display()
-    );
+    let links = made::check(out)?;
+    println!("{pages} pages with {links} links: {}", out.join("index.html").display());
     Ok(())
 }

@@ -82,6 +82,10 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
 
 /// How a file is named in the book: pictures as they are, a page for everything else.
 fn shown(file: &Path) -> PathBuf {
+    // mdbook makes an index of a file of that name, and does not follow links to it from other folders.
+    if file.file_name() == Some(OsStr::new("README.md")) {
+        return file.with_file_name("about.md");
+    }
     if is_picture(file) || file.extension() == Some(OsStr::new("md")) {
         return file.to_owned();
     }
@@ -140,7 +144,7 @@ mod tests {
     #[test]
     fn files_get_pages_and_pictures_stay() {
         assert_eq!(shown(Path::new("arms/avena.toml")), Path::new("arms/avena.toml.md"));
-        assert_eq!(shown(Path::new("references/README.md")), Path::new("references/README.md"));
+        assert_eq!(shown(Path::new("references/README.md")), Path::new("references/about.md"));
         assert_eq!(shown(Path::new("web/a.png")), Path::new("web/a.png"));
     }
 }

@@ -1,0 +1,8 @@
+//! The commands of README.md and of the pages of docs/ are typed as they stand there, against `jtc sim`, and print what is shown.
+#![cfg(target_os = "linux")]
+
+#[test]
+fn the_pages_say_what_the_commands_print() {
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_jtc"));
+    test_kit::transcript::follow_all("jtc", program.parent().expect("a folder"));
+}

@@ -57,7 +57,8 @@ fn cargo_for(board: &str, subcommand: &str) -> std::process::Command {
     cargo
 }
 
-fn cargo_home() -> PathBuf {
+/// Where cargo keeps the sources of dependencies.
+pub fn cargo_home() -> PathBuf {
     std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))

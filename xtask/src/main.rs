@@ -4,7 +4,9 @@
 mod ahead;
 mod bench;
 mod beside;
+mod deny;
 mod dependencies;
+mod dist;
 mod docs;
 mod emulate;
 mod firmware;
@@ -50,6 +52,12 @@ Usage: cargo xtask COMMAND
                                docs/board-figures.txt (--update: write them there)
   emulate --serial PATH        an emulated board with simulated drives behind a serial port, until interrupted
   docs                         write the generated parts of docs/ again: picture and fault matrix
+  dist [--out DIR] [--quick] [--twice] [--check]
+                               the files of a release, in target/dist-files: static programs, Debian packages, the Python
+                               wheel, images of the boards, licences, bill of materials, sums
+                               --quick: only for computers like this one, and without cargo-deny
+                               --twice: made again by a copy of the checkout in another folder, and compared
+                               --check: the packages installed, used and removed in a fresh Debian (needs root)
   size                         static memory of the controller against its limit, and of the boards' programs by region
   help                         this text
 ";
@@ -78,6 +86,7 @@ fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
         "firmware" => firmware::main(rest),
         "emulate" => emulate::main(rest),
         "docs" => docs::main(rest),
+        "dist" => dist::main(rest),
         "size" => size::main(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");

@@ -93,12 +93,18 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// Builds what the references run.
-pub fn programs() -> Result<()> {
-    // What the demo runs comes first.
+/// Builds the commands.
+pub fn commands() -> Result<()> {
     for package in ["jtc-cli", "ucom-cli"] {
         run(&mut cargo(&["build", "--release", "--package", package]))?;
     }
+    Ok(())
+}
+
+/// Builds what the references run.
+pub fn programs() -> Result<()> {
+    // What the demo runs comes first.
+    commands()?;
     for (package, example) in [
         ("jtc-dynamics", "reference"),
         ("jtc-sim", "free_fall"),

@@ -8,7 +8,9 @@ use serde_json::Value;
 use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
-use crate::{dependencies, emulate, firmware, links, python, rules, size, suite, web, worked_bytes};
+use crate::{
+    deny, dependencies, dist, emulate, firmware, links, python, rules, size, suite, web, worked_bytes,
+};
 
 /// Crates that run on the board.
 const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core", "ucom"];
@@ -30,6 +32,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("worked bytes of the protocol page", || passed(worked_bytes::check()));
     tally.step("links between documents", || passed(links::check()));
     tally.step("every dependency is documented", || passed(dependencies::check()));
+    tally.step("licences, sources and bans of dependencies", || passed(deny::check()));
     tally.step("lints", || {
         run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
         let without_formats =
@@ -51,6 +54,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         tally.step("demo", || passed(demo(scratch.path())));
         python::checks(&mut tally, scratch.path());
         emulate::steps(&mut tally, false);
+        dist::steps(&mut tally);
     }
     tally.step("the working tree is as it was", || {
         let (Some(before), Some(after)) = (before, tree()) else {

@@ -1,0 +1,169 @@
+//! `cargo xtask dist`: the files of a release, and that they are what they should be.
+mod check;
+mod chroot;
+mod dashboard;
+mod deb;
+pub mod graph;
+mod images;
+pub mod licences;
+mod packages;
+mod pages;
+mod programs;
+mod sbom;
+mod tree;
+mod twice;
+mod wheel;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail, ensure};
+
+pub use check::steps;
+
+use crate::shell::{self, Scratch};
+use packages::{Made, Release};
+use programs::PLATFORMS;
+
+/// `arguments`: `--out DIR`, `--quick`, `--twice`, `--check`.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    let mut arguments = arguments.to_vec();
+    let out = shell::option(&mut arguments, "--out")?;
+    let out = out.map_or_else(|| shell::target().join("dist-files"), |out| shell::root().join(out));
+    let quick = shell::flag(&mut arguments, "--quick");
+    let twice = shell::flag(&mut arguments, "--twice");
+    let check = shell::flag(&mut arguments, "--check");
+    shell::nothing_left(&arguments)?;
+    let left_out = make(&out, quick)?;
+    if twice {
+        twice::compare(&out, quick)?;
+    }
+    if check {
+        check::install(&out)?;
+    }
+    println!("\nrelease files in {}:", out.display());
+    for line in std::fs::read_to_string(out.join("SHA256SUMS"))?.lines() {
+        println!("  {line}");
+    }
+    for line in left_out {
+        println!("left out: {line}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Makes all files of a release into a folder that has nothing else; what had to be left out, and why.
+fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
+    let mut left_out = Vec::new();
+    empty(out)?;
+    let time = programs::time()?;
+    let version = version()?;
+    let own = programs::own()?;
+    let graph = graph::shipped()?;
+    let third_party = licences::third_party(&graph)?;
+    if quick {
+        left_out.push(
+            "cargo-deny (--quick); `cargo xtask test` holds deny.toml against what cargo resolves".into(),
+        );
+    } else {
+        crate::deny::with_cargo_deny()?;
+    }
+    left_out.push("cargo-deny's advisories: their database is on GitHub, and is asked by hand (cargo deny check advisories)".into());
+    let bill = sbom::bill(&graph, &version, time)?;
+    sbom::validate(&bill)?;
+    let release = Release {
+        version: version.clone(),
+        time,
+        third_party: third_party.clone(),
+        images: images::build()?,
+    };
+    let mut made = vec![
+        Made { name: format!("openjtc-{version}.cdx.json"), bytes: bill.into_bytes() },
+        Made { name: "THIRD-PARTY.txt".into(), bytes: third_party.into_bytes() },
+        Made { name: "firmware.json".into(), bytes: images::list(&release.images, &version)?.into_bytes() },
+    ];
+    for image in &release.images {
+        made.push(Made { name: format!("{}.elf", image.board), bytes: image.elf.clone() });
+        made.push(Made { name: images::name(image), bytes: image.bin.clone() });
+    }
+    let runnable = programs::build(own, time)?;
+    made.extend(release.packages(own, &runnable, &runnable)?);
+    if wheel::folder().is_some() {
+        wheel::build(own, time, out)?;
+    } else {
+        left_out.push("the Python wheel: crates/openjtc-py is not there".into());
+    }
+    for platform in PLATFORMS.into_iter().filter(|platform| *platform != own) {
+        let machine = platform.machine;
+        if quick {
+            left_out.push(format!("all for {machine} (--quick)"));
+            continue;
+        }
+        match programs::build(platform, time) {
+            Ok(programs) => made.extend(release.packages(platform, &programs, &runnable)?),
+            Err(error) => {
+                left_out.push(format!("the programs for {machine}, which cannot be built here: {error:#}"))
+            }
+        }
+        if wheel::folder().is_some()
+            && let Err(error) = wheel::build(platform, time, out)
+        {
+            left_out.push(format!("the Python wheel for {machine}, which cannot be built here: {error:#}"));
+        }
+    }
+    for Made { name, bytes } in made {
+        std::fs::write(out.join(&name), bytes).with_context(|| name.clone())?;
+    }
+    tree::write_sums(out)?;
+    Ok(left_out)
+}
+
+/// The version of the workspace.
+fn version() -> Result<String> {
+    let manifest = std::fs::read_to_string(shell::root().join("Cargo.toml")).context("Cargo.toml")?;
+    let manifest: toml::Table = toml::from_str(&manifest).context("Cargo.toml")?;
+    let version = manifest["workspace"]["package"]["version"].as_str();
+    Ok(version.context("the workspace has no version")?.to_owned())
+}
+
+/// A folder without files of an earlier release; one with other files is left as it is, with an error.
+fn empty(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+    let is_release = out.join("SHA256SUMS").exists();
+    let entries = std::fs::read_dir(out)?.collect::<std::io::Result<Vec<_>>>()?;
+    if let (false, Some(entry)) = (is_release, entries.first()) {
+        bail!(
+            "{} holds {:?} and is no folder of a release; name another with --out",
+            out.display(),
+            entry.file_name()
+        );
+    }
+    for entry in entries {
+        ensure!(entry.path().is_file(), "{} is a folder, which no release has", entry.path().display());
+        std::fs::remove_file(entry.path())?;
+    }
+    Ok(())
+}
+
+/// The files that a release without building any program for it would have: those of the programs that `folder` has already.
+fn assembled(folder: &Path) -> Result<Vec<Made>> {
+    let graph = graph::shipped()?;
+    let release = Release {
+        version: version()?,
+        time: programs::time()?,
+        third_party: licences::third_party(&graph)?,
+        images: images::build()?,
+    };
+    release.packages(programs::own()?, folder, folder)
+}
+
+/// Writes files into a folder of their own; their paths.
+fn write(made: &[Made], name: &str) -> Result<(Scratch, Vec<PathBuf>)> {
+    let scratch = Scratch::new(name)?;
+    let mut paths = Vec::new();
+    for Made { name, bytes } in made {
+        let path = scratch.path().join(name);
+        std::fs::write(&path, bytes)?;
+        paths.push(path);
+    }
+    Ok((scratch, paths))
+}

@@ -1,0 +1,262 @@
+//! A small Debian in a folder, in which packages are installed on trial.
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use super::tree::sha256;
+use crate::shell::{self, Scratch, apt_install, run, works};
+
+/// Folders of which nothing is compared: what dpkg remembers and writes down, and what lasts no longer than the computer runs.
+const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
+/// What the programs that change users keep of the file before.
+const BACKUPS: [&str; 7] = [
+    "etc/passwd-",
+    "etc/group-",
+    "etc/shadow-",
+    "etc/gshadow-",
+    "etc/subuid-",
+    "etc/subgid-",
+    "etc/.pwd.lock",
+];
+/// Packages that the trial uses where this computer has them, beside the essential ones.
+const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
+/// What nobody reads there.
+const LEFT_OUT: [&str; 5] =
+    ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
+
+/// The folder, removed when dropped.
+pub struct Root(Scratch);
+
+/// A package of this computer, as dpkg knows it.
+struct Installed {
+    essential: bool,
+    /// Names of its dependencies: for each one those of which one is enough.
+    depends: Vec<Vec<String>>,
+}
+
+impl Root {
+    /// The essential packages of this computer's Debian, copied; needs no network, and takes seconds.
+    pub fn copied(name: &str) -> Result<Self> {
+        let root = Self(Scratch::new(name)?);
+        for folder in ["bin", "sbin", "lib", "lib32", "lib64", "libx32"] {
+            if let Ok(to) = fs::read_link(Path::new("/").join(folder)) {
+                fs::create_dir_all(root.path().join(&to))?;
+                symlink(to, root.path().join(folder))?;
+            }
+        }
+        let packages = closure(&installed()?)?;
+        let mut list = shell::command("dpkg-query");
+        for path in shell::read(list.arg("-L").args(&packages))?.lines() {
+            if path.starts_with('/') && !LEFT_OUT.iter().any(|folder| Path::new(path).starts_with(folder)) {
+                copy(Path::new(path), &root.path().join(&path[1..])).with_context(|| path.to_owned())?;
+            }
+        }
+        root.remember(&packages)?;
+        root.complete()?;
+        Ok(root)
+    }
+
+    /// A fresh Debian 12 from its archive, with the programs that the trial uses.
+    pub fn bootstrapped(name: &str) -> Result<Self> {
+        if !works(shell::command("debootstrap").arg("--version")) {
+            apt_install(&["debootstrap"])?;
+        }
+        let root = Self(Scratch::new(name)?);
+        let mut debootstrap = shell::command("debootstrap");
+        debootstrap.args(["--variant=minbase", "--include=systemd,man-db", "bookworm"]).arg(root.path());
+        run(debootstrap.env("DEBIAN_FRONTEND", "noninteractive"))?;
+        Ok(root)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    /// What dpkg of the new root knows: the same of the copied packages as that of this computer.
+    fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
+        let to = self.path().join("var/lib/dpkg");
+        for folder in ["info", "updates", "triggers", "alternatives"] {
+            fs::create_dir_all(to.join(folder))?;
+        }
+        fs::write(to.join("status"), shell::read(shell::command("dpkg-query").arg("-s").args(packages))?)?;
+        for entry in fs::read_dir("/var/lib/dpkg/info")? {
+            let path = entry?.path();
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            if packages.contains(name.split(':').next().unwrap_or_default()) {
+                fs::copy(&path, to.join("info").join(path.file_name().unwrap_or_default()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the scripts of essential packages make when they are installed.
+    fn complete(&self) -> Result<()> {
+        for (file, from) in [("passwd", "passwd.master"), ("group", "group.master")] {
+            fs::copy(Path::new("/usr/share/base-passwd").join(from), self.path().join("etc").join(file))?;
+        }
+        for folder in ["dev", "proc", "tmp", "run"] {
+            fs::create_dir_all(self.path().join(folder))?;
+        }
+        fs::set_permissions(self.path().join("tmp"), fs::Permissions::from_mode(0o1777))?;
+        let null = self.path().join("dev/null");
+        if !works(shell::command("mknod").args(["-m", "666"]).arg(&null).args(["c", "1", "3"])) {
+            fs::write(&null, "")?;
+            fs::set_permissions(&null, fs::Permissions::from_mode(0o666))?;
+        }
+        if self.has("usr/bin/awk").is_none() && self.has("usr/bin/mawk").is_some() {
+            symlink("mawk", self.path().join("usr/bin/awk"))?;
+        }
+        for program in ["ldconfig", "pwconv", "grpconv"] {
+            run(&mut self.command(program))?;
+        }
+        Ok(())
+    }
+
+    /// A file of it.
+    pub fn has(&self, path: &str) -> Option<PathBuf> {
+        Some(self.path().join(path)).filter(|path| path.symlink_metadata().is_ok())
+    }
+
+    /// `program` in it, as root.
+    pub fn command(&self, program: &str) -> Command {
+        self.chroot(&[], program)
+    }
+
+    /// `program` in it, as a user without any right.
+    pub fn as_nobody(&self, program: &str) -> Command {
+        self.chroot(&["--userspec=65534:65534"], program)
+    }
+
+    fn chroot(&self, switches: &[&str], program: &str) -> Command {
+        let mut chroot = shell::command("chroot");
+        chroot.args(switches).arg(self.path()).arg(program);
+        chroot
+            .env_clear()
+            .env("PATH", "/usr/sbin:/usr/bin:/sbin:/bin")
+            .env("LC_ALL", "C.UTF-8")
+            .env("HOME", "/tmp");
+        chroot
+    }
+
+    /// dpkg on it. Some containers tell dpkg to leave out manual pages; here they are wanted.
+    pub fn dpkg(&self) -> Command {
+        let mut dpkg = shell::command("dpkg");
+        dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
+        dpkg.env("PATH", "/usr/sbin:/usr/bin:/sbin:/bin").env("DEBIAN_FRONTEND", "noninteractive");
+        dpkg
+    }
+
+    /// Everything in it that packages could have left: kind, mode, owner and content by path.
+    pub fn files(&self) -> Result<BTreeMap<String, String>> {
+        let mut found = BTreeMap::new();
+        let mut waiting = vec![self.path().to_owned()];
+        while let Some(folder) = waiting.pop() {
+            for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+                let path = entry?.path();
+                let name = path.strip_prefix(self.path())?.to_string_lossy().into_owned();
+                if UNCOMPARED.contains(&&*name) || BACKUPS.contains(&&*name) {
+                    continue;
+                }
+                let data = path.symlink_metadata()?;
+                let content = if data.is_symlink() {
+                    fs::read_link(&path)?.display().to_string()
+                } else if data.is_file() {
+                    sha256(&fs::read(&path)?)
+                } else {
+                    String::new()
+                };
+                if data.is_dir() {
+                    waiting.push(path);
+                }
+                found.insert(name, format!("{:o} {}:{} {content}", data.mode(), data.uid(), data.gid()));
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// All packages of this computer.
+fn installed() -> Result<BTreeMap<String, Installed>> {
+    let mut query = shell::command("dpkg-query");
+    let format = "${db:Status-Abbrev}\t${Package}\t${Essential}\t${Pre-Depends}, ${Depends}\t${Provides}\n";
+    let text = shell::read(query.args(["-W", "-f", format]))
+        .context("packages can be tried on Debian and its kin only, where dpkg is")?;
+    let names = |list: &str| -> Vec<String> {
+        let parts = list.split('|').filter_map(|part| part.split_whitespace().next());
+        parts.map(|name| name.split(':').next().unwrap_or(name).to_owned()).collect()
+    };
+    let mut packages = BTreeMap::new();
+    let mut provided: Vec<(String, String)> = Vec::new();
+    for line in text.lines() {
+        let [status, name, essential, depends, provides] = line.split('\t').collect::<Vec<_>>()[..] else {
+            continue;
+        };
+        if !status.starts_with("ii") {
+            continue;
+        }
+        let depends = depends.split(',').map(names).filter(|any| !any.is_empty()).collect();
+        packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
+        provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
+    }
+    // A package that is provided by another one is a package that needs that one.
+    for (other, by) in provided {
+        packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
+    }
+    Ok(packages)
+}
+
+/// The essential packages, those that the trial uses, and all that these need.
+fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> {
+    let begins = |name: &str, package: &Installed| package.essential || WANTED.contains(&name);
+    let mut waiting: Vec<&str> =
+        installed.iter().filter(|(name, package)| begins(name, package)).map(|(name, _)| &**name).collect();
+    let (mut seen, mut real) = (BTreeSet::new(), BTreeSet::new());
+    let provides = |name: &str| !Path::new(&format!("/var/lib/dpkg/info/{name}.list")).exists();
+    while let Some(name) = waiting.pop() {
+        if !seen.insert(name) {
+            continue;
+        }
+        let architecture = shell_architecture()?;
+        if !provides(name) || !provides(&format!("{name}:{architecture}")) {
+            real.insert(name.to_owned());
+        }
+        for any in &installed[name].depends {
+            match any.iter().find_map(|one| installed.get_key_value(one)) {
+                Some((one, _)) => waiting.push(one),
+                None => bail!("{name} needs {}, which this computer does not have", any.join(" or ")),
+            }
+        }
+    }
+    ensure!(real.contains("dpkg"), "this computer has no essential packages");
+    Ok(real)
+}
+
+/// Debian's name of this computer's kind.
+fn shell_architecture() -> Result<&'static str> {
+    Ok(super::programs::own()?.debian)
+}
+
+/// A file, link or folder as it is; what a package names and this computer has not is left out.
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    let Ok(data) = from.symlink_metadata() else { return Ok(()) };
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    if to.symlink_metadata().is_ok() {
+        return Ok(());
+    }
+    if data.is_symlink() {
+        symlink(fs::read_link(from)?, to)?;
+    } else if data.is_dir() {
+        fs::create_dir_all(to)?;
+        fs::set_permissions(to, data.permissions())?;
+    } else if data.is_file() {
+        fs::copy(from, to)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,47 @@
+//! Libraries in the pages of the dashboard, which the programs contain.
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+use crate::shell::root;
+
+/// The libraries whose scripts are a part of the built files; the others of web/package.json build and test them.
+const NAMES: [&str; 3] = ["svelte", "three", "uplot"];
+
+/// One of them.
+pub struct Library {
+    /// Its name in the registry npm.
+    pub name: String,
+    /// The version that the lock file has.
+    pub version: String,
+    /// Its licence, the identifier of SPDX.
+    pub licence: String,
+    /// The text of its licence.
+    pub text: String,
+}
+
+/// All of them. The texts are kept beside this program, so that a release can be made without Node.js.
+pub fn libraries() -> Result<Vec<Library>> {
+    let lock = root().join("web/package-lock.json");
+    let lock: Value =
+        serde_json::from_str(&std::fs::read_to_string(lock)?).context("web/package-lock.json")?;
+    let library = |name: &str| {
+        let entry = &lock["packages"][format!("node_modules/{name}")];
+        let part = |part: &str| {
+            let text = entry[part].as_str().map(str::to_owned);
+            text.with_context(|| format!("web/package-lock.json has no {part} of {name}"))
+        };
+        let kept = root().join(format!("xtask/packaging/licences/{name}.txt"));
+        let text = std::fs::read_to_string(&kept).with_context(|| kept.display().to_string())?;
+        let installed = root().join(format!("web/node_modules/{name}"));
+        for file in ["LICENSE", "LICENSE.md"] {
+            let other = std::fs::read_to_string(installed.join(file)).unwrap_or_else(|_| text.clone());
+            anyhow::ensure!(
+                other == text,
+                "{} is not {file} of {name}: copy it from web/node_modules",
+                kept.display()
+            );
+        }
+        Ok(Library { name: name.to_owned(), version: part("version")?, licence: part("license")?, text })
+    };
+    NAMES.into_iter().map(library).collect()
+}

@@ -1,0 +1,70 @@
+//! The format of Debian packages (deb(5)), the same bytes whoever makes one. The sums of their files are left to dpkg, which makes them.
+use std::fmt::Write as _;
+
+use anyhow::{Context, Result, ensure};
+
+use super::tree::Tree;
+
+/// A package.
+pub struct Deb<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its version with Debian's revision.
+    pub version: &'a str,
+    /// What it runs on: `amd64`, `arm64`.
+    pub architecture: &'a str,
+    /// More fields of the control file, a line each: `Section: science`.
+    pub fields: &'a str,
+    /// What it installs.
+    pub tree: &'a Tree,
+    /// Scripts by name: `postinst`, `postrm`.
+    pub scripts: &'a [(&'a str, &'a str)],
+}
+
+impl Deb<'_> {
+    /// `jtc_0.2.0-1_amd64.deb`.
+    pub fn file_name(&self) -> String {
+        format!("{}_{}_{}.deb", self.name, self.version, self.architecture)
+    }
+
+    /// The package, all of whose files have this `time` (Unix time, s).
+    pub fn bytes(&self, time: u64) -> Result<Vec<u8>> {
+        let mut ar = ar::Builder::new(Vec::new());
+        for (name, bytes) in [
+            ("debian-binary", b"2.0\n".to_vec()),
+            ("control.tar.gz", self.control()?.tar_gz("./", time)?),
+            ("data.tar.gz", self.tree.tar_gz("./", time)?),
+        ] {
+            let mut header = ar::Header::new(name.as_bytes().to_vec(), bytes.len() as u64);
+            header.set_mode(0o100_644);
+            header.set_mtime(time);
+            ar.append(&header, &*bytes).with_context(|| name.to_owned())?;
+        }
+        Ok(ar.into_inner()?)
+    }
+
+    fn control(&self) -> Result<Tree> {
+        let mut control = Tree::default();
+        let kibibytes: usize = self.tree.files().map(|(_, file)| file.bytes.len().div_ceil(1024)).sum();
+        let Self { name, version, architecture, fields, .. } = self;
+        ensure!(fields.contains("\nDescription: "), "the package {name} has no description");
+        control.put(
+            "control",
+            format!(
+                "Package: {name}\nVersion: {version}\nArchitecture: {architecture}\nInstalled-Size: {kibibytes}\n{}\n",
+                fields.trim()
+            ),
+        );
+        let mut settings = String::new();
+        for (path, _) in self.tree.files().filter(|(path, _)| path.starts_with("etc/")) {
+            writeln!(settings, "/{path}")?;
+        }
+        if !settings.is_empty() {
+            control.put("conffiles", settings);
+        }
+        for (name, script) in self.scripts {
+            control.put_program(*name, *script);
+        }
+        Ok(control)
+    }
+}

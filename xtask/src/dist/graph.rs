@@ -1,0 +1,183 @@
+//! The crates of others that a release is made of, as cargo resolves them.
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+use super::programs::PLATFORMS;
+use crate::{firmware, shell};
+
+/// A crate.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Crate {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// Its licence, an SPDX expression; `None` where its manifest names none.
+    pub licence: Option<String>,
+    /// Where its source comes from; `None` for the project's own.
+    pub source: Option<String>,
+    /// Who wrote it, as its manifest has it.
+    pub authors: Vec<String>,
+    /// Where it is developed.
+    pub repository: Option<String>,
+    /// The folder of its source.
+    pub folder: PathBuf,
+    /// SHA-256 of what the registry has of it.
+    pub checksum: Option<String>,
+}
+
+/// Crates by `name version`, with what each of them uses.
+#[derive(Default)]
+pub struct Graph {
+    /// The crates.
+    pub crates: BTreeMap<String, Crate>,
+    /// What each uses, by the same names.
+    pub uses: BTreeMap<String, BTreeSet<String>>,
+}
+
+/// Which dependencies of a crate count.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// What becomes a part of a program, or makes a part of it while it is compiled.
+    Shipped,
+    /// Those of build scripts and tests, too.
+    All,
+}
+
+/// What the programs, the Python package and the boards' programs contain. Features are those of the whole workspace: the graph may have more
+/// than a program has, and never less.
+pub fn shipped() -> Result<Graph> {
+    let mut graph = Graph::default();
+    for platform in PLATFORMS {
+        let metadata = metadata(Path::new("Cargo.toml"), platform.triple)?;
+        graph.add(&metadata, Kind::Shipped, |name| ["jtc-cli", "ucom-cli"].contains(&name))?;
+        if super::wheel::folder().is_some() {
+            let metadata = self::metadata(Path::new("Cargo.toml"), platform.library)?;
+            graph.add(&metadata, Kind::Shipped, |name| name == "openjtc-py")?;
+        }
+    }
+    let metadata = metadata(Path::new("firmware/Cargo.toml"), firmware::TARGET)?;
+    graph.add(&metadata, Kind::Shipped, |name| name == "openjtc-firmware")?;
+    graph.checksums()?;
+    Ok(graph)
+}
+
+/// All that a manifest leads to on these platforms, tests included.
+pub fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
+    let mut graph = Graph::default();
+    for platform in platforms {
+        graph.add(&metadata(manifest, platform)?, Kind::All, |_| true)?;
+    }
+    Ok(graph)
+}
+
+/// What cargo resolves for a platform, without the network where it can do without.
+fn metadata(manifest: &Path, platform: &str) -> Result<Value> {
+    let ask = || {
+        let mut cargo = shell::cargo(&[
+            "metadata",
+            "--format-version",
+            "1",
+            "--filter-platform",
+            platform,
+            "--manifest-path",
+        ]);
+        cargo.arg(manifest);
+        cargo
+    };
+    let offline = ask().args(["--offline", "--quiet"]).output()?;
+    let text = if offline.status.success() {
+        String::from_utf8_lossy(&offline.stdout).into_owned()
+    } else {
+        shell::read(&mut ask())?
+    };
+    serde_json::from_str(&text).context("cargo metadata printed no JSON")
+}
+
+fn text(value: &Value) -> Option<String> {
+    value.as_str().map(str::to_owned)
+}
+
+impl Graph {
+    /// Adds what is used by those crates of the workspace that `begins` names.
+    fn add(&mut self, metadata: &Value, kind: Kind, begins: impl Fn(&str) -> bool) -> Result<()> {
+        let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
+        let by_id: BTreeMap<&str, &Value> =
+            packages.iter().filter_map(|package| Some((package["id"].as_str()?, package))).collect();
+        let nodes = metadata["resolve"]["nodes"].as_array().context("cargo metadata resolves nothing")?;
+        let nodes: BTreeMap<&str, &Value> =
+            nodes.iter().filter_map(|node| Some((node["id"].as_str()?, node))).collect();
+        let members = metadata["workspace_members"].as_array().context("cargo metadata names no members")?;
+        let mut waiting: Vec<&str> = members
+            .iter()
+            .filter_map(Value::as_str)
+            .filter(|id| by_id.get(id).is_some_and(|package| package["name"].as_str().is_some_and(&begins)))
+            .collect();
+        anyhow::ensure!(!waiting.is_empty(), "the workspace has none of the crates that are asked for");
+        let key = |id: &str| -> Result<String> {
+            let package = by_id.get(id).with_context(|| format!("cargo metadata has no package {id}"))?;
+            let part = |name: &str| text(&package[name]).with_context(|| format!("{id} has no {name}"));
+            Ok(format!("{} {}", part("name")?, part("version")?))
+        };
+        let mut seen = BTreeSet::new();
+        while let Some(id) = waiting.pop() {
+            if !seen.insert(id) {
+                continue;
+            }
+            let name = key(id)?;
+            self.crates.insert(name.clone(), described(by_id[id])?);
+            let dependencies = nodes.get(id).and_then(|node| node["deps"].as_array()).into_iter().flatten();
+            for dependency in dependencies {
+                let kinds = dependency["dep_kinds"].as_array().into_iter().flatten();
+                let counts = kinds.into_iter().any(|one| kind == Kind::All || one["kind"].is_null());
+                if let (Some(used), true) = (dependency["pkg"].as_str(), counts) {
+                    self.uses.entry(name.clone()).or_default().insert(key(used)?);
+                    waiting.push(used);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the sums that the lock files have.
+    fn checksums(&mut self) -> Result<()> {
+        for lock in ["Cargo.lock", "firmware/Cargo.lock"] {
+            let text = std::fs::read_to_string(shell::root().join(lock)).context(lock)?;
+            let lock: toml::Table = toml::from_str(&text).context(lock)?;
+            for package in lock.get("package").and_then(|all| all.as_array()).into_iter().flatten() {
+                let part = |name: &str| package.get(name).and_then(|value| value.as_str());
+                if let (Some(name), Some(version), Some(sum)) =
+                    (part("name"), part("version"), part("checksum"))
+                    && let Some(found) = self.crates.get_mut(&format!("{name} {version}"))
+                {
+                    found.checksum = Some(sum.to_owned());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Those that others wrote.
+    pub fn foreign(&self) -> impl Iterator<Item = &Crate> {
+        self.crates.values().filter(|found| found.source.is_some())
+    }
+}
+
+fn described(package: &Value) -> Result<Crate> {
+    let name = text(&package["name"]).context("a package without a name")?;
+    let manifest = text(&package["manifest_path"]).context(name.clone())?;
+    let authors = package["authors"].as_array().into_iter().flatten();
+    Ok(Crate {
+        version: text(&package["version"]).context(name.clone())?,
+        licence: text(&package["license"]),
+        source: text(&package["source"]),
+        authors: authors.filter_map(text).collect(),
+        repository: text(&package["repository"]),
+        folder: Path::new(&manifest).parent().context(name.clone())?.to_owned(),
+        checksum: None,
+        name,
+    })
+}

@@ -1,0 +1,102 @@
+//! The boards' programs as they lie in flash, and the list of them that `jtc firmware flash` reads.
+use anyhow::{Context, Result, ensure};
+use object::{Object as _, ObjectSegment as _};
+use serde_json::json;
+
+use super::tree::{Tree, sha256};
+use crate::firmware;
+
+/// First address of flash.
+const FLASH: u64 = 0x0800_0000;
+/// Bytes from there to the stored arm, the last two sectors of bank 2, which no image may touch. Where bank 2 begins stand the few words of the
+/// second core of an H745, so that the images of these boards have a gap of erased flash in them.
+const ROOM: u64 = (2048 - 2 * 128) * 1024;
+/// What flash that is not written reads as.
+const ERASED: u8 = 0xff;
+
+/// The program of a board.
+pub struct Image {
+    /// The board's name.
+    pub board: &'static str,
+    /// For debuggers.
+    pub elf: Vec<u8>,
+    /// What stands in flash from 0x0800_0000 on.
+    pub bin: Vec<u8>,
+}
+
+/// Builds the programs of all boards.
+pub fn build() -> Result<Vec<Image>> {
+    let image = |board| {
+        let path = firmware::build(board)?;
+        let elf = std::fs::read(&path).with_context(|| path.display().to_string())?;
+        let bin = flash(&elf).with_context(|| path.display().to_string())?;
+        Ok(Image { board, elf, bin })
+    };
+    firmware::BOARDS.into_iter().map(image).collect()
+}
+
+/// What an ELF puts into flash.
+fn flash(elf: &[u8]) -> Result<Vec<u8>> {
+    let file = object::read::elf::ElfFile32::<object::Endianness>::parse(elf)?;
+    let mut bin = Vec::new();
+    for segment in file.segments() {
+        let bytes = segment.data()?;
+        if bytes.is_empty() {
+            continue;
+        }
+        // Where it is loaded to, which is another place than it is used from.
+        let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
+        let end = address + bytes.len() as u64;
+        ensure!(
+            (FLASH..=FLASH + ROOM).contains(&address) && end <= FLASH + ROOM,
+            "a part of {} B for {address:#x} is outside of what an image may fill",
+            bytes.len()
+        );
+        let (from, to) = ((address - FLASH) as usize, (end - FLASH) as usize);
+        bin.resize(bin.len().max(to), ERASED);
+        bin[from..to].copy_from_slice(bytes);
+    }
+    // The vector table: the stack's first address in RAM, then that of the first instruction, odd as all of Thumb are.
+    let word = |at: usize| bin.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
+    let (stack, start) = (word(0).context("the image is empty")?, word(4).context("the image is empty")?);
+    ensure!(
+        (0x2000_0000..0x4000_0000).contains(&stack),
+        "the image begins its stack at {stack:#x}, not in RAM"
+    );
+    ensure!(
+        start & 1 == 1 && (FLASH..FLASH + bin.len() as u64).contains(&u64::from(start)),
+        "the image begins at {start:#x}, not in itself"
+    );
+    Ok(bin)
+}
+
+/// The images with their list, `firmware.json`, in a folder.
+pub fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -> Result<()> {
+    for image in images {
+        tree.put(format!("{folder}/{}", name(image)), &*image.bin);
+    }
+    tree.put(format!("{folder}/firmware.json"), list(images, version)?);
+    Ok(())
+}
+
+/// `nucleo-h745zi-q.bin`.
+pub fn name(image: &Image) -> String {
+    format!("{}.bin", image.board)
+}
+
+/// What each image is: the file, its board, sum and address.
+pub fn list(images: &[Image], version: &str) -> Result<String> {
+    let images: Vec<_> = images
+        .iter()
+        .map(|image| {
+            json!({
+                "board": image.board,
+                "file": name(image),
+                "sha256": sha256(&image.bin),
+                "address": FLASH,
+                "bytes": image.bin.len(),
+            })
+        })
+        .collect();
+    Ok(serde_json::to_string_pretty(&json!({ "version": version, "images": images }))? + "\n")
+}

@@ -1,0 +1,137 @@
+//! The licences of everything that a release contains, with their texts.
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use super::dashboard;
+use super::graph::{Crate, Graph};
+use crate::shell;
+
+/// Beginnings of the names of files in which crates have their licences.
+const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
+
+/// An expression of SPDX; old manifests have `/` where it has `OR`.
+pub fn expression(licence: &str) -> String {
+    licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
+}
+
+/// THIRD-PARTY.txt: each crate and library with its licence, then each text once. An error for a crate without a licence.
+pub fn third_party(graph: &Graph) -> Result<String> {
+    let mut list =
+        String::from("openjtc contains what others wrote. Their licences, and below them the texts.\n\n");
+    let mut texts = Texts::default();
+    for found in graph.foreign() {
+        let label = format!("{} {}", found.name, found.version);
+        let licence = found.licence.as_deref();
+        let licence = licence.with_context(|| format!("{label} names no licence; it cannot be shipped"))?;
+        writeln!(list, "{label}: {}", expression(licence))?;
+        texts.of(found, &label)?;
+    }
+    for library in dashboard::libraries()? {
+        let label = format!("{} {}", library.name, library.version);
+        writeln!(list, "{label} (dashboard): {}", library.licence)?;
+        texts.add(&label, &library.text);
+    }
+    runtime(&mut list, &mut texts)?;
+    for (text, labels) in texts.0 {
+        write!(list, "\n{}\n{}\n\n{}\n", "=".repeat(100), labels.join(", "), text)?;
+    }
+    Ok(list)
+}
+
+/// What the compiler and the linker put into every program: Rust's standard library, and the C library of the static ones.
+fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
+    let version = shell::read(shell::command("rustc").arg("--version"))?;
+    let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
+    let label = format!("Rust's standard library {version}");
+    writeln!(list, "{label}: MIT OR Apache-2.0")?;
+    // The project's own are the same texts.
+    texts.add(&label, &std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?);
+    writeln!(list, "musl (static programs): MIT")?;
+    texts.add("musl", include_str!("../../packaging/licences/musl.txt"));
+    Ok(())
+}
+
+/// Texts in the order in which they were met, with those to whom each belongs.
+#[derive(Default)]
+struct Texts(Vec<(String, Vec<String>)>);
+
+impl Texts {
+    fn add(&mut self, label: &str, text: &str) {
+        let text: Vec<&str> =
+            text.trim_matches(['\n', '\r', '\u{feff}']).lines().map(str::trim_end).collect();
+        let text = text.join("\n");
+        match self.0.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, labels)) if labels.last().is_some_and(|last| last == label) => {}
+            Some((_, labels)) => labels.push(label.to_owned()),
+            None => self.0.push((text, vec![label.to_owned()])),
+        }
+    }
+
+    /// Those in the source of a crate, or else the standard one.
+    fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(&found.folder).with_context(|| found.folder.display().to_string())? {
+            let path = entry?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+            if path.is_file() && NAMES.iter().any(|known| name.starts_with(known)) {
+                files.push(path);
+            }
+        }
+        files.sort();
+        for file in &files {
+            self.add(label, &read(file)?);
+        }
+        if files.is_empty() {
+            let licence = expression(found.licence.as_deref().unwrap_or_default());
+            let mit = licence.split(" OR ").any(|one| one == "MIT");
+            ensure!(
+                mit,
+                "{label} ({licence}) has no text of its licence in its source, and no standard one is known here"
+            );
+            let authors = match &*found.authors {
+                [] => format!(
+                    "the authors of {} ({})",
+                    found.name,
+                    found.repository.as_deref().unwrap_or("crates.io")
+                ),
+                authors => authors.join(", "),
+            };
+            let standard = include_str!("../../../LICENSE-MIT");
+            let terms = standard.split_once("Permission is hereby").context("LICENSE-MIT has no terms")?.1;
+            let text = format!("MIT License\n\nCopyright (c) {authors}\n\nPermission is hereby{terms}");
+            self.add(label, &text);
+        }
+        Ok(())
+    }
+}
+
+fn read(file: &Path) -> Result<String> {
+    let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_expressions_become_those_of_spdx() {
+        assert_eq!(expression("MIT/Apache-2.0"), "MIT OR Apache-2.0");
+        assert_eq!(expression("Apache-2.0 / MIT"), "Apache-2.0 OR MIT");
+        assert_eq!(expression("(MIT OR Apache-2.0) AND Unicode-3.0"), "(MIT OR Apache-2.0) AND Unicode-3.0");
+    }
+
+    #[test]
+    fn a_text_of_many_stands_once() {
+        let mut texts = Texts::default();
+        texts.add("a 1", "one\n");
+        texts.add("b 2", "one  \r\n");
+        texts.add("b 2", "\nother");
+        let expected = [("one", vec!["a 1", "b 2"]), ("other", vec!["b 2"])];
+        let found: Vec<(&str, Vec<&str>)> =
+            texts.0.iter().map(|(text, labels)| (&**text, labels.iter().map(|l| &**l).collect())).collect();
+        assert_eq!(found, expected);
+    }
+}

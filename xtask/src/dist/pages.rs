@@ -1,0 +1,66 @@
+//! Manual pages and completions, as the programs print them.
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use super::tree::Tree;
+use crate::shell::{self, Scratch};
+
+/// What `program`, which must run on this computer, prints of itself.
+pub struct Pages {
+    /// Manual pages by their file names, such as `jtc-serve.1`.
+    pub manual: Vec<(String, Vec<u8>)>,
+    bash: Vec<u8>,
+    zsh: Vec<u8>,
+    fish: Vec<u8>,
+}
+
+impl Pages {
+    /// Asks the program of this name in `folder`.
+    pub fn of(folder: &Path, name: &str) -> Result<Self> {
+        let program = folder.join(name);
+        // Options that this user has set by the environment are none of the packages'.
+        let ask = || {
+            let mut ask = shell::command(&program);
+            ask.env_clear();
+            ask
+        };
+        let scratch = Scratch::new(&format!("pages-{name}"))?;
+        shell::read(ask().args(["man", "--out"]).arg(scratch.path()))?;
+        let mut manual = Vec::new();
+        for entry in std::fs::read_dir(scratch.path())? {
+            let path = entry?.path();
+            let page = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            manual.push((page, std::fs::read(&path).with_context(|| path.display().to_string())?));
+        }
+        manual.sort();
+        ensure!(manual.iter().any(|(page, _)| *page == format!("{name}.1")), "{name} has no manual page");
+        let completions = |shell: &str| -> Result<Vec<u8>> {
+            let text = shell::read(ask().args(["completions", shell]))?;
+            ensure!(text.contains(name), "{name} prints no completions for {shell}");
+            Ok(text.into_bytes())
+        };
+        Ok(Self { manual, bash: completions("bash")?, zsh: completions("zsh")?, fish: completions("fish")? })
+    }
+
+    /// Where Debian has them.
+    pub fn install(&self, name: &str, tree: &mut Tree) -> Result<()> {
+        for (page, text) in &self.manual {
+            tree.put(format!("usr/share/man/man1/{page}.gz"), super::tree::gzip(text)?);
+        }
+        tree.put(format!("usr/share/bash-completion/completions/{name}"), &*self.bash);
+        tree.put(format!("usr/share/zsh/vendor-completions/_{name}"), &*self.zsh);
+        tree.put(format!("usr/share/fish/vendor_completions.d/{name}.fish"), &*self.fish);
+        Ok(())
+    }
+
+    /// Where the archives have them.
+    pub fn unpacked(&self, name: &str, tree: &mut Tree) {
+        for (page, text) in &self.manual {
+            tree.put(format!("man/man1/{page}"), &**text);
+        }
+        tree.put(format!("completions/{name}.bash"), &*self.bash);
+        tree.put(format!("completions/_{name}"), &*self.zsh);
+        tree.put(format!("completions/{name}.fish"), &*self.fish);
+    }
+}

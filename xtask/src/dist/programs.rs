@@ -1,0 +1,171 @@
+//! The programs of a release: static, stripped, and the same bytes wherever the checkout and cargo's folders are.
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::shell::{self, run};
+use crate::{firmware, python};
+
+/// The programs, with the package of each.
+pub const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
+
+/// What a program runs on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Platform {
+    /// As the Linux kernel and Rust call it.
+    pub machine: &'static str,
+    /// As Debian calls it.
+    pub debian: &'static str,
+    /// Rust's target of static programs.
+    pub triple: &'static str,
+    /// Rust's target of libraries that Python loads.
+    pub library: &'static str,
+}
+
+/// All that a release has programs for.
+pub const PLATFORMS: [Platform; 2] = [
+    Platform {
+        machine: "x86_64",
+        debian: "amd64",
+        triple: "x86_64-unknown-linux-musl",
+        library: "x86_64-unknown-linux-gnu",
+    },
+    Platform {
+        machine: "aarch64",
+        debian: "arm64",
+        triple: "aarch64-unknown-linux-musl",
+        library: "aarch64-unknown-linux-gnu",
+    },
+];
+
+/// The one of this computer, if it is any of them.
+pub fn own() -> Result<Platform> {
+    let machine = std::env::consts::ARCH;
+    let own = PLATFORMS.into_iter().find(|platform| platform.machine == machine);
+    own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
+}
+
+/// Adds the compiler's target where rustup manages the toolchain. `Err`: it cannot be had here.
+pub fn add_target(triple: &str) -> Result<()> {
+    let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
+    if installed.lines().any(|target| target == triple) {
+        return Ok(());
+    }
+    run(shell::command("rustup").args(["target", "add", triple]))
+}
+
+/// The seconds since 1970 that stand in every archive: those of the last commit, or of `SOURCE_DATE_EPOCH`.
+pub fn time() -> Result<u64> {
+    let time = match std::env::var("SOURCE_DATE_EPOCH") {
+        Ok(time) => time,
+        Err(_) => shell::read(shell::command("git").args(["log", "-1", "--format=%ct"])).context(
+            "the time of the release is that of its commit; outside a checkout set SOURCE_DATE_EPOCH",
+        )?,
+    };
+    time.trim().parse().with_context(|| format!("SOURCE_DATE_EPOCH is {time:?}, and no number of seconds"))
+}
+
+/// Folder of the tools that requirements-dist.txt lists.
+pub fn tools() -> Result<PathBuf> {
+    let python = python::environment("requirements-dist.txt")?;
+    Ok(python.parent().context("an interpreter in no folder")?.to_owned())
+}
+
+/// Folders of this computer whose paths the compilers write into what they make, with what stands there instead. The later ones count first.
+fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
+    let cargo = firmware::cargo_home();
+    let mut folders =
+        vec![(shell::root().to_owned(), "openjtc"), (cargo, "cargo"), (shell::target(), "target")];
+    for (path, _) in folders.clone() {
+        ensure!(
+            !path.to_string_lossy().contains([' ', '"', '=']),
+            "{}: a release cannot be made in a folder with a space, a quote or `=` in its name",
+            path.display()
+        );
+    }
+    // A checkout behind a link has two names.
+    for at in 0..folders.len() {
+        let (path, name) = folders[at].clone();
+        if let Ok(real) = path.canonicalize()
+            && real != path
+        {
+            folders.push((real, name));
+        }
+    }
+    Ok(folders)
+}
+
+/// The switches for `triple` by which no path of this computer stands in what is made, given to a cargo that `command` begins.
+pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
+    let folders = folders()?;
+    let flags: Vec<String> = folders
+        .iter()
+        .map(|(path, name)| format!("\"--remap-path-prefix={}={name}\"", path.display()))
+        .collect();
+    command.arg("--config").arg(format!("target.{triple}.rustflags=[{}]", flags.join(",")));
+    // C and its assembler.
+    let maps: Vec<String> =
+        folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();
+    command.env(format!("CFLAGS_{}", triple.replace('-', "_")), format!("-g0 {}", maps.join(" ")));
+    Ok(())
+}
+
+/// Sets for the compilers and the linker of `tools`.
+pub fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> {
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let all = [tools.to_owned()].into_iter().chain(std::env::split_paths(&others));
+    command.env("PATH", std::env::join_paths(all)?).env("SOURCE_DATE_EPOCH", time.to_string());
+    Ok(())
+}
+
+/// Builds the programs; the folder in which they are.
+pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
+    add_target(platform.triple)?;
+    let tools = tools()?;
+    let mut build = shell::command(tools.join("cargo-zigbuild"));
+    build.args(["zigbuild", "--locked", "--profile", "dist", "--target", platform.triple]);
+    for (_, package) in PROGRAMS {
+        build.args(["--package", package]);
+    }
+    without_paths(&mut build, platform.triple)?;
+    with_tools(&mut build, &tools, time)?;
+    // Nothing is left of what a debugger would read.
+    build.env("CARGO_PROFILE_DIST_STRIP", "symbols").env("CARGO_PROFILE_DIST_DEBUG", "false");
+    build.env("CARGO_TARGET_DIR", shell::target());
+    run(&mut build)?;
+    let folder = shell::target().join(platform.triple).join("dist");
+    for (name, _) in PROGRAMS {
+        is_static(&folder.join(name))?;
+        has_no_paths(&folder.join(name))?;
+    }
+    Ok(folder)
+}
+
+/// An error for a program that asks for a loader, and so for libraries of the system.
+fn is_static(program: &Path) -> Result<()> {
+    use object::read::elf::{FileHeader as _, ProgramHeader as _};
+    let bytes = std::fs::read(program).with_context(|| program.display().to_string())?;
+    let header = object::elf::FileHeader64::<object::Endianness>::parse(&*bytes)?;
+    let endian = header.endian()?;
+    let loader = header
+        .program_headers(endian, &*bytes)?
+        .iter()
+        .any(|part| part.p_type(endian) == object::elf::PT_INTERP);
+    ensure!(!loader, "{} is not linked statically", program.display());
+    Ok(())
+}
+
+/// An error for a program in which a folder of this computer stands.
+fn has_no_paths(program: &Path) -> Result<()> {
+    let bytes = std::fs::read(program)?;
+    for (path, _) in folders()? {
+        let path = path.to_string_lossy();
+        let found = bytes.windows(path.len()).position(|window| window == path.as_bytes());
+        if let Some(at) = found {
+            let text = String::from_utf8_lossy(&bytes[at..(at + 120).min(bytes.len())]).into_owned();
+            anyhow::bail!("{} has a path of this computer in it: {text:?}", program.display());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,165 @@
+//! Files of a package in memory, and archives of them that are the same bytes whoever makes them.
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use flate2::{Compression, GzBuilder};
+use sha2::{Digest as _, Sha256};
+
+/// Files by their path below the root, such as `usr/bin/jtc`.
+#[derive(Clone, Default, Debug, PartialEq)]
+pub struct Tree(BTreeMap<String, File>);
+
+/// What a file holds, and whether it is a program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct File {
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Whether it can be run.
+    pub runs: bool,
+}
+
+impl Tree {
+    /// Adds a file that everyone can read.
+    pub fn put(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+        self.0.insert(path.into(), File { bytes: bytes.into(), runs: false });
+    }
+
+    /// Adds a program.
+    pub fn put_program(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+        self.0.insert(path.into(), File { bytes: bytes.into(), runs: true });
+    }
+
+    /// Adds a file of this computer.
+    pub fn copy(&mut self, path: impl Into<String>, from: &Path) -> Result<()> {
+        let bytes = std::fs::read(from).with_context(|| from.display().to_string())?;
+        self.put(path, bytes);
+        Ok(())
+    }
+
+    /// The files in the order of their paths.
+    pub fn files(&self) -> impl Iterator<Item = (&str, &File)> {
+        self.0.iter().map(|(path, file)| (path.as_str(), file))
+    }
+
+    /// A tar archive: sorted, of root, each file of `time` (Unix time, s), behind `prefix` (`./` or `name/`). Folders stand in it, too.
+    pub fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
+        let mut tar = tar::Builder::new(Vec::new());
+        let mut folders = BTreeSet::new();
+        folders.insert(prefix.to_owned());
+        for path in self.0.keys() {
+            let ends = path.match_indices('/').map(|(at, _)| format!("{prefix}{}/", &path[..at]));
+            folders.extend(ends);
+        }
+        for folder in folders {
+            let mut header = header(tar::EntryType::Directory, 0o755, 0, time);
+            tar.append_data(&mut header, &folder, std::io::empty()).with_context(|| folder.clone())?;
+        }
+        for (path, file) in &self.0 {
+            let mode = if file.runs { 0o755 } else { 0o644 };
+            let mut header = header(tar::EntryType::Regular, mode, file.bytes.len() as u64, time);
+            tar.append_data(&mut header, format!("{prefix}{path}"), &*file.bytes)
+                .with_context(|| path.clone())?;
+        }
+        Ok(tar.into_inner()?)
+    }
+
+    /// The same archive, compressed.
+    pub fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
+        gzip(&self.tar(prefix, time)?)
+    }
+}
+
+fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header {
+    let mut header = tar::Header::new_gnu();
+    header.set_entry_type(kind);
+    header.set_mode(mode);
+    header.set_size(size);
+    header.set_mtime(time);
+    header.set_uid(0);
+    header.set_gid(0);
+    // The names of number 0 fit into their fields.
+    let _ = header.set_username("root");
+    let _ = header.set_groupname("root");
+    header
+}
+
+/// Compressed, without a time and a name.
+pub fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut gzip = GzBuilder::new().mtime(0).operating_system(3).write(Vec::new(), Compression::default());
+    gzip.write_all(bytes)?;
+    Ok(gzip.finish()?)
+}
+
+/// SHA-256 as `sha256sum` writes it.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The list that `sha256sum --check` reads, of all files in a folder but itself, which it is written into; its path.
+pub fn write_sums(folder: &Path) -> Result<()> {
+    const NAME: &str = "SHA256SUMS";
+    let mut lines = BTreeMap::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        ensure!(path.is_file(), "{} is no file; release files lie in no folders", path.display());
+        if name != NAME {
+            lines.insert(name, sha256(&std::fs::read(&path)?));
+        }
+    }
+    let text: String = lines.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect();
+    std::fs::write(folder.join(NAME), text)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_is_sorted_and_depends_on_nothing_but_its_files_and_the_time() {
+        let put = |names: &[&str]| {
+            let mut tree = Tree::default();
+            names.iter().for_each(|name| tree.put(*name, *name));
+            tree.put_program("usr/bin/jtc", "program");
+            tree
+        };
+        let tree = put(&["usr/share/b", "etc/a"]);
+        let bytes = tree.tar_gz("./", 1_700_000_000).unwrap();
+        assert_eq!(bytes, put(&["etc/a", "usr/share/b"]).tar_gz("./", 1_700_000_000).unwrap());
+        assert_ne!(bytes, tree.tar_gz("./", 1_700_000_001).unwrap());
+        let tar = tree.tar("./", 1_700_000_000).unwrap();
+        let mut archive = tar::Archive::new(&*tar);
+        let entries: Vec<_> = archive
+            .entries()
+            .unwrap()
+            .map(|entry| {
+                let entry = entry.unwrap();
+                let header = entry.header();
+                assert_eq!((header.uid().unwrap(), header.gid().unwrap()), (0, 0));
+                assert_eq!(header.mtime().unwrap(), 1_700_000_000);
+                let path = String::from_utf8(entry.path_bytes().into_owned()).unwrap();
+                (path, header.mode().unwrap())
+            })
+            .collect();
+        let expected = [
+            ("./", 0o755),
+            ("./etc/", 0o755),
+            ("./usr/", 0o755),
+            ("./usr/bin/", 0o755),
+            ("./usr/share/", 0o755),
+            ("./etc/a", 0o644),
+            ("./usr/bin/jtc", 0o755),
+            ("./usr/share/b", 0o644),
+        ];
+        assert_eq!(entries, expected.map(|(path, mode)| (path.to_owned(), mode)));
+    }
+
+    #[test]
+    fn sums_are_those_that_the_standard_names() {
+        // FIPS 180-2, appendix B.1.
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+}

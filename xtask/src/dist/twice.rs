@@ -1,0 +1,81 @@
+//! The same release made again, by a copy of the checkout in another folder, and compared byte for byte.
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+use crate::shell::{self, Scratch, run};
+
+/// Makes the release of `first` again elsewhere. An error that lists each file that differs.
+pub fn compare(first: &Path, quick: bool) -> Result<()> {
+    let scratch = Scratch::new("made-again-in-a-folder-with-a-longer-name")?;
+    let checkout = scratch.path().join("a/checkout");
+    copy(&checkout)?;
+    let (second, target) = (scratch.path().join("release"), scratch.path().join("built"));
+    let mut again = shell::command("cargo");
+    again.current_dir(&checkout).args(["xtask", "dist", "--out"]).arg(&second);
+    if quick {
+        again.arg("--quick");
+    }
+    // Of the toolchain only what the checkout names counts.
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARGO") && name != "CARGO_HOME") {
+        again.env_remove(name);
+    }
+    run(again.env("CARGO_TARGET_DIR", &target))?;
+    let names = |folder: &Path| -> Result<BTreeSet<String>> {
+        fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
+    };
+    let mut differ = Vec::new();
+    let all: BTreeSet<String> = names(first)?.union(&names(&second)?).cloned().collect();
+    for name in &all {
+        match (fs::read(first.join(name)), fs::read(second.join(name))) {
+            (Ok(one), Ok(other)) if one == other => {}
+            (Ok(one), Ok(other)) => {
+                let at =
+                    one.iter().zip(&other).position(|(a, b)| a != b).unwrap_or(one.len().min(other.len()));
+                differ.push(format!(
+                    "{name}: {} and {} B, the first other byte is {at}",
+                    one.len(),
+                    other.len()
+                ));
+            }
+            _ => differ.push(format!("{name}: in one of both only")),
+        }
+    }
+    if !differ.is_empty() {
+        bail!(
+            "{} of {} files are other bytes when they are made again:\n{}",
+            differ.len(),
+            all.len(),
+            differ.join("\n")
+        );
+    }
+    println!("{} files, the same bytes from another folder", all.len());
+    Ok(())
+}
+
+/// The checkout as it is, uncommitted changes and history included, without what was built.
+fn copy(to: &Path) -> Result<()> {
+    run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
+    let listed = shell::read(shell::command("git").args([
+        "-c",
+        "core.quotePath=false",
+        "ls-files",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+    ]))?;
+    for name in listed.lines() {
+        let (from, to) = (shell::root().join(name), to.join(name));
+        if !from.exists() {
+            let _ = fs::remove_file(&to);
+            continue;
+        }
+        if let Some(folder) = to.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        fs::copy(&from, &to).with_context(|| name.to_owned())?;
+    }
+    Ok(())
+}

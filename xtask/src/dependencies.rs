@@ -44,7 +44,7 @@ pub fn check() -> Result<()> {
         std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;
     let documented = documented(&page);
     let mut used = BTreeSet::new();
-    for directory in ["crates", "xtask", "fuzz", "firmware", "emulator"] {
+    for directory in ["crates", "xtask", "fuzz", "firmware", "emulator", "book"] {
         for path in files(&root().join(directory), &["toml"]) {
             if path.file_name().is_some_and(|name| name == "Cargo.toml") {
                 used.extend(direct(&std::fs::read_to_string(path)?));

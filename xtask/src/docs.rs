@@ -3,6 +3,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
+use crate::book;
 use crate::shell::{self, Scratch, cargo, root, run};
 
 /// No arguments.
@@ -32,5 +33,18 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut cycle = cargo(&["test", "--package", "jtc-cli", "--test", "cycle"]);
     run(cycle.env("UPDATE_DOCS", "1"))?;
     println!("wrote what the commands of docs/from-two-poses-to-a-cycle.md print");
+    for package in ["jtc-host", "ucom-host"] {
+        let mut codes = cargo(&["test", "--package", package, "--test", "codes_page"]);
+        run(codes.env("UPDATE_DOCS", "1"))?;
+        println!("wrote the part of docs/codes.md of {package}");
+    }
+    for package in ["jtc-cli", "ucom-cli"] {
+        let page = ["test", "--package", package, "--bins", "--", "the_page_of_the_commands"];
+        run(cargo(&page).env("UPDATE_DOCS", "1"))?;
+        let mut pages = cargo(&["test", "--package", package, "--test", "pages"]);
+        run(pages.env("UPDATE_DOCS", "1"))?;
+        println!("wrote what the commands of {package} are and print on the pages that show it");
+    }
+    book::make(&shell::target().join("book"))?;
     Ok(ExitCode::SUCCESS)
 }

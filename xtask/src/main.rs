@@ -4,6 +4,7 @@
 mod ahead;
 mod bench;
 mod beside;
+mod book;
 mod deny;
 mod dependencies;
 mod dist;
@@ -51,7 +52,8 @@ Usage: cargo xtask COMMAND
   emulate [--update]           boot those programs in an emulator of the chip: tests, and figures that must be those of
                                docs/board-figures.txt (--update: write them there)
   emulate --serial PATH        an emulated board with simulated drives behind a serial port, until interrupted
-  docs                         write the generated parts of docs/ again: picture and fault matrix
+  docs                         write the generated parts of docs/ again, and make the book
+  book [--out DIR]             docs/ as a book of HTML, in target/book
   dist [--out DIR] [--quick] [--twice] [--check]
                                the files of a release, in target/dist-files: static programs, Debian packages, the Python
                                wheel, images of the boards, licences, bill of materials, sums
@@ -86,6 +88,7 @@ fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
         "firmware" => firmware::main(rest),
         "emulate" => emulate::main(rest),
         "docs" => docs::main(rest),
+        "book" => book::main(rest),
         "dist" => dist::main(rest),
         "size" => size::main(rest),
         "help" | "--help" | "-h" => {

@@ -9,7 +9,7 @@ use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{
-    deny, dependencies, dist, emulate, firmware, links, python, rules, size, suite, web, worked_bytes,
+    book, deny, dependencies, dist, emulate, firmware, links, python, rules, size, suite, web, worked_bytes,
 };
 
 /// Crates that run on the board.
@@ -31,6 +31,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("every rule has a test that names it", || passed(rules::check()));
     tally.step("worked bytes of the protocol page", || passed(worked_bytes::check()));
     tally.step("links between documents", || passed(links::check()));
+    tally.step("the book has every page", || passed(book::check()));
     tally.step("every dependency is documented", || passed(dependencies::check()));
     tally.step("licences, sources and bans of dependencies", || passed(deny::check()));
     tally.step("lints", || {

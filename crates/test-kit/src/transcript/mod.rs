@@ -22,6 +22,7 @@ mod terminal;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 pub use blocks::{Block, Kind, Step, blocks};
@@ -121,7 +122,9 @@ const OWN: &str = "";
 impl Run {
     fn new(programs: &Path, page: &Path) -> Self {
         let name = page.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let folder = std::env::temp_dir().join(format!("page-{name}-{}", std::process::id()));
+        static PAGES: AtomicUsize = AtomicUsize::new(0);
+        let number = PAGES.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("page-{name}-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&folder).expect("a folder");
         let folder = folder.canonicalize().expect("a folder");
         let places = vec![("/tmp/".to_owned(), format!("{}/", folder.display()))];

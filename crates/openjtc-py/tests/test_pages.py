@@ -1,0 +1,117 @@
+"""The Python lines of the pages are run as they stand there, and print what is shown.
+
+Blocks of the kind ``pycon`` hold lines behind ``>>>`` with what they print, those of the kind ``python`` lines alone. The blocks of a page are
+run one after the other in one place, in a folder of their own. A comment directly above a block says more: ``<!-- not run: REASON -->``, or
+``<!-- numbers vary -->`` where numbers are not compared. ``UPDATE_DOCS=1`` writes what is printed into the page.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import traceback
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+BLOCK = re.compile(
+    r"(?:^<!--(?P<notes>[^\n]*)-->\n)?^```(?P<kind>pycon|python)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+)
+NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?(?:0x[0-9a-fA-F]+|\d[\d_]*(?:\.\d*)?(?:[eE][-+]?\d+)?)")
+
+
+def pages() -> list[Path]:
+    """The pages that have Python in them; none where the package is tested without its repository."""
+    candidates = [ROOT / "README.md", ROOT / "crates/openjtc-py/README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [page for page in candidates if page.exists() and BLOCK.search(page.read_text(encoding="utf-8"))]
+
+
+def examples(text: str) -> list[tuple[str, str]]:
+    """Source and shown output of each statement of a ``pycon`` block."""
+    found: list[tuple[list[str], list[str]]] = []
+    for line in text.splitlines():
+        if line == ">>>" or line.startswith(">>> "):
+            found.append(([line[4:]], []))
+        elif found and not found[-1][1] and (line == "..." or line.startswith("... ")):
+            found[-1][0].append(line[4:])
+        elif found:
+            found[-1][1].append(line)
+        else:
+            raise AssertionError(f"output before the first line that is typed: {line}")
+    return [("\n".join(source) + "\n", "\n".join(shown).rstrip()) for source, shown in found]
+
+
+def run(source: str, names: dict[str, object], mode: str) -> tuple[str, bool]:
+    """What a statement, or with "exec" a script, prints, and whether it ended in an exception."""
+    out = io.StringIO()
+    try:
+        # Bars of progress are drawn on stderr.
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+            exec(compile(source, "<page>", mode), names)
+    except Exception as error:
+        text = out.getvalue() + "Traceback (most recent call last):\n  ...\n"
+        return text + "".join(traceback.format_exception_only(error)), True
+    return out.getvalue(), False
+
+
+def same(shown: str, printed: str, varying: bool) -> bool:
+    """Whether that is what the page shows. Its ``[...]`` stands for any text."""
+
+    def prepared(text: str) -> str:
+        if varying:
+            # The number of a joint or a board tells one thing from another.
+            text = re.sub(r"\b(joints?|boards?) (\d+)", lambda m: f"{m[1]} " + "abcdefghij"[int(m[2]) % 10], text)
+            text = re.sub(r"\s", "", NUMBER.sub("#", text))
+        return "\n".join(line.rstrip() for line in text.strip("\n").splitlines())
+
+    pieces = [re.escape(prepared(piece)) for piece in shown.split("[...]")]
+    return re.fullmatch(".*".join(pieces), prepared(printed), re.DOTALL) is not None
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = page.read_text(encoding="utf-8")
+    names: dict[str, object] = {"__name__": "__page__"}
+    wrong: list[str] = []
+    ran, left_out = 0, 0
+
+    def block(match: re.Match[str]) -> str:
+        nonlocal ran, left_out
+        notes = [note.strip() for note in (match["notes"] or "").split(";")]
+        line = text.count("\n", 0, match.start()) + 1
+        reasons = [note for note in notes if note.startswith("not run:")]
+        if reasons:
+            left_out += 1
+            print(f"line {line}: {reasons[0]}")
+            return match[0]
+        ran += 1
+        if match["kind"] == "python":
+            printed, failed = run(match["text"], names, "exec")
+            if failed:
+                wrong.append(f"line {line}:\n{printed}")
+            return match[0]
+        new, before = "", len(wrong)
+        for source, shown in examples(match["text"]):
+            printed, _ = run(source, names, "single")
+            if not same(shown, printed, "numbers vary" in notes):
+                wrong.append(f"line {line}: {source}--- the page shows\n{shown}\n--- it prints\n{printed}")
+                shown = printed.rstrip()
+            for number, part in enumerate(source.removesuffix("\n").split("\n")):
+                new += f"{'...' if number else '>>>'} {part}".rstrip() + "\n"
+            new += f"{shown}\n" if shown else ""
+        return match[0] if len(wrong) == before else match[0].replace(match["text"], new)
+
+    updated = BLOCK.sub(block, text)
+    for name in ("robot", "arm", "chain"):
+        close = getattr(names.get(name), "close", None)
+        if callable(close):
+            close()
+    print(f"{page.name}: {ran} blocks run, {left_out} not")
+    if os.environ.get("UPDATE_DOCS"):
+        page.write_text(updated, encoding="utf-8")
+    else:
+        assert not wrong, "\n\n".join(wrong)

@@ -13,6 +13,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::master::InitReport;
+
 /// Longest file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -203,6 +205,26 @@ impl Inventory {
     /// All boards in the order of the chain.
     pub fn boards(&self) -> impl Iterator<Item = &InventoryBoard> {
         self.boards.values()
+    }
+
+    /// The boards of an init, with the names that people gave them in an older inventory.
+    ///
+    /// # Errors
+    /// Two boards have one flash number.
+    pub fn of_init(report: &InitReport, older: Option<&Self>) -> Result<Self, InventoryError> {
+        let mut inventory = Self::default();
+        for board in &report.boards {
+            inventory.insert(InventoryBoard {
+                number: board.number,
+                flash_number: board.info.flash_number,
+                description: board.description.clone().unwrap_or_default(),
+                name: String::new(),
+            })?;
+        }
+        if let Some(older) = older {
+            inventory.keep_names(older);
+        }
+        Ok(inventory)
     }
 
     /// Takes over the names that people gave in an older inventory, by flash number.

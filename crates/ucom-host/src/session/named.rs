@@ -12,6 +12,12 @@ impl Known {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
 
+    /// The keys of such values, in the order of the buffer.
+    pub fn keys(&self, kind: Kind) -> Vec<String> {
+        let names = self.names.names(kind);
+        keys(names, names.len())
+    }
+
     /// The units of such values, by the same keys, as far as a signal table has them.
     pub fn units(&self, kind: Kind) -> Value {
         let (names, signals) = (self.names.names(kind), self.signals.all(kind));

@@ -1,0 +1,157 @@
+"""Chains of UCoM boards on a CAN bus: numbered, looked at, driven by name under supervision, updated.
+
+>>> from openjtc import ucom
+>>> with ucom.connect("sim:") as chain:
+...     chain.init()
+...     chain.run(1, active=True, inputs={"set_position": 1500})
+...     print(chain["1.position"])
+
+The procedures are those of the command ``ucom``. Left to it are decoding and replaying recordings, signal databases, conformance
+tests that program a board, and ``ucom serve``: an agent that owns a bus is reached by HTTP, for which this package has no client yet.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Literal
+
+from openjtc import _native
+from openjtc._native import SimulatedChain
+from openjtc.errors import UsageError
+from openjtc.ucom.boards import Board, BoardValues, Signal, Signals, Value
+from openjtc.ucom.chain import Chain
+from openjtc.ucom.reports import (
+    BusState,
+    ConformanceReport,
+    ConformanceTest,
+    Event,
+    Examination,
+    Finding,
+    ProbeReport,
+    ProbeRow,
+    Progress,
+    RunReport,
+    ScanReport,
+    UpdateReport,
+    UpdateResult,
+)
+from openjtc.ucom.samples import Monitor, OutputTable, Sample, to_numpy, to_pandas
+from openjtc.ucom.session import Boards, Recording
+from openjtc.ucom.values import Settable
+
+__all__ = [
+    "Board",
+    "BoardValues",
+    "Boards",
+    "BusState",
+    "Chain",
+    "ConformanceReport",
+    "ConformanceTest",
+    "Event",
+    "Examination",
+    "Finding",
+    "Monitor",
+    "OutputTable",
+    "ProbeReport",
+    "ProbeRow",
+    "Progress",
+    "Recording",
+    "RunReport",
+    "Sample",
+    "ScanReport",
+    "Settable",
+    "Signal",
+    "Signals",
+    "SimulatedChain",
+    "UpdateReport",
+    "UpdateResult",
+    "Value",
+    "connect",
+    "sim",
+    "to_numpy",
+    "to_pandas",
+]
+
+_Path = str | os.PathLike[str]
+
+
+def sim(
+    chain: _Path | None = None,
+    *,
+    boards: int | None = None,
+    faults: _Path | None = None,
+    seed: int = 1,
+    profile: _Path | None = None,
+) -> SimulatedChain:
+    """A simulated chain in this process, in real time; the same as ``ucom sim``.
+
+    Its ``.url`` is a socketcand bus on this computer, which other programs can join. ``.fault("silent board=3 for_s=1")``
+    injects a fault (``ucom help faults``), ``.end()`` ends it.
+
+    Args:
+        chain: A chain file, TOML (``ucom help sim``); None: a head with ten boards.
+        boards: How many of its boards, 0 to 31.
+        faults: Faults to inject, TOML (``ucom help faults``).
+        seed: Of all that is drawn by chance.
+        profile: How its boards read the protocol, TOML (``ucom help profile``).
+
+    Raises:
+        UsageError: A file cannot be understood.
+    """
+    paths = (None if path is None else os.fspath(path) for path in (chain, faults, profile))
+    chain_file, fault_file, profile_file = paths
+    return SimulatedChain(chain_file, boards, fault_file, seed, profile_file)
+
+
+def connect(
+    bus: str | SimulatedChain,
+    *,
+    names: Mapping[str, int] | None = None,
+    signals: _Path | None = None,
+    inventory: _Path | None = None,
+    profile: _Path | None = None,
+    on_lost: Literal["report", "stop-board", "stop-all"] | None = None,
+    cache: _Path | bool | None = None,
+) -> Chain:
+    """A chain of boards on a bus; nothing is sent by this.
+
+    Args:
+        bus: ``"socketcan:can0"``, ``"slcan:/dev/ttyACM0@1000000"``, ``"socketcand:localhost:29536/can0"``, ``"multicast:…"``,
+            ``"sim:"`` or ``"sim:FILE"`` for a simulated chain that ends with it, or what `sim` gives.
+        names: Names of boards, beside those of the inventory: ``{"gripper": 2}``.
+        signals: A signal table, TOML: types, scales and units of signals (``ucom help edges``).
+        inventory: An inventory file, TOML: who stands where. `Chain.init` writes it, or compares with it.
+        profile: How the boards read the protocol, TOML (``ucom help profile``).
+        on_lost: What is done when a board is lost; None: by the profile, which stops all.
+        cache: A folder where the names of signals are remembered; True or None: the user's, False (and for a simulated chain
+            None): nowhere.
+
+    Raises:
+        UsageError: The URL is none, or a file cannot be understood.
+        NoLinkError: The bus cannot be opened (``bus``).
+    """
+    simulated = bus if isinstance(bus, SimulatedChain) else None
+    if isinstance(bus, str) and bus.startswith("sim:"):
+        simulated = sim(bus.removeprefix("sim:") or None, profile=profile)
+    url = bus if isinstance(bus, str) and simulated is None else ""
+    if url.startswith(("http://", "https://")):
+        raise UsageError(
+            f"{url}: an agent (ucom serve) has no client here",
+            "usage",
+            next="name the bus itself while no agent owns it, or use the HTTP interface of the agent",
+        )
+    remember = (simulated is None or cache is not None) and cache is not False
+    folder = None if cache is None or isinstance(cache, bool) else os.fspath(cache)
+    paths = [None if path is None else os.fspath(path) for path in (signals, inventory, profile)]
+    native = _native.Chain(
+        simulated.url if simulated is not None else url,
+        simulated,
+        paths[2],
+        on_lost,
+        paths[0],
+        paths[1],
+        folder,
+        remember,
+    )
+    return Chain(native, names or {}, simulated)

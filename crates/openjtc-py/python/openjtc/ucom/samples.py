@@ -1,0 +1,118 @@
+"""Outputs of boards as they come, and as tables."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from openjtc._native import ChainSamples
+from openjtc.ucom.boards import Value, _array
+
+__all__ = ["Monitor", "OutputTable", "Sample", "to_numpy", "to_pandas"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """All outputs of a board at one time.
+
+    Attributes:
+        time_s: When the last of them came, s since the chain was opened.
+        board: The number of the board.
+        outputs: By name, in the order of the buffer, in units where a signal table has them.
+        missed: Sets of outputs with gaps since the sample before, which were dropped.
+    """
+
+    time_s: float
+    board: int
+    outputs: dict[str, Value]
+    missed: int
+
+    @property
+    def array(self) -> NDArray[np.float64]:
+        """The outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
+        return _array(self.outputs)
+
+
+@dataclass(frozen=True)
+class OutputTable:
+    """The outputs of one board over time.
+
+    Attributes:
+        names: The names of the columns, M of them.
+        time_s: Shape (N,), s since the chain was opened.
+        values: Shape (N, M), in units where a signal table has them.
+    """
+
+    names: tuple[str, ...]
+    time_s: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+
+class Monitor(Iterator[Sample]):
+    """Samples as they come; ends after so many seconds or samples. Made by `Chain.monitor`.
+
+    Raises:
+        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); once.
+        NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is gone.
+    """
+
+    def __init__(self, native: ChainSamples, seconds: float | None, count: int | None) -> None:
+        self._native = native
+        self._end = None if seconds is None else time.monotonic() + seconds
+        self._left = count
+
+    def __next__(self) -> Sample:
+        if self._left is not None and self._left <= 0:
+            raise StopIteration
+        left = None if self._end is None else self._end - time.monotonic()
+        value = None if left is not None and left <= 0 else self._native.next(left)
+        if value is None:
+            raise StopIteration
+        if self._left is not None:
+            self._left -= 1
+        return Sample(value["time_s"], value["board"], dict(value["outputs"]), value["missed"])
+
+    @property
+    def dropped(self) -> int:
+        """Samples that were dropped because they were not read in time."""
+        return self._native.dropped
+
+    def to_numpy(self) -> dict[int, OutputTable]:
+        """All samples that still come, until the end, as `to_numpy` gives them."""
+        return to_numpy(self)
+
+    def to_pandas(self) -> Any:
+        """All samples that still come, until the end, as `to_pandas` gives them."""
+        return to_pandas(self)
+
+
+def to_numpy(samples: Iterable[Sample]) -> dict[int, OutputTable]:
+    """Samples as one table a board, by its number."""
+    by_board: dict[int, list[Sample]] = {}
+    for sample in samples:
+        by_board.setdefault(sample.board, []).append(sample)
+
+    def table(rows: list[Sample]) -> OutputTable:
+        times = np.array([row.time_s for row in rows], dtype=np.float64)
+        return OutputTable(tuple(rows[0].outputs), times, np.stack([row.array for row in rows]))
+
+    return {board: table(rows) for board, rows in sorted(by_board.items())}
+
+
+def to_pandas(samples: Iterable[Sample]) -> Any:
+    """Samples as a ``pandas.DataFrame``: ``time_s``, ``board``, and a column for each output.
+
+    Boards with different outputs have NaN in the columns of others.
+
+    Raises:
+        ImportError: pandas is not installed: ``pip install openjtc[pandas]``.
+    """
+    pandas = importlib.import_module("pandas")
+    rows = [{"time_s": one.time_s, "board": one.board, **one.outputs} for one in samples]
+    return pandas.DataFrame(rows, columns=None if rows else ["time_s", "board"])

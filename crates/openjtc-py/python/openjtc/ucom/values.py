@@ -1,0 +1,196 @@
+"""Boards of a chain and their values by name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from openjtc import _native
+from openjtc._native import SimulatedChain
+from openjtc.errors import UsageError
+from openjtc.ucom.boards import Board, BoardValues, Signals, Value
+from openjtc.ucom.reports import ScanReport
+from openjtc.ucom.samples import Monitor
+from openjtc.ucom.session import Boards, Session
+
+__all__ = ["Settable", "ValuesByName"]
+
+#: A value to set: a number, a number with its unit (``"15.5 deg"``), a word as it is (``"0x05DC"``), or a switch.
+Settable = bool | int | float | str
+_Path = str | os.PathLike[str]
+
+
+def _text(value: Settable, unit: str = "") -> str:
+    """A value as `ucom` takes it."""
+    if isinstance(value, str):
+        return f"{value} {unit}".strip()
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    number = int(value) if float(value).is_integer() else float(value)
+    return f"{number!r} {unit}".strip()
+
+
+def _value(value: Any) -> Value:
+    assert value is None or isinstance(value, (bool, int, float))
+    return value
+
+
+class ValuesByName(Session):
+    """What a chain has of boards and values; see `openjtc.ucom.Chain`."""
+
+    def __init__(self, native: _native.Chain, names: Mapping[str, int], simulated: SimulatedChain | None) -> None:
+        super().__init__(native, names, simulated)
+        self._boards: dict[int, Board] = {}
+
+    def scan(self) -> ScanReport:
+        """Asks who is there; changes nothing.
+
+        Raises:
+            NoLinkError: No board answers (``no-boards``).
+            RefusedError: Two boards have one number (``number-shared``).
+        """
+        value = self._native.scan()
+        return ScanReport(self._keep(value["boards"]), tuple(value["reports"]), tuple(value["findings"]))
+
+    @property
+    def boards(self) -> dict[int, Board]:
+        """The boards by number, as last seen; the first time it asks who is there."""
+        if not self._boards:
+            self.scan()
+        return dict(self._boards)
+
+    def signals(self, board: int | str) -> Signals:
+        """The inputs, outputs and parameters of a board.
+
+        Raises:
+            RefusedError: Its application is not started, and its names are not remembered (``no-application``): `start` it.
+        """
+        (value,) = self._native.signals(str(self._number(board)))
+        return Signals._of(value)
+
+    def initial_inputs(self, board: int | str) -> dict[str, Value]:
+        """What a board wants its inputs to be at first; its application has to be started."""
+        return dict(self._native.initial_inputs(self._number(board)))
+
+    def set(
+        self,
+        name: str,
+        value: Settable,
+        *,
+        unit: str = "",
+        kind: Literal["input", "parameter"] | None = None,
+        force: bool = False,
+    ) -> Value:
+        """Sets an input, or writes a parameter.
+
+        An input is sent at once, and again and again while its board runs. Boards have no way to read parameters back, and lose
+        them when their application ends.
+
+        Args:
+            name: ``BOARD.NAME``, in any case, or the name alone where one board has it.
+            value: A number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch.
+            unit: Its unit, where the signal has one by the signal table: bare numbers are refused there.
+            kind: Which of the two, where an input and a parameter have the same name; otherwise the input is set.
+            force: Also when another PC is on the bus.
+
+        Returns:
+            What was sent, in the unit of the signal: between two words the nearer one is taken.
+
+        Raises:
+            UsageError: There is no such signal (``no-edge``).
+            RefusedError: Out of range, or without its unit (``value``, with ``.value`` and ``.limit``).
+        """
+        board, signal = self._find(name)
+        return _value(self._native.set(board, kind, signal, _text(value, unit), force))
+
+    def __setitem__(self, name: str, value: Settable) -> None:
+        self.set(name, value)
+
+    def __getitem__(self, name: str) -> Value:
+        """An output by its name; else an input as last set, or a parameter as written (None: not known).
+
+        Raises:
+            NoLinkError: The board sends no outputs (``no-outputs``), or none for half a second (``stale``).
+            FaultError: It was lost, or has left its control loop by itself.
+        """
+        board, signal = self._find(name)
+        return _value(self._native.value(board, signal))
+
+    def values(self) -> dict[str, Value]:
+        """The last outputs of all boards that this chain runs, by ``NUMBER.NAME``; see `board_values` for their age.
+
+        Raises:
+            FaultError: A board was lost, or has left its control loop by itself.
+        """
+        self.check()
+        boards = [BoardValues._of(value) for value in self._native.running()]
+        return {f"{one.board}.{name}": value for one in boards for name, value in one.outputs.items()}
+
+    def board_values(self, boards: Boards = "all") -> dict[int, BoardValues]:
+        """Outputs with their age, inputs and parameters of boards, also of those that another program runs."""
+        all_values = (BoardValues._of(value) for value in self._native.values(self._list(boards)))
+        return {one.board: one for one in all_values}
+
+    def monitor(
+        self, boards: Boards | None = None, *, seconds: float | None = None, count: int | None = None
+    ) -> Monitor:
+        """Outputs of boards as they come, an iterator of `Sample`; ``.to_pandas()`` and ``.to_numpy()`` make tables of it.
+
+        Args:
+            boards: Which, also such as another program runs; None: those that this chain runs, or all where it runs none.
+            seconds: End after so many seconds.
+            count: End after so many samples.
+        """
+        return Monitor(self._native.samples(None if boards is None else self._list(boards)), seconds, count)
+
+    def save_parameters(self, path: _Path, boards: Boards = "all") -> None:
+        """Writes a parameter file, YAML: what was written last as values, all other names as comments."""
+        Path(path).write_text(self._native.parameters_text(self._list(boards)), encoding="utf-8")
+
+    def apply_parameters(self, path: _Path, *, dry_run: bool = False, force: bool = False) -> int:
+        """Checks a whole parameter file against boards, programs, names and ranges, then writes it. How many parameters."""
+        return self._native.apply_parameters(os.fspath(path), dry_run, force)
+
+    def _keep(self, boards: list[dict[str, Any]]) -> tuple[Board, ...]:
+        all_boards = tuple(Board._of(one, self) for one in boards)
+        self._boards = {board.number: board for board in all_boards}
+        self._inventory_names = {board.name.lower(): board.number for board in all_boards if board.name}
+        return all_boards
+
+    def _seen(self, boards: list[dict[str, Any]], whole: bool = False) -> dict[int, Board]:
+        for one in boards:
+            known = self._boards.get(one["number"])
+            if not whole and not one["description"] and known and known.flash_number == one["flash_number"]:
+                one["description"] = known.description
+        seen = {one["number"]: Board._of(one, self) for one in boards}
+        self._boards.update(seen)
+        return seen
+
+    def _find(self, name: str) -> tuple[int, str]:
+        """Board and signal of a name."""
+        first, dot, rest = name.partition(".")
+        number = self._named(first) if dot else None
+        if number is not None and rest:
+            return self._number(number), rest
+        short = name.strip().lower()
+        found = [
+            number
+            for number in self.boards
+            if any(short in (signal.name.lower(), signal.text.lower()) for signal in self.signals(number))
+        ]
+        if len(found) == 1:
+            return found[0], name
+        if not found:
+            raise UsageError(f"no board has a signal {name!r}", "no-edge", next="boards[N].signals lists the names")
+        listed = ", ".join(f"{number}.{name}" for number in found)
+        raise UsageError(f"several boards have a signal {name!r}", "no-edge", next=f"name one of {listed}")
+
+    def _given(self, values: Mapping[str, Settable]) -> list[tuple[int | None, str, str]]:
+        def one(name: str, value: Settable) -> tuple[int | None, str, str]:
+            first, dot, rest = name.partition(".")
+            number = self._named(first) if dot else None
+            return (None, name, _text(value)) if number is None else (number, rest, _text(value))
+
+        return [one(name, value) for name, value in values.items()]

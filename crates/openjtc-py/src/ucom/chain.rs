@@ -1,0 +1,344 @@
+//! A chain of boards as Python has it: thin calls into the thread that owns its session.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use host_kit::user_folder;
+use pyo3::prelude::*;
+use serde_json::Value;
+use ucom_host::files::{Inventory, SignalTable};
+use ucom_host::master::StopLevel;
+use ucom_host::master::io::Kind as Buffer;
+use ucom_host::session::{Assignment, Boards, Cache, Link, SessionError};
+
+use super::failure::BoardFailure;
+use super::hands::Config;
+use super::owner::Owner;
+use super::recording::{ChainRecording, Sink, Tap};
+use super::samples::ChainSamples;
+use super::shared::{Halt, Kind, Listener};
+use super::simulated::{Simulated, SimulatedChain};
+use super::update::{Source, Update};
+use super::{procedures, running, update, values};
+use crate::error::Failure;
+use crate::json;
+
+type Object<'py> = PyResult<Bound<'py, PyAny>>;
+/// A board, a name and a value, all as Python gives them.
+type Given = (Option<u8>, String, String);
+
+/// A chain of boards on a bus.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct Chain {
+    pub owner: Owner,
+    url: String,
+    profile: ucom::Profile,
+    sink: Sink,
+}
+
+fn boards(text: &str) -> Result<Boards, BoardFailure> {
+    text.parse().map_err(BoardFailure::usage)
+}
+
+fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, BoardFailure> {
+    let one = |(board, name, value): Given| {
+        let value = value.parse().map_err(|e| BoardFailure::usage(format!("{name}: {e}")))?;
+        Ok(Assignment { board, name, value })
+    };
+    values.into_iter().map(one).collect()
+}
+
+fn plain(py: Python<'_>, value: Value) -> Object<'_> {
+    json::to_python(py, &value)
+}
+
+#[pymethods]
+impl Chain {
+    #[new]
+    #[pyo3(signature = (url, simulated=None, profile=None, on_lost=None, signals=None, inventory=None, cache=None, remember=true))]
+    #[allow(clippy::too_many_arguments, reason = "they are named in Python")]
+    fn new(
+        py: Python<'_>,
+        url: String,
+        simulated: Option<Py<SimulatedChain>>,
+        profile: Option<PathBuf>,
+        on_lost: Option<&str>,
+        signals: Option<PathBuf>,
+        inventory: Option<PathBuf>,
+        cache: Option<PathBuf>,
+        remember: bool,
+    ) -> Result<Self, BoardFailure> {
+        let profile = procedures::profile(profile.as_deref(), on_lost)?;
+        let signals = signals.map(|path| SignalTable::read(&path)).transpose();
+        let signals =
+            signals.map_err(|e| Failure::usage(e.to_string()).next("ucom help edges shows the form"))?;
+        let listed = inventory.as_deref().filter(|path| path.exists()).map(Inventory::read).transpose();
+        let simulated: Option<Arc<Simulated>> = simulated.map(|chain| chain.get().inner.clone());
+        let folder = || Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom"));
+        let cache = cache.or_else(folder).filter(|_| remember);
+        let config = Config {
+            profile,
+            signals: signals.unwrap_or_default(),
+            cache: Cache::new(cache, false),
+            inventory: listed.map_err(|e| Failure::usage(e.to_string()))?,
+            inventory_file: inventory,
+            simulated,
+        };
+        let sink = Sink::default();
+        let (own, opened) = (sink.clone(), url.clone());
+        let link = py.detach(|| {
+            let bus = can_link::open(&opened).map_err(|e| SessionError::Open(Box::new(e)))?;
+            Ok::<_, SessionError>(Link::on(Box::new(Tap::new(bus, own)), &opened))
+        })?;
+        Ok(Self { owner: Owner::new(config, link), url, profile, sink })
+    }
+
+    #[getter]
+    fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Load, frames and time of the bus.
+    fn bus<'py>(&self, py: Python<'py>) -> Object<'py> {
+        plain(py, self.owner.shared.bus())
+    }
+
+    fn events<'py>(&self, py: Python<'py>, after: u64) -> Object<'py> {
+        plain(py, self.owner.shared.events(after))
+    }
+
+    fn check(&self) -> Result<(), BoardFailure> {
+        self.owner.shared.check()
+    }
+
+    fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.owner.close(py)
+    }
+
+    fn scan<'py>(&self, py: Python<'py>) -> Object<'py> {
+        plain(py, self.owner.call(py, procedures::scan)?)
+    }
+
+    fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
+        plain(py, self.owner.call(py, move |hands| procedures::init(hands, renew, force, check))?)
+    }
+
+    fn info<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(py, self.owner.call(py, move |hands| procedures::info(hands, &boards))?)
+    }
+
+    fn status<'py>(
+        &self,
+        py: Python<'py>,
+        boards: &str,
+        set: Vec<String>,
+        clear: Vec<String>,
+        force: bool,
+    ) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(
+            py,
+            self.owner.call(py, move |hands| procedures::status(hands, &boards, (&set, &clear), force))?,
+        )
+    }
+
+    fn start<'py>(&self, py: Python<'py>, boards: &str, force: bool) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(py, self.owner.call(py, move |hands| running::start(hands, &boards, force))?)
+    }
+
+    fn xreset<'py>(&self, py: Python<'py>, boards: &str, force: bool) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(py, self.owner.call(py, move |hands| procedures::xreset(hands, &boards, force))?)
+    }
+
+    fn reset(&self, py: Python<'_>, boards: &str, force: bool) -> PyResult<Vec<u8>> {
+        let boards = self::boards(boards)?;
+        self.owner.call(py, move |hands| procedures::reset(hands, &boards, force))
+    }
+
+    fn repair<'py>(&self, py: Python<'py>, board: u8, flash_number: Option<u16>, force: bool) -> Object<'py> {
+        plain(py, self.owner.call(py, move |hands| procedures::repair(hands, board, flash_number, force))?)
+    }
+
+    fn stop<'py>(&self, py: Python<'py>, boards: &str, application: bool) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        let halt = match &boards {
+            Boards::All => Halt::All,
+            Boards::Some(numbers) => Halt::Boards(numbers.clone()),
+            Boards::None => Halt::Boards(Vec::new()),
+        };
+        let level = if application { StopLevel::Application } else { StopLevel::Loop };
+        plain(py, self.owner.stop(py, halt, move |hands| running::stop(hands, &boards, level))?)
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "they are named in Python")]
+    fn run<'py>(
+        &self,
+        py: Python<'py>,
+        boards: &str,
+        active: bool,
+        inputs: Vec<Given>,
+        parameters: Vec<Given>,
+        file: Option<PathBuf>,
+        texts: bool,
+        force: bool,
+    ) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        let (inputs, parameters) = (assignments(inputs)?, assignments(parameters)?);
+        let run = running::Run { boards, active, inputs, parameters, file, texts, force };
+        plain(py, self.owner.call(py, move |hands| running::run(hands, &run))?)
+    }
+
+    fn outputs(&self, py: Python<'_>, boards: &str, active: bool) -> PyResult<()> {
+        let boards = self::boards(boards)?;
+        self.owner.call(py, move |hands| running::outputs(hands, &boards, active))
+    }
+
+    fn signals<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(py, self.owner.call(py, move |hands| values::signals(hands, &boards))?)
+    }
+
+    fn initial_inputs<'py>(&self, py: Python<'py>, board: u8) -> Object<'py> {
+        plain(py, self.owner.call(py, move |hands| values::initial_inputs(hands, board))?)
+    }
+
+    fn set<'py>(
+        &self,
+        py: Python<'py>,
+        board: u8,
+        kind: Option<&str>,
+        name: String,
+        value: String,
+        force: bool,
+    ) -> Object<'py> {
+        let buffer = match kind {
+            None => None,
+            Some("input") => Some(Buffer::Ci),
+            Some("parameter") => Some(Buffer::Par),
+            Some(other) => {
+                let text = format!("kind: {other:?} is neither input nor parameter");
+                return Err(BoardFailure::usage(text).into());
+            }
+        };
+        let set = move |hands: &mut _| values::set(hands, board, buffer, (&name, &value), force);
+        plain(py, self.owner.call(py, set)?)
+    }
+
+    fn value<'py>(&self, py: Python<'py>, board: u8, name: String) -> Object<'py> {
+        plain(py, self.owner.call(py, move |hands| values::value(hands, board, &name))?)
+    }
+
+    fn values<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        plain(py, self.owner.call(py, move |hands| values::values(hands, &boards))?)
+    }
+
+    fn running<'py>(&self, py: Python<'py>) -> Object<'py> {
+        plain(py, self.owner.call(py, values::running)?)
+    }
+
+    fn parameters_text(&self, py: Python<'_>, boards: &str) -> PyResult<String> {
+        let boards = self::boards(boards)?;
+        self.owner.call(py, move |hands| values::parameters_text(hands, &boards))
+    }
+
+    fn apply_parameters(&self, py: Python<'_>, path: PathBuf, dry_run: bool, force: bool) -> PyResult<usize> {
+        self.owner.call(py, move |hands| values::apply_parameters(hands, &path, dry_run, force))
+    }
+
+    /// Samples of boards from now on.
+    fn samples(this: PyRef<'_, Self>, py: Python<'_>, boards: Option<&str>) -> PyResult<ChainSamples> {
+        let boards = boards.map(self::boards).transpose()?;
+        let listener = this.owner.call(py, move |hands| {
+            let running: Vec<u8> = hands.local.borrow().running.iter().copied().collect();
+            let numbers = match boards {
+                None if !running.is_empty() => running,
+                boards => hands.driver.numbers(&boards.unwrap_or(Boards::All))?,
+            };
+            for board in &numbers {
+                hands.known(*board)?;
+            }
+            let listener = Arc::new(Listener::new(numbers.into_iter().collect()));
+            hands.shared.listen(&listener);
+            Ok(listener)
+        })?;
+        Ok(ChainSamples { chain: this.into(), listener })
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "they are named in Python")]
+    fn update<'py>(
+        &self,
+        py: Python<'py>,
+        boards: &str,
+        image: (Option<PathBuf>, Option<Vec<u8>>),
+        second: (Option<PathBuf>, Option<Vec<u8>>),
+        flash_number: Option<u16>,
+        date: Option<(u16, u8, u8)>,
+        addresses: Option<String>,
+        expect_program_id: Option<u16>,
+        flags: [bool; 8],
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> Object<'py> {
+        let source = |(file, bytes): (Option<PathBuf>, Option<Vec<u8>>)| {
+            file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
+        };
+        let [raw, name_target, group, start, dry_run, unverified, force, check] = flags;
+        let update = Update {
+            boards: self::boards(boards)?,
+            image: source(image).ok_or_else(|| BoardFailure::usage("there is no image"))?,
+            second: source(second),
+            flash_number,
+            raw,
+            addresses,
+            date,
+            expect_program_id,
+            name_target,
+            group,
+            start,
+            dry_run,
+            unverified,
+            force,
+            check,
+        };
+        let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, &update, report);
+        plain(py, self.owner.call_with(py, Kind::Update, progress.as_ref(), act)?)
+    }
+
+    fn doctor<'py>(&self, py: Python<'py>) -> Object<'py> {
+        plain(py, self.owner.call(py, procedures::doctor)?)
+    }
+
+    fn probe<'py>(
+        &self,
+        py: Python<'py>,
+        init: bool,
+        alive: bool,
+        image: Option<PathBuf>,
+        force: bool,
+    ) -> Object<'py> {
+        let act = move |hands: &mut _| procedures::probe(hands, (init, alive, force), image.as_deref());
+        plain(py, self.owner.call(py, act)?)
+    }
+
+    fn conformance<'py>(
+        &self,
+        py: Python<'py>,
+        boards: &str,
+        init: bool,
+        run: bool,
+        only: Vec<String>,
+        force: bool,
+    ) -> Object<'py> {
+        let boards = self::boards(boards)?;
+        let act = move |hands: &mut _| procedures::conformance(hands, &boards, (init, run, force), only);
+        plain(py, self.owner.call(py, act)?)
+    }
+
+    fn record(&self, py: Python<'_>, path: PathBuf) -> Result<ChainRecording, BoardFailure> {
+        let channel = self.url.rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
+        Ok(py.detach(|| ChainRecording::begin(self.sink.clone(), &path, self.profile, &channel))?)
+    }
+}

@@ -1,0 +1,116 @@
+//! The operator of the session: what happens on the bus becomes events, samples and alarms, also in the middle of a procedure.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use serde_json::json;
+use ucom_host::master::io::Snapshot;
+use ucom_host::master::{Event, Master, Supervision};
+use ucom_host::session::{Followed, Known, Link, Notice, Operator};
+
+use super::shared::{Halt, Shared};
+
+/// What the owner's thread remembers, also in the middle of a procedure.
+#[derive(Default)]
+pub struct Local {
+    pub followed: Followed,
+    pub snapshots: BTreeMap<u8, Snapshot>,
+    pub known: BTreeMap<u8, Arc<Known>>,
+    /// Boards whose applications this session has started, and those whose control loops.
+    pub started: BTreeSet<u8>,
+    pub running: BTreeSet<u8>,
+    /// The Stop at the session's end is on the bus.
+    end_sent: bool,
+    now_us: u64,
+}
+
+/// The operator of the session.
+pub struct Hand {
+    pub shared: Arc<Shared>,
+    pub local: Rc<RefCell<Local>>,
+}
+
+impl Hand {
+    /// A change of a board that runs: an event, and an alarm where it was lost or has left its loop by itself.
+    pub fn noticed(shared: &Shared, local: &Local, notice: &Notice, text: Option<&String>) {
+        let Notice { board, change, time_s, .. } = *notice;
+        let text = notice.text().or_else(|| text.cloned());
+        let text = text.unwrap_or_else(|| format!("board {board}: {}", change.name()));
+        shared.event(time_s, change.name(), Some(board), text);
+        shared.alarm(change, board, (local.running.contains(&board), !local.started.is_empty()));
+    }
+}
+
+impl Operator for Hand {
+    fn stop_asked(&self) -> bool {
+        self.shared.is_cancelled()
+    }
+
+    fn note(&self, text: String) {
+        let time_s = self.local.borrow().now_us as f64 * 1e-6;
+        self.shared.event(time_s, "note", None, text);
+    }
+
+    fn happened(&self, event: &Event, text: Option<String>) {
+        let mut local = self.local.borrow_mut();
+        let now_us = local.now_us;
+        let time_s = now_us as f64 * 1e-6;
+        if let Some(notice) = local.followed.see(event, now_us) {
+            Self::noticed(&self.shared, &local, &notice, text.as_ref());
+        }
+        let (kind, board) = match event {
+            Event::Snapshot { board, snapshot } => {
+                if let Some(known) = local.known.get(board) {
+                    self.shared.sampled(known, snapshot);
+                }
+                local.snapshots.insert(*board, snapshot.clone());
+                return;
+            }
+            // Of boards that run it is an event already.
+            Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
+            Event::Supervision { .. } => return,
+            Event::BoardError { board, .. } => ("error", Some(*board)),
+            Event::Debug { board, text } => {
+                self.shared.event(time_s, "text", Some(*board), text.clone());
+                return;
+            }
+            Event::CompetingMaster { .. } => ("competing-master", None),
+            Event::Foreign(_) => ("foreign", None),
+            Event::NumberShared { board, .. } => ("number-shared", Some(*board)),
+            _ => ("note", None),
+        };
+        if let Some(text) = text {
+            self.shared.event(time_s, kind, board, text);
+        }
+    }
+
+    fn turned(&self, master: &mut Master, link: &mut Link) {
+        let mut local = self.local.borrow_mut();
+        local.now_us = link.now_us();
+        let mut halts = self.shared.halts();
+        if self.shared.has_ended() && !local.end_sent {
+            // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
+            local.end_sent = true;
+            halts.push(Halt::Started);
+        }
+        for halt in halts {
+            match halt {
+                Halt::All => master.stop_at_once(local.now_us, None),
+                Halt::Boards(boards) => master.stop_at_once(local.now_us, Some(&boards)),
+                Halt::Started if local.started.is_empty() => {}
+                Halt::Started => {
+                    let started: Vec<u8> = local.started.iter().copied().collect();
+                    master.stop_at_once(local.now_us, Some(&started));
+                }
+            }
+        }
+        self.shared.seen(json!({
+            "load_percent": master.statistics().load_percent(local.now_us),
+            "received": master.statistics().received,
+            "is_master": master.is_master(),
+            "time_s": local.now_us as f64 * 1e-6,
+        }));
+    }
+}

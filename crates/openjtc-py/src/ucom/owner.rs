@@ -1,0 +1,196 @@
+//! The thread that owns a session: what is asked of it is done one after the other, and a stop before all.
+
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use host_kit::ErrorKind;
+use pyo3::prelude::*;
+use serde_json::Value;
+use ucom_host::session::Link;
+
+use super::failure::BoardFailure;
+use super::hands::{Config, Hands};
+use super::shared::{Halt, Kind, Shared, Work, failure, fault, lock};
+use crate::json;
+
+/// So often signals (Ctrl-C) are looked at while Python waits.
+pub const LOOK: Duration = Duration::from_millis(50);
+
+/// What a call hears of what it asked for.
+enum Message<T> {
+    Progress(Value),
+    Done(Result<T, BoardFailure>),
+}
+
+/// The thread that owns a session.
+pub struct Owner {
+    pub shared: Arc<Shared>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl Owner {
+    /// Takes an open bus.
+    pub fn new(config: Config, link: Link) -> Self {
+        let shared = Arc::new(Shared::default());
+        let own = shared.clone();
+        let thread = std::thread::spawn(move || {
+            // Where this thread has a fault nobody waits for it without end.
+            let gone = Gone(&own);
+            let mut hands = Hands::new(own.clone(), config, link);
+            match hands.serve() {
+                Ok(()) => {
+                    own.left(hands.leave());
+                    own.close(failure(ErrorKind::NoLink, "closed", "the chain is closed", "connect again"));
+                }
+                Err(error) => {
+                    own.left(hands.started());
+                    own.close(error.into());
+                }
+            }
+            drop(gone);
+        });
+        Self { shared, thread: Mutex::new(Some(thread)) }
+    }
+
+    /// Has something done and waits for it without the GIL. Ctrl-C ends it, and stops what this session has started.
+    pub fn call<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
+    ) -> PyResult<T> {
+        self.call_with(py, Kind::Command, None, |hands, _| act(hands))
+    }
+
+    /// The same; `progress` is called with what is reported on the way.
+    pub fn call_with<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        kind: Kind,
+        progress: Option<&Bound<'_, PyAny>>,
+        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
+    ) -> PyResult<T> {
+        let (id, heard) = self.ask(kind, act);
+        loop {
+            let result = match self.wait(py, &heard)? {
+                Heard::Done(result) => return Ok(result?),
+                Heard::Progress(value) => match progress {
+                    Some(progress) => {
+                        json::to_python(py, &value).and_then(|value| progress.call1((value,))).map(drop)
+                    }
+                    None => Ok(()),
+                },
+                Heard::Nothing => py.check_signals(),
+            };
+            if let Err(error) = result {
+                self.shared.cancel(id);
+                self.interrupted(py);
+                return Err(error);
+            }
+        }
+    }
+
+    /// Ctrl-C came: what this session has started is stopped, and waited for; another Ctrl-C ends only the waiting.
+    pub fn interrupted(&self, py: Python<'_>) {
+        let (_, heard) = self.ask(Kind::Stop, |hands, _| {
+            hands.leave();
+            Ok(())
+        });
+        self.shared.halt(Halt::Started);
+        while let Ok(Heard::Nothing) = self.wait(py, &heard) {
+            if py.check_signals().is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Stops boards at once, whatever goes on, and then what `act` does.
+    pub fn stop<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        halt: Halt,
+        act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
+    ) -> PyResult<T> {
+        let (_, heard) = self.ask(Kind::Stop, |hands, _| act(hands));
+        self.shared.halt(halt);
+        loop {
+            match self.wait(py, &heard)? {
+                Heard::Done(result) => return Ok(result?),
+                // It is a stop already.
+                _ => py.check_signals()?,
+            }
+        }
+    }
+
+    fn ask<T: Send + 'static>(
+        &self,
+        kind: Kind,
+        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
+    ) -> (u64, Mutex<mpsc::Receiver<Message<T>>>) {
+        let (sender, heard) = mpsc::channel();
+        let id = self.shared.next_id();
+        let act = move |hands: Result<&mut Hands, BoardFailure>| {
+            let report = |value| drop(sender.send(Message::Progress(value)));
+            let done = hands.and_then(|hands| {
+                let done = act(hands, &report);
+                hands.settle();
+                done
+            });
+            // Who has given up needs no answer.
+            let _ = sender.send(Message::Done(done));
+        };
+        self.shared.put(Work { id, kind, act: Box::new(act) });
+        (id, Mutex::new(heard))
+    }
+
+    fn wait<T: Send>(&self, py: Python<'_>, heard: &Mutex<mpsc::Receiver<Message<T>>>) -> PyResult<Heard<T>> {
+        py.detach(|| match lock(heard).recv_timeout(LOOK) {
+            Ok(Message::Progress(value)) => Ok(Heard::Progress(value)),
+            Ok(Message::Done(result)) => Ok(Heard::Done(result)),
+            Err(mpsc::RecvTimeoutError::Timeout) => Ok(Heard::Nothing),
+            Err(mpsc::RecvTimeoutError::Disconnected) => Err(fault().into()),
+        })
+    }
+
+    /// Stops what this session has started, and lets the bus go. Returns the boards whose end is not certain.
+    pub fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.shared.end();
+        loop {
+            let over = py.detach(|| {
+                std::thread::sleep(Duration::from_millis(2));
+                lock(&self.thread).as_ref().is_none_or(JoinHandle::is_finished)
+            });
+            if over {
+                break;
+            }
+            py.check_signals()?;
+        }
+        if let Some(thread) = lock(&self.thread).take() {
+            // A panic of that thread has been printed.
+            drop(thread.join());
+        }
+        Ok(self.shared.take_left())
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        // The thread stops what was started; nobody waits here, who may have the GIL.
+        self.shared.end();
+    }
+}
+
+/// What came within a moment.
+enum Heard<T> {
+    Nothing,
+    Progress(Value),
+    Done(Result<T, BoardFailure>),
+}
+
+struct Gone<'a>(&'a Shared);
+
+impl Drop for Gone<'_> {
+    fn drop(&mut self) {
+        self.0.close(fault());
+    }
+}

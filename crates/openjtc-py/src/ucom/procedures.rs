@@ -1,0 +1,282 @@
+//! What is done with a chain: the procedures of `ucom-host`, in the order in which `ucom` calls them.
+
+use std::path::Path;
+use std::time::Duration;
+
+use host_kit::ErrorKind;
+use serde_json::{Value, json};
+use ucom::profile::OnLost;
+use ucom::{Profile, Status};
+use ucom_host::ProfileFile as _;
+use ucom_host::files::{Image, ImageOptions, Inventory};
+use ucom_host::master::conformance::ConformanceOptions;
+use ucom_host::master::probe::ProbeOptions;
+use ucom_host::master::{InitOptions, Outcome, Reports, Request};
+use ucom_host::session::{Boards, Numbered, SessionError, nothing_shared};
+
+use super::failure::BoardFailure;
+use super::hands::Hands;
+use super::objects;
+use crate::error::Failure;
+
+/// How long a doctor listens before it asks.
+const LISTEN: Duration = Duration::from_millis(1500);
+
+/// The profile of a file, or the defaults; what is done about a lost board may be another.
+pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, BoardFailure> {
+    let mut profile = match path {
+        None => Profile::default(),
+        Some(path) => {
+            let wrong = |e: &dyn std::fmt::Display| {
+                Failure::usage(format!("{}: {e}", path.display())).next("ucom help profile lists every key")
+            };
+            let text = std::fs::read_to_string(path).map_err(|e| wrong(&e))?;
+            Profile::from_toml(&text).map_err(|e| wrong(&e))?
+        }
+    };
+    profile.on_lost = match on_lost {
+        None => profile.on_lost,
+        Some("report") => OnLost::Report,
+        Some("stop-board") => OnLost::StopBoard,
+        Some("stop-all") => OnLost::StopAll,
+        Some(other) => {
+            return Err(BoardFailure::usage(format!(
+                "on_lost: {other:?} is none of report, stop-board, stop-all"
+            )));
+        }
+    };
+    Ok(profile)
+}
+
+/// A failure that several findings are.
+fn findings(kind: ErrorKind, code: &str, texts: &[String], next: &str) -> BoardFailure {
+    let facts = Default::default();
+    Failure { kind, code: code.into(), message: texts.join("; "), next: next.into(), facts }.into()
+}
+
+/// Who is there; changes nothing.
+pub fn scan(hands: &mut Hands) -> Result<Value, BoardFailure> {
+    let report = match hands.driver.run(Request::Scan)? {
+        Outcome::Scan(report) => report,
+        other => return Err(SessionError::from(other).into()),
+    };
+    if report.boards.is_empty() && report.reports.ids.is_empty() {
+        return Err(SessionError::NoBoards.into());
+    }
+    nothing_shared(&hands.driver.master)?;
+    let profile = hands.driver.master.profile();
+    Ok(json!({
+        "boards": objects::boards(&report.boards, &profile, hands.inventory.as_ref()),
+        "reports": report.reports.ids,
+        "findings": objects::texts(&report.findings),
+    }))
+}
+
+/// Resets and numbers the whole chain.
+pub fn init(hands: &mut Hands, renew: bool, force: bool, check: bool) -> Result<Value, BoardFailure> {
+    // What another program has written there since is compared with, as well.
+    if let Some(file) = hands.inventory_file.as_deref().filter(|file| file.exists()) {
+        hands.inventory = Some(Inventory::read(file).map_err(|e| Failure::usage(e.to_string()))?);
+    }
+    let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
+    let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
+    let options = InitOptions { expected: expected.unwrap_or_default(), force };
+    let outcome = hands.driver.run(Request::Init(options));
+    hands.renumbered(match &outcome {
+        Ok(Outcome::Init(report)) => Some(report),
+        _ => None,
+    });
+    let report = match outcome? {
+        Outcome::Init(report) => report,
+        other => return Err(SessionError::from(other).into()),
+    };
+    if report.is_ok() {
+        let made = Inventory::of_init(&report, hands.inventory.as_ref());
+        let inventory = made.map_err(|e| Failure::usage(e.to_string()))?;
+        if let Some(file) = &hands.inventory_file {
+            inventory.write(file).map_err(|e| Failure::usage(e.to_string()))?;
+        }
+        hands.inventory = Some(inventory);
+    }
+    let texts = objects::texts(&report.findings);
+    if let Some(kind) = report.failure().filter(|_| check) {
+        return Err(findings(kind, "init", &texts, "doctor() looks for the reason"));
+    }
+    let profile = hands.driver.master.profile();
+    Ok(json!({
+        "boards": objects::boards(&report.boards, &profile, hands.inventory.as_ref()),
+        "reports": report.reports.ids,
+        "findings": texts,
+    }))
+}
+
+/// What boards report about themselves.
+pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+    let mut all = Vec::new();
+    for board in hands.driver.numbers(boards)? {
+        all.push(hands.driver.seen(board)?);
+    }
+    let profile = hands.driver.master.profile();
+    Ok(objects::boards(&all, &profile, hands.inventory.as_ref()))
+}
+
+/// Boards by their status.
+pub fn numbered(hands: &Hands, all: &[Numbered]) -> Value {
+    let profile = hands.driver.master.profile();
+    all.iter().map(|(n, info)| objects::info(*n, info, &profile, hands.inventory.as_ref())).collect()
+}
+
+/// Names of status bits as bits.
+fn bits(names: &[String]) -> Result<Status, BoardFailure> {
+    let bit = |name: &String| {
+        Status::bit(name).ok_or_else(|| {
+            let names: Vec<&str> = Status::NAMES.iter().map(|(name, _)| *name).collect();
+            BoardFailure::usage(format!("there is no bit {name:?}; there are {}", names.join(" ")))
+        })
+    };
+    names.iter().try_fold(Status(0), |all, name| Ok(all | bit(name)?))
+}
+
+/// Status bits, after setting and clearing some.
+pub fn status(
+    hands: &mut Hands,
+    boards: &Boards,
+    (set, clear): (&[String], &[String]),
+    force: bool,
+) -> Result<Value, BoardFailure> {
+    let (set, clear) = (bits(set)?, bits(clear)?);
+    let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
+    if both != Status(0) {
+        return Err(BoardFailure::usage(format!("{both}: cannot be set and cleared at once")));
+    }
+    if mirrors != Status(0) {
+        let text = format!("{mirrors}: mirrors reality and cannot be written");
+        return Err(Failure::usage(text)
+            .next("start(), stop() and init() change what these bits show")
+            .into());
+    }
+    let numbers = hands.driver.numbers(boards)?;
+    let all = match set | clear {
+        Status(0) => hands.driver.statuses(&numbers)?,
+        mask => hands.driver.change_each(&numbers, |board| Request::SetStatus {
+            board,
+            mask,
+            value: set,
+            force,
+        })?,
+    };
+    Ok(numbered(hands, &all))
+}
+
+/// PC_XRESET: exloader with programming enabled.
+pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, BoardFailure> {
+    let numbers = hands.driver.numbers(boards)?;
+    let all = hands.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
+    numbers.iter().for_each(|board| hands.forget(*board));
+    Ok(numbered(hands, &all))
+}
+
+/// PC_RESET, to all at once or one by one. Low bytes of the flash numbers of those that reported.
+pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, BoardFailure> {
+    let targets: Vec<Option<u8>> = match boards {
+        Boards::All => vec![None],
+        Boards::None => Vec::new(),
+        Boards::Some(numbers) => numbers.iter().copied().map(Some).collect(),
+    };
+    let mut reports = Reports::default();
+    for board in targets {
+        match hands.driver.run(Request::Reset { board, force })? {
+            Outcome::Reset(some) => reports.ids.extend(some.ids),
+            other => return Err(SessionError::from(other).into()),
+        }
+        match board {
+            Some(board) => hands.forget(board),
+            None => {
+                hands.runs_no_more(None);
+                hands.local.borrow_mut().known.clear();
+            }
+        }
+    }
+    if reports.ids.is_empty() {
+        let text = ["no board reported after the reset".to_owned()];
+        return Err(findings(ErrorKind::NoLink, "no-boards", &text, "doctor() looks for the reason"));
+    }
+    Ok(reports.ids.into_iter().collect())
+}
+
+/// Gives one board its number back.
+pub fn repair(
+    hands: &mut Hands,
+    board: u8,
+    flash_number: Option<u16>,
+    force: bool,
+) -> Result<Value, BoardFailure> {
+    let listed = hands.inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number);
+    let flash_number = flash_number.or(listed).ok_or_else(|| {
+        Failure::usage(format!("which board stands at number {board}? no inventory has it"))
+            .next("pass its flash_number, or an inventory to connect()")
+    })?;
+    match hands.driver.run(Request::Repair { board, flash_number, force })? {
+        Outcome::Repaired(seen) => {
+            hands.forget(board);
+            Ok(objects::board(&seen, &hands.driver.master.profile(), hands.inventory.as_ref()))
+        }
+        other => Err(SessionError::from(other).into()),
+    }
+}
+
+/// Listens, asks where that cannot do harm, and reports what is wrong.
+pub fn doctor(hands: &mut Hands) -> Result<Value, BoardFailure> {
+    let seen = hands.driver.examine(LISTEN)?;
+    let profile = hands.driver.master.profile();
+    Ok(json!({
+        "healthy": seen.failure().is_none(),
+        "findings": seen.findings,
+        "boards": objects::boards(&seen.boards, &profile, hands.inventory.as_ref()),
+    }))
+}
+
+/// Measures how boards read the protocol.
+pub fn probe(
+    hands: &mut Hands,
+    (init, alive, force): (bool, bool, bool),
+    image: Option<&Path>,
+) -> Result<Value, BoardFailure> {
+    let image = image.map(|path| Image::read(path, &ImageOptions::default())).transpose();
+    let image = image.map_err(|e| Failure::usage(e.to_string()))?.map(|image| image.into_bytes().into());
+    match hands.driver.run(Request::Probe(ProbeOptions { init, alive, image, force }))? {
+        Outcome::Probe(report) if report.boards.is_empty() && report.reports == 0 => {
+            Err(SessionError::NoBoards.into())
+        }
+        Outcome::Probe(report) => Ok(json!({
+            "boards": report.boards,
+            "rows": report.rows,
+            "profile": report.profile.to_toml(),
+        })),
+        other => Err(SessionError::from(other).into()),
+    }
+}
+
+/// Whether boards keep to the protocol.
+pub fn conformance(
+    hands: &mut Hands,
+    boards: &Boards,
+    (init, run, force): (bool, bool, bool),
+    only: Vec<String>,
+) -> Result<Value, BoardFailure> {
+    let boards = match boards {
+        Boards::All => Vec::new(),
+        boards => hands.driver.numbers(boards)?,
+    };
+    let options = ConformanceOptions { boards, init, run, program: None, only, force };
+    match hands.driver.run(Request::Conformance(options))? {
+        Outcome::Conformance(report) => {
+            if let Some(error) = report.error {
+                let board = super::failure::of_procedure(&error);
+                return Err(BoardFailure { board, ..SessionError::from(error).into() });
+            }
+            Ok(json!({ "tests": report.tests, "left": report.left }))
+        }
+        other => Err(SessionError::from(other).into()),
+    }
+}

@@ -1,0 +1,187 @@
+//! What is on the bus to a file: frames are taken where the session has them, and written by a thread that may wait for a disk.
+
+use std::path::Path;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use can_link::{CanBus, CanError, CanFrame, ControllerState};
+use host_kit::ErrorKind;
+use pyo3::prelude::*;
+use ucom::Profile;
+use ucom_host::files::recording::{RecordingError, RecordingFormat};
+use ucom_host::session::Recorder;
+
+use super::failure::BoardFailure;
+use crate::error::Failure;
+
+/// Longest wait for a frame: what is asked of the session is looked at so often.
+const WAIT: Duration = Duration::from_millis(5);
+/// So often what was recorded reaches the file.
+const FLUSH: Duration = Duration::from_secs(1);
+
+/// A frame, µs of the session and ns since 1970.
+struct Taken(u64, u64, CanFrame);
+
+/// Where frames go while a recording is written.
+#[derive(Clone, Default)]
+pub struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
+
+impl Sink {
+    fn set(&self, sender: Option<Sender<Taken>>) -> Option<Sender<Taken>> {
+        std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), sender)
+    }
+}
+
+/// A bus that is never waited for long, with an ear.
+pub struct Tap {
+    bus: Box<dyn CanBus + Send>,
+    sink: Sink,
+    start: Instant,
+    /// However the clock is set meanwhile, time does not run backwards in a file.
+    began_at: Duration,
+}
+
+impl Tap {
+    /// On a bus that is open.
+    pub fn new(bus: Box<dyn CanBus + Send>, sink: Sink) -> Self {
+        Self { bus, sink, start: Instant::now(), began_at: host_kit::unix_time() }
+    }
+
+    fn take(&self, frame: &CanFrame) {
+        if let Some(sender) = &*self.sink.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            let passed = self.start.elapsed();
+            let time_ns = (self.began_at + passed).as_nanos() as u64;
+            // Its writer has ended where the disk is full, which it reports itself.
+            let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
+        }
+    }
+}
+
+impl CanBus for Tap {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        self.bus.send(frame)?;
+        self.take(frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let received = self.bus.receive(timeout.min(WAIT))?;
+        if let Some(frame) = &received {
+            self.take(frame);
+        }
+        Ok(received)
+    }
+
+    fn state(&mut self) -> ControllerState {
+        self.bus.state()
+    }
+
+    fn times_bus_off(&self) -> u64 {
+        self.bus.times_bus_off()
+    }
+}
+
+/// What came of a recording: frames that were written, and those of other protocols that its form has no place for.
+type Written = Result<(u64, u64), RecordingError>;
+
+/// A recording that is being written.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct ChainRecording {
+    sink: Sink,
+    writer: Mutex<Option<JoinHandle<Written>>>,
+}
+
+impl ChainRecording {
+    /// Begins one; its form goes by the ending of the file.
+    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
+        let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
+        let known = ["log", "candump", "fzi", "fzican", "mcap"];
+        if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
+            return Err(Failure::usage(format!("{}: nothing writes .{other} here", path.display()))
+                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP"));
+        }
+        let (ready, opened) = mpsc::channel();
+        let (sender, taken) = mpsc::channel();
+        let (file, channel) = (path.to_owned(), channel.to_owned());
+        let writer = std::thread::spawn(move || {
+            let format = RecordingFormat::of_path(&file);
+            match Recorder::file(&file, format, profile, &channel) {
+                Ok(recorder) => {
+                    let _ = ready.send(None);
+                    write(recorder, &taken)
+                }
+                Err(error) => {
+                    let _ = ready.send(Some(error.to_string()));
+                    Err(error)
+                }
+            }
+        });
+        match opened.recv() {
+            Ok(None) => {}
+            Ok(Some(error)) => return Err(Failure::usage(error)),
+            Err(_) => return Err(failed("its writer has a fault")),
+        }
+        if let Some(other) = sink.set(Some(sender)) {
+            // The one before goes on.
+            drop(sink.set(Some(other)));
+            return Err(
+                Failure::usage("the chain is being recorded already").next("end that recording first")
+            );
+        }
+        Ok(Self { sink, writer: Mutex::new(Some(writer)) })
+    }
+
+    fn finish(&self) -> Result<Option<(u64, u64)>, Failure> {
+        let Some(writer) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take() else {
+            return Ok(None);
+        };
+        drop(self.sink.set(None));
+        let written = writer.join().map_err(|_| failed("its writer has a fault"))?;
+        written.map(Some).map_err(|e| failed(&e.to_string()))
+    }
+}
+
+impl Drop for ChainRecording {
+    fn drop(&mut self) {
+        // Nobody is there to be told; what was written is whole.
+        let _ = self.finish();
+    }
+}
+
+fn failed(why: &str) -> Failure {
+    Failure {
+        kind: ErrorKind::Fault,
+        code: "recording".into(),
+        message: format!("the recording failed: {why}"),
+        next: "is the disk full?".into(),
+        facts: Default::default(),
+    }
+}
+
+fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
+    let mut flushed = Instant::now();
+    loop {
+        match taken.recv_timeout(FLUSH) {
+            Ok(Taken(now_us, time_ns, frame)) => recorder.take(now_us, time_ns, &frame)?,
+            Err(mpsc::RecvTimeoutError::Timeout) => {}
+            Err(mpsc::RecvTimeoutError::Disconnected) => break,
+        }
+        if flushed.elapsed() >= FLUSH {
+            flushed = Instant::now();
+            recorder.flush()?;
+        }
+    }
+    let counts = (recorder.frames(), recorder.left_out());
+    recorder.finish()?;
+    Ok(counts)
+}
+
+#[pymethods]
+impl ChainRecording {
+    /// Ends it: frames that were written, and those that its form has no place for; None when it has ended before.
+    fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, BoardFailure> {
+        Ok(py.detach(|| self.finish())?)
+    }
+}

@@ -1,0 +1,153 @@
+//! Applications and control loops: started with their values, and stopped.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
+use ucom_host::session::{
+    Assignment, Boards, Cache, ParameterFile, Prepared, SessionError, Stopped, only, plans, remember,
+};
+
+use super::failure::BoardFailure;
+use super::hands::Hands;
+use super::procedures::numbered;
+
+/// Starts applications; nothing moves by that.
+pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, BoardFailure> {
+    let numbers = hands.driver.numbers(boards)?;
+    let all = hands.starting(&numbers, |hands| {
+        hands.driver.change_each(&numbers, |board| Request::Start { board, force })
+    })?;
+    // Their names are there from now on; without them they are started all the same.
+    numbers.iter().for_each(|board| drop(hands.known(*board)));
+    Ok(numbered(hands, &all))
+}
+
+/// What is to run.
+pub struct Run {
+    pub boards: Boards,
+    pub active: bool,
+    pub inputs: Vec<Assignment>,
+    pub parameters: Vec<Assignment>,
+    pub file: Option<PathBuf>,
+    pub texts: bool,
+    pub force: bool,
+}
+
+/// Starts applications and control loops, with their values.
+pub fn run(hands: &mut Hands, run: &Run) -> Result<Value, BoardFailure> {
+    let numbers = hands.driver.numbers(&run.boards)?;
+    only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
+    only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
+    let inventory = hands.inventory_file.clone().unwrap_or_default();
+    let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
+    let read = |path: &PathBuf| ParameterFile::read(path, &inventory, meant);
+    let file = run.file.as_ref().map(read).transpose().map_err(SessionError::from)?;
+    // Who is there comes first: it needs no started application.
+    if let Some(file) = &file {
+        file.identities(&mut hands.driver)?;
+    }
+    let begin = |hands: &mut Hands, cache: &Cache| {
+        let mut prepared = Prepared::default();
+        let started = begin(hands, cache, &numbers, run, file.as_ref(), &mut prepared);
+        // What the procedure began it has taken back itself.
+        let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
+        Ok((report, prepared))
+    };
+    let (report, prepared) = hands.starting(&numbers, |hands| hands.by_names(begin))?;
+    for known in prepared.known.into_values() {
+        hands.knows(known);
+    }
+    hands.runs(&numbers);
+    for board in numbers.iter().filter(|_| run.texts) {
+        let change = AdminChange { debug: Some(true), ..Default::default() };
+        hands.driver.run(Request::Admin { board: *board, change, force: true })?;
+    }
+    hands.first_outputs(&numbers)?;
+    Ok(json!({
+        "boards": numbers,
+        "active": run.active,
+        "load_percent": report.load.percent(),
+        "load_limit_percent": report.load.limit,
+    }))
+}
+
+/// Names, plans, and the start of all boards.
+fn begin(
+    hands: &mut Hands,
+    cache: &Cache,
+    numbers: &[u8],
+    run: &Run,
+    file: Option<&ParameterFile>,
+    prepared: &mut Prepared,
+) -> Result<RunReport, SessionError> {
+    for board in numbers {
+        prepared.add(&mut hands.driver, cache, &hands.signals, *board, run.force)?;
+    }
+    let plans = plans(&hands.driver, prepared, file, &run.inputs, &run.parameters)?;
+    let options = RunOptions { boards: plans.clone(), active: run.active, force: run.force };
+    match hands.driver.run(Request::Run(options))? {
+        Outcome::Running(report) => {
+            remember(cache, prepared, &plans);
+            Ok(report)
+        }
+        other => Err(other.into()),
+    }
+}
+
+/// Enables outputs of boards that run, or makes them safe.
+pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), BoardFailure> {
+    let numbers = match boards {
+        Boards::All => hands.local.borrow().running.iter().copied().collect(),
+        boards => hands.driver.numbers(boards)?,
+    };
+    for board in numbers {
+        let change = AdminChange { active: Some(active), ..AdminChange::default() };
+        let request = Request::Admin { board, change, force: false };
+        match active {
+            true => hands.starting(&[board], |hands| hands.driver.run(request).map(drop))?,
+            false => hands.driver.run(request).map(drop)?,
+        }
+    }
+    Ok(())
+}
+
+/// Sees to each board after a stop: those that are meant, or all that answer and all that this session has started.
+pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Value, BoardFailure> {
+    let was_master = hands.driver.master.is_master();
+    let wanted = match boards {
+        Boards::All => {
+            let mut wanted = hands.started();
+            match hands.driver.numbers_to_stop(&Boards::All) {
+                Ok(found) => wanted.extend(found),
+                // Without a number no board runs.
+                Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
+                Err(error) => return Err(error.into()),
+            }
+            wanted.sort_unstable();
+            wanted.dedup();
+            Boards::Some(wanted)
+        }
+        boards => boards.clone(),
+    };
+    let Stopped { boards: all, failed } = hands.driver.stop_each(&wanted, level)?;
+    for (board, _) in &all {
+        match level {
+            StopLevel::Application => hands.runs_no_more(Some(*board)),
+            StopLevel::Loop | StopLevel::Outputs => hands.only_started(*board),
+        }
+    }
+    if !was_master && hands.started().is_empty() {
+        // A stop makes nobody the master.
+        hands.driver.master.end_session();
+    }
+    let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
+    if let Some((board, error)) = failed.into_iter().next() {
+        let mut own = BoardFailure::from(error);
+        own.board = Some(board).filter(|_| numbers.len() == 1);
+        own.failure.message =
+            format!("not stopped for certain: board {}: {}", numbers.join(", "), own.failure.message);
+        return Err(own);
+    }
+    Ok(numbered(hands, &all))
+}

@@ -1,0 +1,78 @@
+//! Outputs of boards as they come.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use host_kit::ErrorKind;
+use pyo3::prelude::*;
+use serde_json::json;
+
+use super::chain::Chain;
+use super::failure::BoardFailure;
+use super::objects;
+use super::owner::LOOK;
+use super::shared::Listener;
+use crate::error::Failure;
+use crate::json;
+
+/// A bus on which no outputs come for so long has no control loop that runs.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// The outputs of boards, one set after the other.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct ChainSamples {
+    pub chain: Py<Chain>,
+    pub listener: Arc<Listener>,
+}
+
+#[pymethods]
+impl ChainSamples {
+    /// The next sample; None when none comes within `patience` seconds.
+    fn next<'py>(&self, py: Python<'py>, patience: Option<f64>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let chain = self.chain.get();
+        let since = Instant::now();
+        let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
+        loop {
+            let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
+            let sample = py.detach(|| self.listener.next(left.min(LOOK)));
+            if let Err(error) = py.check_signals() {
+                chain.owner.interrupted(py);
+                return Err(error);
+            }
+            chain.owner.shared.check()?;
+            if let Some(sample) = sample {
+                let value = json!({
+                    "time_s": sample.snapshot.time_us as f64 * 1e-6,
+                    "board": sample.known.board,
+                    "outputs": objects::outputs(&sample.known, &sample.snapshot.words),
+                    "missed": sample.snapshot.incomplete_before,
+                });
+                return json::to_python(py, &value).map(Some);
+            }
+            if let Some(gone) = chain.owner.shared.gone() {
+                return Err(gone.into());
+            }
+            if patience.is_some_and(|patience| since.elapsed() >= patience) {
+                return Ok(None);
+            }
+            if since.elapsed() >= SILENCE {
+                return Err(silent().into());
+            }
+        }
+    }
+
+    #[getter]
+    fn dropped(&self) -> u64 {
+        self.listener.dropped()
+    }
+}
+
+fn silent() -> BoardFailure {
+    BoardFailure::from(Failure {
+        kind: ErrorKind::NoLink,
+        code: "no-outputs".into(),
+        message: format!("no board sent outputs for {} s: no control loop runs", SILENCE.as_secs()),
+        next: "run() starts control loops".into(),
+        facts: Default::default(),
+    })
+}

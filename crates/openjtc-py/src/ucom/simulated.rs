@@ -1,0 +1,154 @@
+//! A simulated chain in this process, behind a socketcand server on this computer, so that other programs can join its bus.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use ucom::Profile;
+use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
+
+use super::failure::BoardFailure;
+use crate::error::Failure;
+
+/// How long nothing that happens outside is waited for.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// What is simulated.
+#[derive(Default)]
+pub struct Simulation {
+    pub profile: Profile,
+    pub chain: Option<PathBuf>,
+    pub boards: Option<u8>,
+    pub faults: Option<PathBuf>,
+    pub seed: u64,
+}
+
+/// A chain that goes on in a thread until the last of its owners is gone.
+pub struct Simulated {
+    url: String,
+    boards: usize,
+    faults: Mutex<Sender<String>>,
+    ended: Arc<AtomicBool>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl Simulated {
+    /// Starts it at a free port of this computer.
+    pub fn start(simulation: Simulation) -> Result<Self, Failure> {
+        let Simulation { profile, chain, boards, faults, seed } = simulation;
+        let config = match &chain {
+            Some(path) => ChainConfig::read(path, &profile).map_err(|e| {
+                Failure::usage(e.to_string()).next("ucom help sim shows the form of chain files")
+            })?,
+            None => ChainConfig::head(&profile),
+        };
+        let config = match boards {
+            Some(boards) => config.with_boards(boards.into(), &profile),
+            None => config,
+        };
+        let faults = match &faults {
+            None => Vec::new(),
+            Some(path) => {
+                let wrong = |e: &dyn std::fmt::Display| {
+                    Failure::usage(format!("{}: {e}", path.display())).next("ucom help faults shows the form")
+                };
+                let text = std::fs::read_to_string(path).map_err(|e| wrong(&e))?;
+                Fault::from_toml(&text).map_err(|e| wrong(&e))?
+            }
+        };
+        let boards = config.boards.len();
+        let (ready, url) = mpsc::channel();
+        let (sender, lines) = mpsc::channel::<String>();
+        let ended: Arc<AtomicBool> = Arc::default();
+        let end = ended.clone();
+        let thread = std::thread::spawn(move || {
+            let chain = ChainSim::new(&config, faults, seed, &profile);
+            let mut server = match ChainServer::bind("127.0.0.1:0", chain, profile.bitrate, seed, drop) {
+                Ok(server) => server,
+                Err(error) => return drop(ready.send(Err(error.to_string()))),
+            };
+            // Who waits for it has not gone.
+            let _ = ready.send(Ok(server.url()));
+            while !end.load(Ordering::Relaxed) {
+                lines.try_iter().for_each(|line| server.fault(&line));
+                server.turn(LOOK);
+            }
+        });
+        let url = url.recv().unwrap_or_else(|_| Err("the simulated chain has a fault".into()));
+        let url = url.map_err(|e| Failure::usage(e).next("is a port of 127.0.0.1 free?"))?;
+        Ok(Self { url, boards, faults: Mutex::new(sender), ended, thread: Mutex::new(Some(thread)) })
+    }
+
+    /// The URL of its bus.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Ends it and waits for that.
+    fn end(&self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            // A panic of that thread has been printed.
+            drop(thread.join());
+        }
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// A simulated chain.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct SimulatedChain {
+    pub inner: Arc<Simulated>,
+}
+
+#[pymethods]
+impl SimulatedChain {
+    #[new]
+    #[pyo3(signature = (chain=None, boards=None, faults=None, seed=1, profile=None))]
+    fn new(
+        py: Python<'_>,
+        chain: Option<PathBuf>,
+        boards: Option<u8>,
+        faults: Option<PathBuf>,
+        seed: u64,
+        profile: Option<PathBuf>,
+    ) -> Result<Self, BoardFailure> {
+        let profile = super::procedures::profile(profile.as_deref(), None)?;
+        if boards.is_some_and(|boards| boards > 31) {
+            return Err(BoardFailure::usage("boards: a chain has at most 31"));
+        }
+        let simulation = Simulation { profile, chain, boards, faults, seed };
+        let inner = py.detach(|| Simulated::start(simulation))?;
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
+    #[getter]
+    fn url(&self) -> &str {
+        self.inner.url()
+    }
+
+    #[getter]
+    fn board_count(&self) -> usize {
+        self.inner.boards
+    }
+
+    fn fault(&self, line: &str) -> Result<(), BoardFailure> {
+        Fault::from_line(line)
+            .map_err(|e| Failure::usage(e.to_string()).next("ucom help faults lists them"))?;
+        let sender = self.inner.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        sender.send(line.into()).map_err(|_| BoardFailure::usage("the simulated chain has ended"))
+    }
+
+    fn end(&self, py: Python<'_>) {
+        py.detach(|| self.inner.end());
+    }
+}

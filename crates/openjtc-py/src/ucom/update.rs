@@ -1,0 +1,249 @@
+//! Firmware onto boards: checked, written, read back.
+
+use std::path::PathBuf;
+
+use host_kit::{Diagnose as _, ErrorKind};
+use serde_json::{Value, json};
+use ucom::{BoardInfo, Profile};
+use ucom_host::date_text;
+use ucom_host::files::image::{AddressUnit, Format};
+use ucom_host::files::inventory::IdentifyError;
+use ucom_host::files::{Image, ImageOptions};
+use ucom_host::master::update::{
+    Progress, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult,
+    UpdateTarget, has_header,
+};
+use ucom_host::master::{Event, Outcome, Request};
+use ucom_host::session::{Boards, SessionError};
+
+use super::failure::BoardFailure;
+use super::hands::Hands;
+use crate::error::Failure;
+
+/// Where an image comes from.
+pub enum Source {
+    File(PathBuf),
+    Bytes(Vec<u8>),
+}
+
+/// What is to be updated with what.
+pub struct Update {
+    pub boards: Boards,
+    pub image: Source,
+    pub second: Option<Source>,
+    pub flash_number: Option<u16>,
+    pub raw: bool,
+    pub addresses: Option<String>,
+    /// Year, month and day; `None`: no date is given.
+    pub date: Option<(u16, u8, u8)>,
+    pub expect_program_id: Option<u16>,
+    pub name_target: bool,
+    pub group: bool,
+    pub start: bool,
+    pub dry_run: bool,
+    pub unverified: bool,
+    pub force: bool,
+    pub check: bool,
+}
+
+fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFailure> {
+    let read = match source {
+        Source::File(path) => Image::read(path, options),
+        Source::Bytes(bytes) => Image::parse(bytes, options),
+    };
+    let image = read.map_err(|e| {
+        let text = e.to_string();
+        let name = match source {
+            Source::File(path) => path.display().to_string(),
+            Source::Bytes(_) => "image".into(),
+        };
+        // Some mistakes name the file themselves.
+        Failure::usage(if text.contains(&name) { text.clone() } else { format!("{name}: {text}") }).next(
+            match e.is_of_addresses() {
+                true => "addresses=\"byte\" or \"word\" defines what the addresses of records count",
+                false => {
+                    "formats are Intel HEX, S-record, and raw bytes in a .bin; raw=True sends it as it is"
+                }
+            },
+        )
+    })?;
+    Ok(image.into())
+}
+
+/// The flash date in the profile's form; 0 where no header carries it.
+fn day(date: Option<(u16, u8, u8)>, profile: &Profile) -> Result<u16, BoardFailure> {
+    let Some((year, month, day)) = date.filter(|_| has_header(profile)) else { return Ok(0) };
+    let form = profile.prog_date;
+    form.encode(year, month, day).ok_or_else(|| {
+        let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
+        BoardFailure::usage(text)
+    })
+}
+
+/// Which flash number each board must have: named, else as the inventory has it.
+fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, BoardFailure> {
+    if let Some(flash) = update.flash_number {
+        return match numbers {
+            [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
+            _ => {
+                let text = format!("flash_number names one board, but {} are meant", numbers.len());
+                Err(Failure::usage(text)
+                    .next("several take theirs from the inventory that init() makes")
+                    .into())
+            }
+        };
+    }
+    // One board by its number alone is what the user asked for; a list needs to know who is who.
+    if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &hands.inventory) {
+        return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
+    }
+    let target = |board: &u8| {
+        let listed = hands.inventory.as_ref().and_then(|inventory| inventory.get(*board));
+        listed.map(|known| UpdateTarget { board: *board, flash_number: Some(known.flash_number) }).ok_or_else(
+            || {
+                let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
+                let error = match hands.inventory {
+                    Some(_) => IdentifyError::NotListed { board: *board, path },
+                    None => IdentifyError::NoInventory { board: *board, path },
+                };
+                let own = BoardFailure::about(&error, Some(*board));
+                BoardFailure {
+                    failure: own.failure.next("init() makes one; or update one board with its flash_number"),
+                    ..own
+                }
+            },
+        )
+    };
+    numbers.iter().map(target).collect()
+}
+
+/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
+fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, BoardFailure> {
+    let mut numbers = hands.driver.numbers(boards)?;
+    if let (Boards::All, Some(inventory)) = (boards, &hands.inventory) {
+        numbers.extend(inventory.boards().map(|board| board.number));
+        numbers.sort_unstable();
+        numbers.dedup();
+    }
+    Ok(numbers)
+}
+
+/// Programs the boards that are meant; `report` gets the progress.
+pub fn update(hands: &mut Hands, update: &Update, report: &dyn Fn(Value)) -> Result<Value, BoardFailure> {
+    let profile = hands.driver.master.profile();
+    let address_unit = match update.addresses.as_deref() {
+        None => None,
+        Some("byte") => Some(AddressUnit::Byte),
+        Some("word") => Some(AddressUnit::Word),
+        Some(other) => {
+            return Err(BoardFailure::usage(format!("addresses: {other:?} is neither byte nor word")));
+        }
+    };
+    let options =
+        ImageOptions { format: update.raw.then_some(Format::Bin), address_unit, ..Default::default() };
+    if update.name_target && !has_header(&profile) {
+        let text = "name_target: the name goes into the header, and the profile sends none";
+        return Err(BoardFailure::usage(text));
+    }
+    let first = image(&update.image, &options)?;
+    let second = update.second.as_ref().map(|source| image(source, &options)).transpose()?;
+    let date = day(update.date, &profile)?;
+    let numbers = numbers(hands, &update.boards)?;
+    let targets = targets(hands, update, &numbers)?;
+    let several = targets.len() > 1;
+    let options = UpdateOptions {
+        dry_run: update.dry_run,
+        force: update.force,
+        start: update.start,
+        accept_unverified: update.unverified,
+        mode: if update.group { UpdateMode::Group } else { UpdateMode::OneByOne },
+        second,
+        expect_program_id: update.expect_program_id,
+        name_target: update.name_target,
+        // The other boards of an update session are none the worse for one that fails.
+        keep_going: several,
+        ..UpdateOptions::new(targets, first, date)
+    };
+    let outcome = hands.driver.run_with(Request::Update(options), &mut |event| {
+        if let Event::Progress { progress, .. } = event {
+            report(step(progress));
+        }
+    })?;
+    let done = match outcome {
+        Outcome::Update(done) => done,
+        other => return Err(SessionError::from(other).into()),
+    };
+    hands.updated(&done, update.start);
+    match done.failure().filter(|_| update.check) {
+        Some(kind) => Err(failed(&done, kind)),
+        None => Ok(object(&done, &profile)),
+    }
+}
+
+fn step(progress: &Progress) -> Value {
+    json!({
+        "boards": progress.boards,
+        "attempt": progress.attempt,
+        "cycle": progress.cycle,
+        "bytes": progress.bytes,
+        "total_bytes": progress.total,
+        "rate": progress.rate,
+        "remaining_s": progress.remaining_us as f64 * 1e-6,
+    })
+}
+
+/// What an update that did not end well ended with.
+fn failed(report: &UpdateReport, kind: ErrorKind) -> BoardFailure {
+    let failures: Vec<_> =
+        report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?))).collect();
+    let texts: Vec<String> =
+        failures.iter().map(|(board, failure)| format!("board {board}: {failure}")).collect();
+    let gravest = failures.iter().find(|(_, failure)| failure.kind() == kind);
+    let Some((board, failure)) = gravest else {
+        let hint = report.unverifiable.map_or("", |why| why.hint());
+        return Failure {
+            kind,
+            code: "not-verified".into(),
+            message: "what was written could not be verified".into(),
+            next: format!("{hint}; or accept it: unverified=True"),
+            facts: Default::default(),
+        }
+        .into();
+    };
+    let mut own = BoardFailure::about(*failure, Some(*board));
+    own.failure.kind = kind;
+    own.failure.message = texts.join("; ");
+    own.board = own.board.filter(|_| failures.len() == 1);
+    own
+}
+
+fn object(report: &UpdateReport, profile: &Profile) -> Value {
+    json!({
+        "dry_run": report.dry_run,
+        "program_id": report.program_id,
+        "flash_date": has_header(profile).then(|| date_text(profile, report.date)),
+        "bytes": report.bytes,
+        "unverifiable": report.unverifiable.map(|why| why.to_string()),
+        "boards": report.boards.iter().map(|one| result(one, report, profile)).collect::<Vec<_>>(),
+    })
+}
+
+fn result(one: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
+    let shown = |info: Option<BoardInfo>| {
+        let info = info.filter(BoardInfo::has_application);
+        json!([info.map(|i| i.program_id), info.map(|i| date_text(profile, i.date))])
+    };
+    let done = matches!(one.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
+    let taken_on_trust = report.unverifiable.is_some() && done && one.failure.is_none();
+    json!({
+        "board": one.board,
+        "flash_number": one.flash_number,
+        "outcome": one.outcome.name(),
+        "verified": one.outcome.is_done() && !taken_on_trust,
+        "before": shown(one.before),
+        "after": shown(one.after),
+        "attempts": one.attempts,
+        "time_s": one.time_us as f64 * 1e-6,
+        "error": one.failure.as_ref().map(ToString::to_string).unwrap_or_default(),
+    })
+}

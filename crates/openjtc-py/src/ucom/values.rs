@@ -1,0 +1,225 @@
+//! Inputs, outputs and parameters of boards by name.
+
+use std::path::Path;
+
+use host_kit::ErrorKind;
+use serde_json::{Value, json};
+use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
+use ucom_host::master::io::Kind as Buffer;
+use ucom_host::master::{Error, Request, SignalError};
+use ucom_host::session::{
+    Assignment, Boards, History, ParameterFile, Parameters, SessionError, arrived, become_master, name_of,
+    note_rounded, words, write,
+};
+
+use super::failure::BoardFailure;
+use super::hands::Hands;
+use super::objects;
+use crate::error::Failure;
+
+/// The last outputs of a board are old after so long, µs.
+const OLD_US: u64 = 500_000;
+
+/// The names of boards.
+pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+    let numbers = hands.driver.numbers(boards)?;
+    let mut all = Vec::new();
+    for board in numbers {
+        all.push(objects::signals(&*hands.known(board)?));
+    }
+    Ok(all.into())
+}
+
+/// Sets an input, or a parameter where no input has this name or `buffer` asks for it. What was sent, in the signal's unit.
+pub fn set(
+    hands: &mut Hands,
+    board: u8,
+    buffer: Option<Buffer>,
+    (name, value): (&str, &str),
+    force: bool,
+) -> Result<Value, BoardFailure> {
+    let value = value.parse().map_err(|e| {
+        Failure::usage(format!("{name}: {e}")).next("pass a number, \"15.5 deg\", \"0x05DC\" or a bool")
+    })?;
+    let known = hands.known(board)?;
+    let is_input = known.names.find(board, Buffer::Ci, name).is_ok();
+    let is_parameter = known.names.find(board, Buffer::Par, name).is_ok();
+    let buffer = buffer.unwrap_or(if is_parameter && !is_input { Buffer::Par } else { Buffer::Ci });
+    let assignment = Assignment { board: Some(board), name: name.to_owned(), value };
+    let Some(word) = words(&known, buffer, &[assignment])?.into_iter().next() else {
+        return Err(SessionError::NoBoards.into());
+    };
+    note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
+    let now_us = hands.driver.now_us();
+    let boards = hands.driver.master.boards();
+    // Of a board that runs inputs are repeated: one that is lost is followed by others. One without power does not run.
+    let runs = hands.driver.master.repeats_inputs(board)
+        && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
+    let quick = runs && buffer == Buffer::Ci;
+    if !quick {
+        become_master(&mut hands.driver, board, force)?;
+    }
+    let (now, setting) = (hands.driver.now_us(), known.setting(buffer, &word));
+    let master = &mut hands.driver.master;
+    match buffer {
+        Buffer::Par => master.set_parameter(now, board, &setting.name, setting.value),
+        _ => master.set_input(now, board, &setting.name, setting.value),
+    }
+    .map_err(|e| SessionError::from(Error::from(e)))?;
+    if !quick {
+        arrived(&mut hands.driver, board).map_err(SessionError::from)?;
+    }
+    if buffer == Buffer::Par {
+        History::of(&hands.cache, &known.info).wrote([(word.index, word.word)].into_iter());
+    }
+    let signal = known.signals.get(buffer, word.index.into());
+    Ok(signal.map_or(Value::Null, |signal| signal.json(word.word)))
+}
+
+/// Outputs with their age, inputs and parameters of boards; those whose names are not known are asked.
+pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+    let numbers = hands.driver.numbers(boards)?;
+    let mut all = Vec::new();
+    for board in numbers {
+        all.push(of_board(hands, board)?);
+    }
+    Ok(all.into())
+}
+
+/// The same of boards that run.
+pub fn running(hands: &mut Hands) -> Result<Value, BoardFailure> {
+    let numbers: Vec<u8> = hands.local.borrow().running.iter().copied().collect();
+    values(hands, &Boards::Some(numbers))
+}
+
+fn of_board(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
+    let known = hands.known(board)?;
+    let (inputs, parameters) = objects::settings(&known, &hands.driver.master);
+    let now_us = hands.driver.now_us();
+    let local = hands.local.borrow();
+    let followed = local.followed.outputs(&hands.driver.master, now_us);
+    let followed =
+        followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
+    // A board that somebody else runs.
+    let other =
+        || local.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
+    let last = followed.or_else(other);
+    Ok(json!({
+        "board": board,
+        "time_s": last.map(|(last, _)| last.time_us as f64 * 1e-6),
+        "age_s": last.map(|(last, _)| now_us.saturating_sub(last.time_us) as f64 * 1e-6),
+        "stale": last.is_none_or(|(_, stale)| stale),
+        "outputs": last.map_or_else(|| json!([]), |(last, _)| objects::outputs(&known, &last.words)),
+        "inputs": inputs,
+        "parameters": parameters,
+        "units": [known.units(Buffer::So), known.units(Buffer::Ci), known.units(Buffer::Par)],
+    }))
+}
+
+/// A value by its name: an output of a board that sends them, else an input, else a parameter. What is old is an error.
+pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, BoardFailure> {
+    let known = hands.known(board)?;
+    let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
+        .into_iter()
+        .find_map(|buffer| Some((buffer, known.names.find(board, buffer, name).ok()?)));
+    let Some((buffer, index)) = of_buffer else {
+        let none = known.names.find(board, Buffer::So, name).err();
+        let error = none.unwrap_or(SignalError::StaleNames { board });
+        return Err(SessionError::from(Error::from(error)).into());
+    };
+    let all = of_board(hands, board)?;
+    let list = &all[match buffer {
+        Buffer::So => "outputs",
+        Buffer::Ci => "inputs",
+        Buffer::Par => "parameters",
+    }];
+    if buffer == Buffer::So && all["stale"] == json!(true) {
+        // The reason, where it is known.
+        hands.shared.check()?;
+        return Err(no_value(board, name, all["age_s"].as_f64()));
+    }
+    Ok(list[usize::from(index)][1].clone())
+}
+
+fn no_value(board: u8, name: &str, age_s: Option<f64>) -> BoardFailure {
+    let (code, message) = match age_s {
+        None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
+        Some(age_s) => ("stale", format!("board {board}: the last `{name}` is {age_s:.1} s old")),
+    };
+    let failure = Failure {
+        kind: ErrorKind::NoLink,
+        code: code.into(),
+        message,
+        next: "run() starts control loops; doctor() looks at bus and boards".into(),
+        facts: Default::default(),
+    };
+    BoardFailure { failure, board: Some(board) }
+}
+
+/// Writes a parameter file: what was written last as values, all other names as comments.
+pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, BoardFailure> {
+    let mut saved = Vec::new();
+    for board in hands.driver.numbers(boards)? {
+        let known = hands.known(board)?;
+        let history = History::of(&hands.cache, &known.info);
+        let par = known.signals.all(Buffer::Par).iter().enumerate().map(|(i, signal)| {
+            let last = history.last(i);
+            let remark = last.map_or_else(String::new, |w| format!("written {}", w.when()));
+            SavedSignal { signal: signal.clone(), word: last.map(|w| w.word), remark }
+        });
+        let ci = known.signals.all(Buffer::Ci).iter();
+        let blank = |signal: &ucom_host::files::Signal| SavedSignal {
+            signal: signal.clone(),
+            word: None,
+            remark: String::new(),
+        };
+        saved.push(SavedBoard {
+            number: board,
+            flash_number: known.info.flash_number,
+            name: name_of(hands.inventory.as_ref(), known.info.flash_number).unwrap_or_default().into(),
+            program_id: known.info.program_id,
+            description: known.names.clone(),
+            par: par.collect(),
+            ci: ci.map(blank).collect(),
+        });
+    }
+    Ok(params_text(&saved))
+}
+
+/// Checks a whole parameter file against the boards, then writes its parameters. How many.
+pub fn apply_parameters(
+    hands: &mut Hands,
+    path: &Path,
+    dry_run: bool,
+    force: bool,
+) -> Result<usize, BoardFailure> {
+    let inventory = hands.inventory_file.clone().unwrap_or_default();
+    let file = ParameterFile::read(path, &inventory, |_| true).map_err(SessionError::from)?;
+    file.identities(&mut hands.driver)?;
+    // What is written to must run. To check, what is known will do.
+    let known = hands.cache.all(&mut hands.driver, &hands.signals, &file.numbers(), |_| !dry_run)?;
+    let checked =
+        file.words(|number| known.iter().find(|k| k.board == number)).map_err(SessionError::from)?;
+    let mut all = Vec::new();
+    for (known, (_, (_, words))) in known.into_iter().zip(checked) {
+        note_rounded(&hands.driver, known.board, Buffer::Par, &words);
+        let history = History::of(&hands.cache, &known.info);
+        all.push(Parameters { known, words, history });
+    }
+    if !dry_run {
+        write(&mut hands.driver, &mut all, force)?;
+    }
+    Ok(all.iter().map(|p| p.words.len()).sum())
+}
+
+/// What the boards want their inputs to be at first.
+pub fn initial_inputs(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
+    let known = hands.known(board)?;
+    match hands.driver.run(Request::InitialInputs { board })? {
+        ucom_host::master::Outcome::InitialInputs { values, .. } => {
+            let words: Vec<_> = values.into_iter().map(Some).collect();
+            Ok(objects::named(&known, Buffer::Ci, &words))
+        }
+        other => Err(SessionError::from(other).into()),
+    }
+}

@@ -1,0 +1,508 @@
+"""Chains of boards, on a simulated chain; what is on its bus is seen by a client of its own that shares no code with the package."""
+
+from __future__ import annotations
+
+import _thread
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from openjtc import errors, ucom
+
+#: Identifier of MCA_ADMIN_DATA to and from board 0.
+ADMIN_TO = 0x600
+
+HEAD = """
+[[board]]
+flash_id = 0x21
+[[board]]
+flash_id = 0x22
+[[board]]
+flash_id = 0x23
+"""
+
+
+class Bus:
+    """A socketcand client in raw mode: every frame as (identifier, data)."""
+
+    def __init__(self, url: str) -> None:
+        host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
+        self.socket = socket.create_connection((host, int(port)))
+        self.frames: list[tuple[int, bytes]] = []
+        self.text, self.ended = "", False
+        self.thread = threading.Thread(target=self._read)
+        self.thread.start()
+        self.wait(lambda: "< hi >" in self.text)
+        self.socket.sendall(f"< open {channel} >".encode())
+        self.wait(lambda: "< ok >" in self.text)
+        self.socket.sendall(b"< rawmode >")
+        self.wait(lambda: self.text.count("< ok >") == 2)
+
+    def _read(self) -> None:
+        while not self.ended:
+            try:
+                self.text += self.socket.recv(65536).decode()
+            except OSError:
+                return
+            for found in re.finditer(r"< frame ([0-9A-Fa-f]+) [\d.]+ ([0-9A-Fa-f ]*)>", self.text):
+                self.frames.append((int(found[1], 16), bytes.fromhex(found[2].replace(" ", ""))))
+            self.text = re.sub(r"< frame [^>]*>", "", self.text)
+
+    def wait(self, condition: Callable[[], object]) -> None:
+        since = time.monotonic()
+        while not condition():
+            assert time.monotonic() - since < 30, f"never: {self.text!r} {self.frames[-20:]}"
+            time.sleep(0.002)
+
+    def send(self, identifier: int, data: bytes = b"") -> None:
+        listed = " ".join(f"{byte:02X}" for byte in data)
+        self.socket.sendall(f"< send {identifier:X} {len(data)} {listed} >".encode())
+
+    def status(self, board: int) -> int:
+        """The status byte in the answer of a board to PC_INFO (0x200 + number), the first frame of DSP_INFO (0x140 + number)."""
+        before = len(self.frames)
+        self.send(0x200 + board)
+
+        def answers() -> list[bytes]:
+            return [data for identifier, data in self.frames[before:] if identifier == 0x140 + board and len(data) == 8]
+
+        self.wait(answers)
+        return answers()[0][3]
+
+    def runs(self, board: int) -> bool:
+        """MCARUN (0x20) of its status."""
+        return bool(self.status(board) & 0x20)
+
+    def started(self, board: int) -> bool:
+        """MSTART (0x80) of its status."""
+        return bool(self.status(board) & 0x80)
+
+    def sends_outputs(self, board: int) -> bool:
+        """Its sensor outputs (0x380 + number) come within a moment."""
+        before = len(self.frames)
+        time.sleep(0.1)
+        return any(identifier == 0x380 + board for identifier, _ in self.frames[before:])
+
+    def close(self) -> None:
+        self.ended = True
+        self.socket.shutdown(socket.SHUT_RDWR)
+        self.thread.join()
+        self.socket.close()
+
+
+@pytest.fixture
+def sim() -> Iterator[ucom.SimulatedChain]:
+    simulated = ucom.sim(boards=3)
+    yield simulated
+    simulated.end()
+
+
+@pytest.fixture(scope="module")
+def numbered() -> Iterator[ucom.SimulatedChain]:
+    """A chain whose three boards have numbers, for tests that leave it as it was."""
+    simulated = ucom.sim(boards=3)
+    with ucom.connect(simulated) as chain:
+        chain.init()
+    yield simulated
+    simulated.end()
+
+
+@pytest.fixture
+def bus(sim: ucom.SimulatedChain) -> Iterator[Bus]:
+    client = Bus(sim.url)
+    yield client
+    client.close()
+
+
+def test_a_chain_is_numbered_listed_and_driven_by_name(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with ucom.connect(sim, names={"neck": 1}) as chain:
+        assert chain.scan().boards == () and len(chain.scan().reports) == 3
+        with pytest.raises(errors.NoLinkError) as no_numbers:
+            chain.start()
+        assert no_numbers.value.code == "no-numbers" and "ucom init" in no_numbers.value.next
+        report = chain.init()
+        assert [board.number for board in report.boards] == [1, 2, 3] and not report.findings
+        one = chain.boards[1]
+        assert one.description == "UCoM2 neck yaw" and one.flash_number == 0x21 and "INIT" in one.status
+        assert chain.start(1)[1].state == "started" and bus.started(1) and not bus.runs(1)
+        position = one.signals.outputs[0]
+        assert (position.name, position.text, position.type) == ("position", "position [0.01 deg]", "int16")
+        running = chain.run([1, 2], active=True, inputs={"neck.set_position": 1500}, parameters={"kp": 100})
+        assert running.boards == (1, 2) and running.active and 0 < running.load_percent < running.load_limit_percent
+        assert bus.runs(1) and bus.runs(2) and not bus.started(3)
+        bus.wait(lambda: abs(float(chain["neck.position"] or 0) - 1500) < 60)
+        chain["1.set_position"] = -500
+        assert chain.set("neck.set_position", "-500") == -500 == chain["1.set_position"]
+        bus.wait(lambda: abs(float(chain["neck.position"] or 0) + 500) < 60)
+        assert chain["neck.kp"] == 100 and chain["neck.kd"] is None, "parameters cannot be read back"
+        values = chain.values()
+        assert len(values) == 10 and abs(float(values["1.position"] or 0) + 500) < 60
+        of_one = chain.boards[1].values()
+        assert of_one.array.shape == (5,) and not of_one.stale and of_one.age_s is not None and of_one.age_s < 0.5
+        assert list(of_one.outputs) == ["position", "velocity", "current", "temperature", "reference"]
+        assert chain.bus().is_master and chain.bus().load_percent > 0
+    assert not bus.started(1) and not bus.started(2), "stopped at the end of the context"
+
+
+def test_what_cannot_be_says_why_and_what_helps(numbered: ucom.SimulatedChain) -> None:
+    with ucom.connect(numbered) as chain:
+        with pytest.raises(errors.RefusedError) as refused:
+            chain.signals(2)
+        assert (refused.value.code, refused.value.board, refused.value.next) == ("no-application", 2, "ucom start 2")
+        with pytest.raises(errors.NoLinkError) as silent:
+            chain.info(7)
+        assert silent.value.code == "no-answer" and silent.value.board == 7
+        chain.start(1)
+        with pytest.raises(errors.UsageError) as unknown:
+            chain["1.set_positon"] = 3
+        assert unknown.value.code == "no-edge" and "set_position" in str(unknown.value)
+        with pytest.raises(errors.RefusedError) as range_:
+            chain.set("1.set_position", 40_000)
+        assert (range_.value.value, range_.value.limit, range_.value.board) == (40_000, 32_767, 1)
+        with pytest.raises(errors.NoLinkError) as none:
+            chain["1.position"]
+        assert none.value.code == "no-outputs"
+        with pytest.raises(errors.UsageError):
+            chain.info("everyone")
+        with pytest.raises(errors.UsageError):
+            chain.update(Path("none.hex"), 1)
+    with pytest.raises(errors.NoLinkError) as closed:
+        chain.scan()
+    assert closed.value.code == "closed"
+
+
+def test_urls_that_are_none() -> None:
+    for url in ("nothing", "http://127.0.0.1:8781", "sim:none.toml"):
+        with pytest.raises(errors.UsageError):
+            ucom.connect(url)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with pytest.raises(errors.NoLinkError):
+        ucom.connect(f"socketcand:127.0.0.1:{port}/can0")
+
+
+def test_units_come_from_a_signal_table(numbered: ucom.SimulatedChain, tmp_path: Path) -> None:
+    with ucom.connect(numbered) as chain:
+        program = chain.boards[1].program_id
+    table = tmp_path / "table.toml"
+    table.write_text(
+        f"[[program]]\nprogram_id = 0x{program:04X}\n"
+        '[program.ci]\n"set_position" = { scale = 0.01, unit = "deg", min = -60, max = 60 }\n'
+        '[program.so]\n"position" = { scale = 0.01, unit = "deg" }\n'
+    )
+    with ucom.connect(numbered, signals=table) as chain:
+        chain.run(1, active=True, inputs={"set_position": "15 deg"})
+        assert chain.boards[1].signals.inputs[0].maximum == 60
+        assert chain["1.set_position"] == 15 and chain.board_values(1)[1].units["position"] == "deg"
+        assert chain.set("1.set_position", 20.004, unit="deg") == 20.0
+        with pytest.raises(errors.RefusedError, match="unit is missing"):
+            chain["1.set_position"] = 15
+        with pytest.raises(errors.RefusedError) as outside:
+            chain["1.set_position"] = "61 deg"
+        assert (outside.value.value, outside.value.limit) == (61, 60)
+
+
+def test_samples_become_tables(numbered: ucom.SimulatedChain) -> None:
+    with ucom.connect(numbered) as chain:
+        chain.run("1-2")
+        samples = list(chain.monitor(count=40))
+        assert len(samples) == 40 and {sample.board for sample in samples} == {1, 2}
+        tables = ucom.to_numpy(samples)
+        assert tables[1].values.shape == (len(tables[1].time_s), 5) and tables[1].names[0] == "position"
+        assert np.all(np.diff(tables[1].time_s) > 0)
+        only = chain.monitor(2, seconds=0.2).to_numpy()
+        assert set(only) == {2}
+        pandas = pytest.importorskip("pandas")
+        frame = chain.monitor(1, count=5).to_pandas()
+        assert isinstance(frame, pandas.DataFrame) and list(frame.columns)[:3] == ["time_s", "board", "position"]
+        assert len(frame) == 5 and len(ucom.to_pandas([])) == 0
+
+
+def test_an_update_is_proved_by_the_board(sim: ucom.SimulatedChain, bus: Bus, tmp_path: Path) -> None:
+    image = tmp_path / "image.bin"
+    image.write_bytes(bytes((37 * i + 11) % 256 for i in range(1000)))
+    with ucom.connect(sim) as chain:
+        chain.init()
+        steps: list[ucom.Progress] = []
+        planned = chain.update(image, 2, dry_run=True, progress=steps.append)
+        assert planned.dry_run and planned.boards[0].outcome == "not-started" and not steps
+        done = chain.update(image, 2, progress=steps.append)
+        # The golden update of the protocol's page: 1000 bytes have the Program ID 0x4B3F.
+        assert done.verified and done.program_id == 0x4B3F and done.bytes == 2 * 17 * 64
+        (result,) = done.boards
+        assert (result.outcome, result.after[0], result.error) == ("verified", 0x4B3F, "")
+        assert result.before[0] != 0x4B3F and result.flash_number == chain.boards[2].flash_number
+        assert steps[-1].bytes == steps[-1].total_bytes and {step.cycle for step in steps} == {1, 2}
+        assert chain.update(image, 2).boards[0].outcome == "up-to-date"
+        before = len(bus.frames)
+        assert bus.status(2) is not None
+        answer = next(data for identifier, data in bus.frames[before:] if identifier == 0x142)
+        assert 0x4B3F in (int.from_bytes(answer[4:6], "little"), int.from_bytes(answer[4:6], "big"))
+        with pytest.raises(errors.RefusedError) as other:
+            chain.update(image.read_bytes(), 1, flash_number=0x7777, raw=True)
+        assert other.value.code == "wrong-board" and other.value.board == 1
+        kept = chain.update(image, 1, flash_number=0x7777, check=False)
+        assert not kept.verified and "0x7777" in kept.boards[0].error
+
+
+def test_a_progress_function_that_fails_ends_the_update(sim: ucom.SimulatedChain, tmp_path: Path) -> None:
+    image = tmp_path / "image.bin"
+    image.write_bytes(bytes(i * i % 251 for i in range(4000)))
+
+    def fails(_: ucom.Progress) -> None:
+        raise KeyError("mine")
+
+    with ucom.connect(sim) as chain:
+        chain.init()
+        with pytest.raises(KeyError, match="mine"):
+            chain.update(image, 1, progress=fails)
+        assert chain.update(image, 1).verified, "the chain is there as before"
+
+
+def test_a_board_that_goes_silent_is_reported(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with pytest.raises(errors.FaultError) as not_stopped:
+        with ucom.connect(sim) as chain:
+            chain.init()
+            chain.run(active=True)
+            sim.fault("silent board=3")
+            with pytest.raises(errors.FaultError) as lost:
+                for _ in chain.monitor(seconds=60):
+                    pass
+            assert lost.value.code == "lost" and lost.value.board == 3
+            kinds = [event.kind for event in chain.events() if event.board == 3]
+            assert kinds.index("late") < kinds.index("lost")
+            with pytest.raises(errors.NoLinkError) as stale:
+                chain["3.position"]
+            assert stale.value.code == "stale" and stale.value.board == 3
+            bus.wait(lambda: not bus.runs(1) and not bus.runs(2))
+            assert not chain.doctor().healthy
+    assert not_stopped.value.code == "not-stopped"
+
+
+def test_what_nobody_has_looked_at_is_an_error_at_the_end(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with pytest.raises(errors.FaultError) as left:
+        with ucom.connect(sim) as chain:
+            chain.init()
+            chain.run()
+            # MCA_ADMIN_DATA of another PC, all flags 0, to board 2.
+            bus.send(ADMIN_TO + 2, bytes(4))
+            bus.wait(lambda: any(event.kind == "left-loop" for event in chain.events()))
+    assert left.value.code == "left-loop" and left.value.board == 2
+
+
+def test_ctrl_c_leaves_outputs_safe(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with ucom.connect(sim) as chain:
+        chain.init()
+        chain.run([1, 2], active=True)
+        chain.start(3)
+        assert bus.runs(1) and bus.sends_outputs(1)
+        timer = threading.Timer(0.2, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            # Its control loop does not run: this waits.
+            next(chain.monitor(3))
+        timer.join()
+        # Before the context ends.
+        assert not any(bus.started(board) for board in (1, 2, 3)) and not bus.sends_outputs(1)
+        assert chain.board_values(1)[1].stale
+
+
+CHILD = """
+import sys
+from openjtc import ucom
+chain = ucom.connect(sys.argv[1])
+chain.run([1, 2], active=True)
+print("runs", flush=True)
+if sys.argv[2] == "monitor":
+    list(chain.monitor())
+"""
+
+
+@pytest.mark.parametrize("how", ["monitor", "end"])
+def test_a_program_that_ends_leaves_outputs_safe(sim: ucom.SimulatedChain, bus: Bus, how: str) -> None:
+    """Without a context manager, too: by Ctrl-C in a call, and at the end of the program."""
+    with ucom.connect(sim) as chain:
+        chain.init()
+    before = len(bus.frames)
+    child = subprocess.Popen([sys.executable, "-c", CHILD, sim.url, how], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None and child.stdout.readline() == "runs\n"
+    if how == "monitor":
+        assert bus.sends_outputs(1)
+        child.send_signal(signal.SIGINT)
+    assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
+    child.stdout.close()
+    # Stopped by it, not by themselves for want of heartbeats: their applications have ended, too.
+    assert not bus.started(1) and not bus.started(2)
+    assert [data for identifier, data in bus.frames[before:] if identifier == ADMIN_TO + 1 and not any(data)]
+
+
+def test_a_stop_from_another_thread_goes_first(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with ucom.connect(sim) as chain:
+        chain.init()
+        chain.run([1, 2], active=True)
+        failed: list[errors.Error] = []
+
+        def examine() -> None:
+            try:
+                while True:
+                    chain.doctor()
+            except errors.Error as error:
+                failed.append(error)
+
+        thread = threading.Thread(target=examine)
+        thread.start()
+        time.sleep(0.2)
+        stopped = chain.stop()
+        thread.join()
+        assert failed[0].code == "cancelled"
+        assert all(board.state == "exloader" for board in stopped.values())
+        assert not bus.started(1) and not bus.started(2)
+
+
+def test_outputs_and_single_acts(sim: ucom.SimulatedChain) -> None:
+    with ucom.connect(sim) as chain:
+        chain.init()
+        chain.run(1)
+        chain.outputs(True)
+        assert chain.stop(1, application=False)[1].state == "started"
+        assert chain.stop(1)[1].state == "exloader"
+        assert "ASTART" in chain.status(2, set=["ASTART"])[2].status
+        assert "ASTART" not in chain.status(2, clear=["ASTART"])[2].status
+        assert chain.xreset(2)[2].state == "programming"
+        assert len(chain.reset(3)) == 1
+        assert chain.repair(3).number == 3
+        assert chain.reset() == tuple(sorted(chain.scan().reports))
+
+
+def test_parameters_go_to_files_and_back(numbered: ucom.SimulatedChain, tmp_path: Path) -> None:
+    file, cache = tmp_path / "parameters.yaml", tmp_path / "cache"
+    with ucom.connect(numbered, cache=cache) as chain:
+        chain.start()
+        chain.set("2.kp", 77)
+        assert chain["2.kp"] == 77 and chain.initial_inputs(2)["stiffness"] == 1000
+        chain.save_parameters(file)
+        assert "kp: 0x004D" in file.read_text()
+        assert chain.apply_parameters(file, dry_run=True) == 1 == chain.apply_parameters(file)
+        chain.stop()
+        chain.run(2, file=file)
+        assert chain["2.kp"] == 77
+
+
+def test_inventories_name_boards_and_are_compared_with(tmp_path: Path) -> None:
+    file = tmp_path / "inventory.toml"
+    chain_file = tmp_path / "chain.toml"
+    chain_file.write_text(HEAD)
+    with ucom.connect(f"sim:{chain_file}", inventory=file) as chain:
+        chain.init()
+        assert chain.simulated is not None and chain.simulated.board_count == len(chain.boards) == 3
+    text = file.read_text()
+    assert text.count("[[board]]") == 3
+    file.write_text(text.replace("number = 2\n", 'number = 2\nname = "nod"\n'))
+    simulated = ucom.sim(boards=2)
+    with ucom.connect(simulated, inventory=file) as chain:
+        with pytest.raises(errors.DeviceError, match="missing"):
+            chain.init()
+        assert chain.init(check=False).findings
+        chain.init(renew=True)
+        assert chain.boards[2].name == "nod" and file.read_text().count("[[board]]") == 2
+        chain.run("nod", active=True, inputs={"nod.set_position": 300})
+        bus_value = chain["NOD.set_position"]
+        assert bus_value == 300
+    simulated.end()
+
+
+def test_recordings_have_every_frame(sim: ucom.SimulatedChain, bus: Bus, tmp_path: Path) -> None:
+    path = tmp_path / "bus.log"
+    with ucom.connect(sim) as chain:
+        with chain.record(path) as recording:
+            chain.init()
+            with pytest.raises(errors.UsageError):
+                chain.record(tmp_path / "other.log")
+        with pytest.raises(errors.UsageError, match="there already"):
+            chain.record(path)
+        with pytest.raises(errors.UsageError, match="nothing writes .txt"):
+            chain.record(tmp_path / "bus.txt")
+    lines = path.read_text().splitlines()
+    frames = [(int(found[1], 16), bytes.fromhex(found[2])) for found in (
+        re.search(r" ([0-9A-F]{3})#([0-9A-F]*)", line) for line in lines) if found]
+    assert len(frames) == recording.frames > 20
+    seen = bus.frames[:]
+    assert all(frame in seen for frame in frames), "the other client saw each, this chain's own among them"
+
+
+def test_probe_and_conformance(numbered: ucom.SimulatedChain) -> None:
+    with ucom.connect(numbered) as chain:
+        assert chain.probe().boards == (1, 2, 3)
+        report = chain.conformance(1)
+        assert report.tests and not report.failed and not report.left
+
+
+def test_another_master_is_not_disturbed(sim: ucom.SimulatedChain, bus: Bus) -> None:
+    with ucom.connect(sim) as chain:
+        chain.init()
+        sim.fault("foreign-master for_s=60")
+        bus.wait(lambda: (0x680, b"") in bus.frames[-50:])
+        with pytest.raises(errors.RefusedError) as other:
+            chain.run(1)
+        assert other.value.code == "foreign-master"
+
+
+@pytest.mark.skipif(not os.environ.get("UCOM"), reason="UCOM names no program `ucom`")
+def test_python_can_sees_what_a_chain_does_on_the_bus_of_the_program() -> None:
+    can = pytest.importorskip("can")
+    program = os.environ["UCOM"]
+    assert shutil.which(program) or Path(program).exists()
+    child = subprocess.Popen(
+        [program, "sim", "--boards", "2", "--listen", "127.0.0.1:0", "--json"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert child.stdout is not None
+        found = re.search(r"socketcand:([\d.]+):(\d+)/(\w+)", child.stdout.readline())
+        assert found is not None
+        host, port, channel = found.groups()
+        with can.Bus(interface="socketcand", host=host, port=int(port), channel=channel) as peer:
+            with ucom.connect(found[0]) as chain:
+                assert len(chain.init().boards) == 2
+                chain.run(active=True, inputs={"1.set_position": 700})
+                since = time.monotonic()
+                outputs: dict[int, int] = {}
+                while abs(outputs.get(1, 0) - 700) > 60:
+                    assert time.monotonic() - since < 30, outputs
+                    message = peer.recv(1)
+                    # Packages of sensor outputs: offset, then up to three words.
+                    if message is not None and 0x381 <= message.arbitration_id <= 0x39F and message.data[:2] == b"\0\0":
+                        outputs[message.arbitration_id - 0x380] = int.from_bytes(message.data[2:4], "little", signed=True)
+                assert abs(float(chain["1.position"] or 0) - 700) < 80
+            while peer.recv(0) is not None:
+                pass
+            peer.send(can.Message(arbitration_id=0x201, is_extended_id=False))
+            while (answer := peer.recv(5)) is not None and (answer.arbitration_id, answer.dlc) != (0x141, 8):
+                pass
+            assert answer is not None and not answer.data[3] & 0xA0, "neither started nor running"
+    finally:
+        child.terminate()
+        child.wait(30)
+
+
+def test_the_example_runs(capfd: pytest.CaptureFixture[str]) -> None:
+    example = os.environ.get("OPENJTC_EXAMPLES")
+    path = Path(example) if example else Path(__file__).parent.parent / "examples"
+    if not (path / "ucom_chain.py").exists():
+        pytest.skip("the examples are not here")
+    done = subprocess.run([sys.executable, str(path / "ucom_chain.py")], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "10 boards" in done.stdout and re.search(r"moved from -?0\.\d to 1[45]\.\d degrees", done.stdout), done.stdout

@@ -1,21 +1,27 @@
 """The Python lines of the pages are run as they stand there, and print what is shown.
 
 Blocks of the kind ``pycon`` hold lines behind ``>>>`` with what they print, those of the kind ``python`` lines alone. The blocks of a page are
-run one after the other in one place, in a folder of their own. A comment directly above a block says more: ``<!-- not run: REASON -->``, or
-``<!-- numbers vary -->`` where numbers are not compared. ``UPDATE_DOCS=1`` writes what is printed into the page.
+run one after the other in one place, in a folder of their own. A comment directly above a block says more: ``<!-- not run: REASON -->``,
+``<!-- needs: PACKAGE -->`` (left out where it is not installed), or ``<!-- numbers vary -->`` where numbers are not compared. ``UPDATE_DOCS=1``
+writes what is printed into the page. Simulated arms are as fast as they can be followed, and not as a real one.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
+import importlib.util
 import io
 import os
 import re
 import traceback
 from pathlib import Path
 
+import openjtc
 import pytest
 
+#: Times real time, of simulated arms.
+SPEED = 6.0
 ROOT = Path(__file__).resolve().parents[3]
 BLOCK = re.compile(
     r"(?:^<!--(?P<notes>[^\n]*)-->\n)?^```(?P<kind>pycon|python)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
@@ -74,6 +80,7 @@ def same(shown: str, printed: str, varying: bool) -> bool:
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(openjtc, "connect", functools.partial(openjtc.connect, speed=SPEED))
     text = page.read_text(encoding="utf-8")
     names: dict[str, object] = {"__name__": "__page__"}
     wrong: list[str] = []
@@ -84,6 +91,8 @@ def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         notes = [note.strip() for note in (match["notes"] or "").split(";")]
         line = text.count("\n", 0, match.start()) + 1
         reasons = [note for note in notes if note.startswith("not run:")]
+        needed = [note.removeprefix("needs:").strip() for note in notes if note.startswith("needs:")]
+        reasons += [f"needs {name}" for name in needed if importlib.util.find_spec(name) is None]
         if reasons:
             left_out += 1
             print(f"line {line}: {reasons[0]}")

@@ -2,8 +2,8 @@
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use serde_json::json;
-use ucom_host::files::{Inventory, InventoryBoard};
-use ucom_host::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
+use ucom_host::files::Inventory;
+use ucom_host::master::{InitOptions, Outcome, Request, ScanFinding, counted};
 use ucom_host::session::{SessionError, nothing_shared};
 
 use crate::args::{InitArgs, LinkArgs};
@@ -97,7 +97,8 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     };
     let written = report.is_ok();
     if written {
-        inventory(&report, known.as_ref())?.write(&args.inventory).map_err(Failure::usage)?;
+        let made = Inventory::of_init(&report, known.as_ref()).map_err(Failure::usage)?;
+        made.write(&args.inventory).map_err(Failure::usage)?;
     }
     let name = file.name();
     if written {
@@ -125,22 +126,4 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         None => Ok(()),
         Some(kind) => Err(Failure::printed(kind)),
     }
-}
-
-/// The boards of a report, with the names that people have given them.
-fn inventory(report: &InitReport, known: Option<&Inventory>) -> Result<Inventory, Failure> {
-    let mut inventory = Inventory::default();
-    for board in &report.boards {
-        let entry = InventoryBoard {
-            number: board.number,
-            flash_number: board.info.flash_number,
-            description: board.description.clone().unwrap_or_default(),
-            name: String::new(),
-        };
-        inventory.insert(entry).map_err(Failure::usage)?;
-    }
-    if let Some(known) = known {
-        inventory.keep_names(known);
-    }
-    Ok(inventory)
 }

@@ -28,12 +28,12 @@ def main(bus: str) -> None:
         print(f"boards {report.boards} run; {report.load_percent:.0f} % of the bus")
 
         begin = time.monotonic()
-        while (passed := time.monotonic() - begin) < 2.0:
-            chain["2.set_position"] = round(500 * math.sin(math.pi * passed))
+        while (passed := time.monotonic() - begin) < 1.0:
+            chain["2.set_position"] = round(500 * math.sin(2 * math.pi * passed))
             time.sleep(0.02)
 
         chain["1.set_position"] = 1500
-        table = chain.monitor(1, seconds=2.0).to_numpy()[1]
+        table = chain.monitor(1, seconds=1.5).to_numpy()[1]
         position = table.values[:, table.names.index("position")] / 100
         print(f"board 1 moved from {position[0]:.1f} to {position[-1]:.1f} degrees in {len(position)} samples")
 

@@ -125,6 +125,13 @@ def bus(sim: ucom.SimulatedChain) -> Iterator[Bus]:
     client.close()
 
 
+@pytest.fixture
+def numbered_bus(numbered: ucom.SimulatedChain) -> Iterator[Bus]:
+    client = Bus(numbered.url)
+    yield client
+    client.close()
+
+
 def test_a_chain_is_numbered_listed_and_driven_by_name(sim: ucom.SimulatedChain, bus: Bus) -> None:
     with ucom.connect(sim, names={"neck": 1}) as chain:
         assert chain.scan().boards == () and len(chain.scan().reports) == 3
@@ -229,11 +236,10 @@ def test_samples_become_tables(numbered: ucom.SimulatedChain) -> None:
         assert len(frame) == 5 and len(ucom.to_pandas([])) == 0
 
 
-def test_an_update_is_proved_by_the_board(sim: ucom.SimulatedChain, bus: Bus, tmp_path: Path) -> None:
+def test_an_update_is_proved_by_the_board(numbered: ucom.SimulatedChain, numbered_bus: Bus, tmp_path: Path) -> None:
     image = tmp_path / "image.bin"
     image.write_bytes(bytes((37 * i + 11) % 256 for i in range(1000)))
-    with ucom.connect(sim) as chain:
-        chain.init()
+    with ucom.connect(numbered) as chain:
         steps: list[ucom.Progress] = []
         planned = chain.update(image, 2, dry_run=True, progress=steps.append)
         assert planned.dry_run and planned.boards[0].outcome == "not-started" and not steps
@@ -245,9 +251,9 @@ def test_an_update_is_proved_by_the_board(sim: ucom.SimulatedChain, bus: Bus, tm
         assert result.before[0] != 0x4B3F and result.flash_number == chain.boards[2].flash_number
         assert steps[-1].bytes == steps[-1].total_bytes and {step.cycle for step in steps} == {1, 2}
         assert chain.update(image, 2).boards[0].outcome == "up-to-date"
-        before = len(bus.frames)
-        assert bus.status(2) is not None
-        answer = next(data for identifier, data in bus.frames[before:] if identifier == 0x142)
+        before = len(numbered_bus.frames)
+        assert numbered_bus.status(2) is not None
+        answer = next(data for identifier, data in numbered_bus.frames[before:] if identifier == 0x142)
         assert 0x4B3F in (int.from_bytes(answer[4:6], "little"), int.from_bytes(answer[4:6], "big"))
         with pytest.raises(errors.RefusedError) as other:
             chain.update(image.read_bytes(), 1, flash_number=0x7777, raw=True)
@@ -256,18 +262,25 @@ def test_an_update_is_proved_by_the_board(sim: ucom.SimulatedChain, bus: Bus, tm
         assert not kept.verified and "0x7777" in kept.boards[0].error
 
 
-def test_a_progress_function_that_fails_ends_the_update(sim: ucom.SimulatedChain, tmp_path: Path) -> None:
+def test_ctrl_c_and_a_progress_function_that_fails_end_an_update(
+    numbered: ucom.SimulatedChain, tmp_path: Path
+) -> None:
     image = tmp_path / "image.bin"
     image.write_bytes(bytes(i * i % 251 for i in range(4000)))
 
     def fails(_: ucom.Progress) -> None:
         raise KeyError("mine")
 
-    with ucom.connect(sim) as chain:
-        chain.init()
+    with ucom.connect(numbered) as chain:
         with pytest.raises(KeyError, match="mine"):
             chain.update(image, 1, progress=fails)
-        assert chain.update(image, 1).verified, "the chain is there as before"
+        timer = threading.Timer(0.9, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            while True:
+                chain.update(image, 1, progress=False, force=True)
+        timer.join()
+        assert chain.update(image, 1, force=True).verified, "the chain is there as before"
 
 
 def test_a_board_that_goes_silent_is_reported(sim: ucom.SimulatedChain, bus: Bus) -> None:
@@ -290,23 +303,21 @@ def test_a_board_that_goes_silent_is_reported(sim: ucom.SimulatedChain, bus: Bus
     assert not_stopped.value.code == "not-stopped"
 
 
-def test_what_nobody_has_looked_at_is_an_error_at_the_end(sim: ucom.SimulatedChain, bus: Bus) -> None:
+def test_what_nobody_has_looked_at_is_an_error_at_the_end(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
     with pytest.raises(errors.FaultError) as left:
-        with ucom.connect(sim) as chain:
-            chain.init()
+        with ucom.connect(numbered) as chain:
             chain.run()
             # MCA_ADMIN_DATA of another PC, all flags 0, to board 2.
-            bus.send(ADMIN_TO + 2, bytes(4))
-            bus.wait(lambda: any(event.kind == "left-loop" for event in chain.events()))
+            numbered_bus.send(ADMIN_TO + 2, bytes(4))
+            numbered_bus.wait(lambda: any(event.kind == "left-loop" for event in chain.events()))
     assert left.value.code == "left-loop" and left.value.board == 2
 
 
-def test_ctrl_c_leaves_outputs_safe(sim: ucom.SimulatedChain, bus: Bus) -> None:
-    with ucom.connect(sim) as chain:
-        chain.init()
+def test_ctrl_c_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
+    with ucom.connect(numbered) as chain:
         chain.run([1, 2], active=True)
         chain.start(3)
-        assert bus.runs(1) and bus.sends_outputs(1)
+        assert numbered_bus.runs(1) and numbered_bus.sends_outputs(1)
         timer = threading.Timer(0.2, _thread.interrupt_main)
         timer.start()
         with pytest.raises(KeyboardInterrupt):
@@ -314,7 +325,7 @@ def test_ctrl_c_leaves_outputs_safe(sim: ucom.SimulatedChain, bus: Bus) -> None:
             next(chain.monitor(3))
         timer.join()
         # Before the context ends.
-        assert not any(bus.started(board) for board in (1, 2, 3)) and not bus.sends_outputs(1)
+        assert not any(numbered_bus.started(board) for board in (1, 2, 3)) and not numbered_bus.sends_outputs(1)
         assert chain.board_values(1)[1].stale
 
 
@@ -330,26 +341,23 @@ if sys.argv[2] == "monitor":
 
 
 @pytest.mark.parametrize("how", ["monitor", "end"])
-def test_a_program_that_ends_leaves_outputs_safe(sim: ucom.SimulatedChain, bus: Bus, how: str) -> None:
+def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus, how: str) -> None:
     """Without a context manager, too: by Ctrl-C in a call, and at the end of the program."""
-    with ucom.connect(sim) as chain:
-        chain.init()
-    before = len(bus.frames)
-    child = subprocess.Popen([sys.executable, "-c", CHILD, sim.url, how], stdout=subprocess.PIPE, text=True)
+    before = len(numbered_bus.frames)
+    child = subprocess.Popen([sys.executable, "-c", CHILD, numbered.url, how], stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None and child.stdout.readline() == "runs\n"
     if how == "monitor":
-        assert bus.sends_outputs(1)
+        assert numbered_bus.sends_outputs(1)
         child.send_signal(signal.SIGINT)
     assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
     child.stdout.close()
     # Stopped by it, not by themselves for want of heartbeats: their applications have ended, too.
-    assert not bus.started(1) and not bus.started(2)
-    assert [data for identifier, data in bus.frames[before:] if identifier == ADMIN_TO + 1 and not any(data)]
+    assert not numbered_bus.started(1) and not numbered_bus.started(2)
+    assert [data for identifier, data in numbered_bus.frames[before:] if identifier == ADMIN_TO + 1 and not any(data)]
 
 
-def test_a_stop_from_another_thread_goes_first(sim: ucom.SimulatedChain, bus: Bus) -> None:
-    with ucom.connect(sim) as chain:
-        chain.init()
+def test_a_stop_from_another_thread_goes_first(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
+    with ucom.connect(numbered) as chain:
         chain.run([1, 2], active=True)
         failed: list[errors.Error] = []
 
@@ -362,12 +370,12 @@ def test_a_stop_from_another_thread_goes_first(sim: ucom.SimulatedChain, bus: Bu
 
         thread = threading.Thread(target=examine)
         thread.start()
-        time.sleep(0.2)
-        stopped = chain.stop()
-        thread.join()
+        while thread.is_alive():
+            stopped = chain.stop()
+            thread.join(0.3)
         assert failed[0].code == "cancelled"
         assert all(board.state == "exloader" for board in stopped.values())
-        assert not bus.started(1) and not bus.started(2)
+        assert not numbered_bus.started(1) and not numbered_bus.started(2)
 
 
 def test_outputs_and_single_acts(sim: ucom.SimulatedChain) -> None:
@@ -413,7 +421,6 @@ def test_inventories_name_boards_and_are_compared_with(tmp_path: Path) -> None:
     with ucom.connect(simulated, inventory=file) as chain:
         with pytest.raises(errors.DeviceError, match="missing"):
             chain.init()
-        assert chain.init(check=False).findings
         chain.init(renew=True)
         assert chain.boards[2].name == "nod" and file.read_text().count("[[board]]") == 2
         chain.run("nod", active=True, inputs={"nod.set_position": 300})

@@ -12,14 +12,10 @@ use crate::args::JogArgs;
 use crate::link::LinkPort;
 use jtc_host::session::BRING_UP;
 
-/// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
-const AGAIN: Duration = Duration::from_millis(50);
 /// How long a key counts. A terminal repeats a key that is held after half a second, and then faster than this.
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// An arm comes to rest within this time.
-const REST: Duration = Duration::from_secs(3);
 
 /// Jogs until the keys, the time or a signal ends it; the arm rests then.
 pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
@@ -44,7 +40,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         let message = "cancelled during the wait for the drives; no joint was jogged".into();
         return Err(Failure { message, ..Failure::of(&Error::Cancelled) });
     }
-    settled(&mut session)?;
+    session.settle_for_jog().map_err(refused)?;
     if let Some(joint) = args.joint.and_then(|joint| Joint::from_number(joint.into()))
         && words::is_absent(&begin, joint.index())
     {
@@ -70,24 +66,6 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Joints whose load has just been caught are not jogged yet; anything else that forbids it is an error at once.
-fn settled(session: &mut Session<LinkPort>) -> Result<(), Failure> {
-    let end = session.now() + REST;
-    loop {
-        match session.jog(&[0.0; JOINTS]) {
-            Err(Error::Link(LinkError::Refused {
-                code: DataStatus::NotAllowed, state, trajectory, ..
-            })) if state == ControllerState::HoldPos
-                && trajectory != TrajectoryState::Pause
-                && session.now() < end =>
-            {
-                wait(session, AGAIN)?;
-            }
-            done => return done.map_err(refused),
-        }
-    }
-}
-
 fn moved(from: &Status, to: &Status) -> String {
     let ways = Joint::ALL.into_iter().zip(from.positions().into_iter().zip(to.positions()));
     let moved: Vec<String> = ways
@@ -107,20 +85,7 @@ fn one(
 ) -> Result<(), Failure> {
     let mut velocity = [0.0; JOINTS];
     velocity[joint.index()] = rate;
-    while !over(session) {
-        session.jog(&velocity).map_err(refused)?;
-        wait(session, AGAIN)?;
-    }
-    Ok(())
-}
-
-/// Statuses are taken meanwhile.
-fn wait(session: &mut Session<LinkPort>, time: Duration) -> Result<(), Failure> {
-    let end = session.now() + time;
-    while session.now() < end {
-        session.poll(end.saturating_sub(session.now()))?;
-    }
-    Ok(())
+    session.jog_while(&velocity, over).map_err(refused)
 }
 
 /// Which joint the keys move, how fast, and until when.
@@ -194,7 +159,7 @@ fn with_keys(
             eprint!("\r\x1b[K{line}");
             shown = line;
         }
-        wait(session, Duration::from_millis(20))?;
+        session.pass(Duration::from_millis(20))?;
     }
     Ok(())
 }
@@ -219,22 +184,10 @@ fn refused(error: Error) -> Failure {
 /// Every joint stands.
 fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
-    // Refused where nothing is jogged any more, which is just as well.
-    match session.jog(&[0.0; JOINTS]) {
-        Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
-        Err(error) => return Err(Failure::of(&error)),
-    }
-    let end = session.now() + REST;
-    loop {
-        let status = session.next_status()?;
-        if words::moving_joint(&status).is_none() {
-            return Ok(status);
-        }
-        if session.now() > end {
-            return Err(Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves")
-                .hint("press the emergency stop; `jtc status` shows the joints"));
-        }
-    }
+    session.jog_to_rest().map_err(|error| Failure::of(&error))?.ok_or_else(|| {
+        Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves")
+            .hint("press the emergency stop; `jtc status` shows the joints")
+    })
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// Those of [`Session::push`]; [`Error::Cancelled`].
-    pub(super) fn push_until(
+    pub fn push_until(
         &mut self,
         set: &ParameterSet,
         ended: impl Fn() -> bool,

@@ -89,7 +89,7 @@ class Chain:
         image: tuple[str | None, bytes | None],
         second: tuple[str | None, bytes | None],
         flash_number: int | None,
-        date: tuple[int, int, int] | None,
+        date: tuple[tuple[int, int, int] | None, tuple[int, int, int]],
         addresses: str | None,
         expect_program_id: int | None,
         flags: list[bool],

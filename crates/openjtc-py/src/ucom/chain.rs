@@ -27,6 +27,9 @@ type Object<'py> = PyResult<Bound<'py, PyAny>>;
 /// A board, a name and a value, all as Python gives them.
 type Given = (Option<u8>, String, String);
 
+/// Year, month and day.
+type Day = (u16, u8, u8);
+
 /// A chain of boards on a bus.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Chain {
@@ -276,7 +279,7 @@ impl Chain {
         image: (Option<PathBuf>, Option<Vec<u8>>),
         second: (Option<PathBuf>, Option<Vec<u8>>),
         flash_number: Option<u16>,
-        date: Option<(u16, u8, u8)>,
+        date: (Option<Day>, Day),
         addresses: Option<String>,
         expect_program_id: Option<u16>,
         flags: [bool; 8],
@@ -293,7 +296,8 @@ impl Chain {
             flash_number,
             raw,
             addresses,
-            date,
+            date: date.0,
+            today: date.1,
             expect_program_id,
             name_target,
             group,
@@ -339,6 +343,6 @@ impl Chain {
 
     fn record(&self, py: Python<'_>, path: PathBuf) -> Result<ChainRecording, BoardFailure> {
         let channel = self.url.rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
-        Ok(py.detach(|| ChainRecording::begin(self.sink.clone(), &path, self.profile, &channel))?)
+        py.detach(|| ChainRecording::begin(self.sink.clone(), &path, self.profile, &channel))
     }
 }

@@ -14,7 +14,7 @@ use crate::error::Failure;
 #[derive(Clone, Debug)]
 pub struct BoardFailure {
     /// What is the same for all errors.
-    pub failure: Failure,
+    pub failure: Box<Failure>,
     /// The board; `None`: it is about none, or about several.
     pub board: Option<u8>,
 }
@@ -22,7 +22,7 @@ pub struct BoardFailure {
 impl BoardFailure {
     /// Of an error of the libraries about a board.
     pub fn about(error: &impl Diagnose, board: Option<u8>) -> Self {
-        Self { failure: plain(Failure::of(error)), board }
+        Self { failure: Box::new(plain(Failure::of(error))), board }
     }
 
     /// An argument that is none.
@@ -38,7 +38,7 @@ fn plain(failure: Failure) -> Failure {
 
 impl From<Failure> for BoardFailure {
     fn from(failure: Failure) -> Self {
-        Self { failure, board: None }
+        Self { failure: Box::new(failure), board: None }
     }
 }
 
@@ -53,7 +53,7 @@ impl From<SessionError> for BoardFailure {
 
 impl From<BoardFailure> for PyErr {
     fn from(BoardFailure { failure, board }: BoardFailure) -> Self {
-        let error = Self::from(failure);
+        let error = Self::from(*failure);
         Python::attach(|py| match error.value(py).setattr("board", board) {
             Ok(()) => error,
             Err(other) => other,
@@ -64,14 +64,13 @@ impl From<BoardFailure> for PyErr {
 fn board(error: &SessionError) -> Option<u8> {
     match error {
         SessionError::Procedure(error) => of_procedure(error),
-        SessionError::Values(error) => match error {
+        SessionError::Values(
             ValuesError::NoSignal { board, .. }
             | ValuesError::Value { board, .. }
             | ValuesError::Twice { board, .. }
             | ValuesError::NotMeant { board, .. }
-            | ValuesError::Unknown { board, .. } => Some(*board),
-            _ => None,
-        },
+            | ValuesError::Unknown { board, .. },
+        ) => Some(*board),
         SessionError::BusOff { failure, .. } | SessionError::Partly { failure, .. } => board(failure),
         SessionError::LeftLoop { boards } => only(boards),
         SessionError::NoNames { failed } => match failed.as_slice() {

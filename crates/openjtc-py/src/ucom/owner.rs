@@ -72,16 +72,15 @@ impl Owner {
     ) -> PyResult<T> {
         let (id, heard) = self.ask(kind, act);
         loop {
-            let result = match self.wait(py, &heard)? {
+            let reported = match self.wait(py, &heard)? {
                 Heard::Done(result) => return Ok(result?),
-                Heard::Progress(value) => match progress {
-                    Some(progress) => {
-                        json::to_python(py, &value).and_then(|value| progress.call1((value,))).map(drop)
-                    }
-                    None => Ok(()),
-                },
-                Heard::Nothing => py.check_signals(),
+                Heard::Progress(value) => progress.map_or(Ok(()), |progress| {
+                    json::to_python(py, &value).and_then(|value| progress.call1((value,))).map(drop)
+                }),
+                Heard::Nothing => Ok(()),
             };
+            // Also while one report comes after the other.
+            let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.cancel(id);
                 self.interrupted(py);

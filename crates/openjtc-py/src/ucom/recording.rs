@@ -29,8 +29,12 @@ struct Taken(u64, u64, CanFrame);
 pub struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
 
 impl Sink {
-    fn set(&self, sender: Option<Sender<Taken>>) -> Option<Sender<Taken>> {
-        std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), sender)
+    fn is_taken(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
+
+    fn set(&self, sender: Option<Sender<Taken>>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = sender;
     }
 }
 
@@ -95,12 +99,17 @@ pub struct ChainRecording {
 
 impl ChainRecording {
     /// Begins one; its form goes by the ending of the file.
-    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
+    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, BoardFailure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
         if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
             return Err(Failure::usage(format!("{}: nothing writes .{other} here", path.display()))
-                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP"));
+                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP")
+                .into());
+        }
+        if sink.is_taken() {
+            let busy = Failure::usage("the chain is being recorded already");
+            return Err(busy.next("end that recording first").into());
         }
         let (ready, opened) = mpsc::channel();
         let (sender, taken) = mpsc::channel();
@@ -120,24 +129,18 @@ impl ChainRecording {
         });
         match opened.recv() {
             Ok(None) => {}
-            Ok(Some(error)) => return Err(Failure::usage(error)),
+            Ok(Some(error)) => return Err(BoardFailure::usage(error)),
             Err(_) => return Err(failed("its writer has a fault")),
         }
-        if let Some(other) = sink.set(Some(sender)) {
-            // The one before goes on.
-            drop(sink.set(Some(other)));
-            return Err(
-                Failure::usage("the chain is being recorded already").next("end that recording first")
-            );
-        }
+        sink.set(Some(sender));
         Ok(Self { sink, writer: Mutex::new(Some(writer)) })
     }
 
-    fn finish(&self) -> Result<Option<(u64, u64)>, Failure> {
+    fn finish(&self) -> Result<Option<(u64, u64)>, BoardFailure> {
         let Some(writer) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take() else {
             return Ok(None);
         };
-        drop(self.sink.set(None));
+        self.sink.set(None);
         let written = writer.join().map_err(|_| failed("its writer has a fault"))?;
         written.map(Some).map_err(|e| failed(&e.to_string()))
     }
@@ -150,7 +153,7 @@ impl Drop for ChainRecording {
     }
 }
 
-fn failed(why: &str) -> Failure {
+fn failed(why: &str) -> BoardFailure {
     Failure {
         kind: ErrorKind::Fault,
         code: "recording".into(),
@@ -158,6 +161,7 @@ fn failed(why: &str) -> Failure {
         next: "is the disk full?".into(),
         facts: Default::default(),
     }
+    .into()
 }
 
 fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
@@ -182,6 +186,6 @@ fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
 impl ChainRecording {
     /// Ends it: frames that were written, and those that its form has no place for; None when it has ended before.
     fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, BoardFailure> {
-        Ok(py.detach(|| self.finish())?)
+        py.detach(|| self.finish())
     }
 }

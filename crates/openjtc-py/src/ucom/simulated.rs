@@ -38,7 +38,7 @@ pub struct Simulated {
 
 impl Simulated {
     /// Starts it at a free port of this computer.
-    pub fn start(simulation: Simulation) -> Result<Self, Failure> {
+    pub fn start(simulation: Simulation) -> Result<Self, BoardFailure> {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
             Some(path) => ChainConfig::read(path, &profile).map_err(|e| {

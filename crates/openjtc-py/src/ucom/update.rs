@@ -34,8 +34,9 @@ pub struct Update {
     pub flash_number: Option<u16>,
     pub raw: bool,
     pub addresses: Option<String>,
-    /// Year, month and day; `None`: no date is given.
+    /// Year, month and day that were asked for; `None`: today.
     pub date: Option<(u16, u8, u8)>,
+    pub today: (u16, u8, u8),
     pub expect_program_id: Option<u16>,
     pub name_target: bool,
     pub group: bool,
@@ -71,8 +72,12 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFa
 }
 
 /// The flash date in the profile's form; 0 where no header carries it.
-fn day(date: Option<(u16, u8, u8)>, profile: &Profile) -> Result<u16, BoardFailure> {
-    let Some((year, month, day)) = date.filter(|_| has_header(profile)) else { return Ok(0) };
+fn day(update: &Update, profile: &Profile) -> Result<u16, BoardFailure> {
+    if !has_header(profile) {
+        let text = "date: it goes into the header, and the profile sends none";
+        return update.date.map_or(Ok(0), |_| Err(BoardFailure::usage(text)));
+    }
+    let (year, month, day) = update.date.unwrap_or(update.today);
     let form = profile.prog_date;
     form.encode(year, month, day).ok_or_else(|| {
         let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
@@ -99,22 +104,22 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
     }
     let target = |board: &u8| {
         let listed = hands.inventory.as_ref().and_then(|inventory| inventory.get(*board));
-        listed.map(|known| UpdateTarget { board: *board, flash_number: Some(known.flash_number) }).ok_or_else(
-            || {
-                let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
-                let error = match hands.inventory {
-                    Some(_) => IdentifyError::NotListed { board: *board, path },
-                    None => IdentifyError::NoInventory { board: *board, path },
-                };
-                let own = BoardFailure::about(&error, Some(*board));
-                BoardFailure {
-                    failure: own.failure.next("init() makes one; or update one board with its flash_number"),
-                    ..own
-                }
-            },
-        )
+        let flash_number = listed.map(|known| known.flash_number).ok_or_else(|| not_listed(hands, *board))?;
+        Ok(UpdateTarget { board: *board, flash_number: Some(flash_number) })
     };
     numbers.iter().map(target).collect()
+}
+
+/// Nobody knows which board stands there.
+fn not_listed(hands: &Hands, board: u8) -> BoardFailure {
+    let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
+    let error = match hands.inventory {
+        Some(_) => IdentifyError::NotListed { board, path },
+        None => IdentifyError::NoInventory { board, path },
+    };
+    let mut own = BoardFailure::about(&error, Some(board));
+    own.failure.next = "init() makes one; or update one board with its flash_number".into();
+    own
 }
 
 /// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
@@ -147,7 +152,7 @@ pub fn update(hands: &mut Hands, update: &Update, report: &dyn Fn(Value)) -> Res
     }
     let first = image(&update.image, &options)?;
     let second = update.second.as_ref().map(|source| image(source, &options)).transpose()?;
-    let date = day(update.date, &profile)?;
+    let date = day(update, &profile)?;
     let numbers = numbers(hands, &update.boards)?;
     let targets = targets(hands, update, &numbers)?;
     let several = targets.len() > 1;

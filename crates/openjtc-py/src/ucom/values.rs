@@ -153,7 +153,7 @@ fn no_value(board: u8, name: &str, age_s: Option<f64>) -> BoardFailure {
         next: "run() starts control loops; doctor() looks at bus and boards".into(),
         facts: Default::default(),
     };
-    BoardFailure { failure, board: Some(board) }
+    BoardFailure { board: Some(board), ..failure.into() }
 }
 
 /// Writes a parameter file: what was written last as values, all other names as comments.

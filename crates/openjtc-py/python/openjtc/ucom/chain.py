@@ -259,14 +259,15 @@ class Chain(ValuesByName):
             RefusedError, NoLinkError, DeviceError: Nothing was erased.
             FaultError: Something was erased: run it again.
         """
-        day = date or datetime.datetime.now(datetime.timezone.utc).date()
+        today = datetime.datetime.now(datetime.timezone.utc).date()
+        asked = None if date is None else (date.year, date.month, date.day)
         flags = [raw, name_target, group, start, dry_run, unverified, force, check]
         value = self._native.update(
             self._list(boards),
             _image(image),
             _image(second),
             flash_number,
-            (day.year, day.month, day.day),
+            (asked, (today.year, today.month, today.day)),
             addresses,
             expect_program_id,
             flags,

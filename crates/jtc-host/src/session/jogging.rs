@@ -1,0 +1,96 @@
+//! Jogging from its begin to standstill.
+
+use std::time::Duration;
+
+use jtc_wire::{ControllerState, DataStatus, JOINTS, Status, TrajectoryState};
+
+use super::Session;
+use crate::error::{Error, LinkError};
+use crate::port::Port;
+use crate::words;
+
+/// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
+pub const JOG_AGAIN: Duration = Duration::from_millis(50);
+/// An arm comes to rest within this time.
+const REST: Duration = Duration::from_secs(3);
+
+impl<P: Port> Session<P> {
+    /// Waits until joints may be jogged: those whose load has just been caught are not jogged yet. Anything else that forbids it is an
+    /// error at once.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::jog`].
+    pub fn settle_for_jog(&mut self) -> Result<(), Error> {
+        let end = self.now() + REST;
+        loop {
+            match self.jog(&[0.0; JOINTS]) {
+                Err(Error::Link(LinkError::Refused {
+                    code: DataStatus::NotAllowed,
+                    state,
+                    trajectory,
+                    ..
+                })) if state == ControllerState::HoldPos
+                    && trajectory != TrajectoryState::Pause
+                    && self.now() < end =>
+                {
+                    self.pass(JOG_AGAIN)?;
+                }
+                done => return done,
+            }
+        }
+    }
+
+    /// Jogs at this velocity (rad/s) until `over`. **The arm moves.** [`Session::jog_to_rest`] belongs behind it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::jog`].
+    pub fn jog_while(
+        &mut self,
+        velocity: &[f64; JOINTS],
+        mut over: impl FnMut(&Self) -> bool,
+    ) -> Result<(), Error> {
+        while !over(self) {
+            self.jog(velocity)?;
+            self.pass(JOG_AGAIN)?;
+        }
+        Ok(())
+    }
+
+    /// Jogs no more, and waits until every joint stands; `None` where one does not within 3 s.
+    ///
+    /// # Errors
+    ///
+    /// Those of the line.
+    pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
+        // Refused where nothing is jogged any more, which is just as well.
+        match self.jog(&[0.0; JOINTS]) {
+            Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
+            Err(error) => return Err(error),
+        }
+        let end = self.now() + REST;
+        loop {
+            let status = self.next_status()?;
+            if words::moving_joint(&status).is_none() {
+                return Ok(Some(status));
+            }
+            if self.now() > end {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Takes statuses for this time.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::Port`].
+    pub fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
+        let end = self.now() + time;
+        while self.now() < end {
+            self.poll(end.saturating_sub(self.now()))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,36 @@
+"""From waypoints to a cycle: planned within all limits, looked at, run three times.
+
+    python waypoints.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
+"""
+
+import sys
+
+import numpy as np
+import openjtc
+
+PICK = np.radians([20, 40, -70, 0, 30, 0])
+PLACE = np.radians([-40, 35, -60, 0, 25, 90])
+ABOVE = np.radians([0, 10, -60, 0, 50, 0])
+
+
+def main(target: str = "sim:") -> None:
+    with openjtc.connect(target) as robot:
+        # Corners are rounded by up to 0.1 rad, and the last waypoint is the first one.
+        cycle = robot.plan([PICK, ABOVE, PLACE, ABOVE, PICK], blend=0.1, speed=80)
+        print(f"{cycle.duration:.2f} s; the waypoints are passed at", np.round(cycle.waypoint_times, 2))
+        for bound in cycle.binding[:4]:
+            print(f"  {bound['from_s']:.2f} to {bound['to_s']:.2f} s: joint {bound['joint']}, {bound['limit']}")
+
+        run = robot.run(cycle, approach=True, repeat=3)
+        print(run)
+        worst = max(run.joints, key=lambda joint: joint.torque_share or 0)
+        print(f"{worst.name} needs most of its torque: {100 * (worst.torque_share or 0):.0f} %")
+
+        try:
+            robot.plan([PICK, PICK + [0, 0, 0, 0, 0, 9]])
+        except openjtc.RefusedError as error:
+            print(f"refused: joint {error.joint}, {error.value:.2f} rad of {error.limit:.2f}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

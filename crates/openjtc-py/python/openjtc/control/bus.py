@@ -1,0 +1,137 @@
+"""The joint bus from the side of the drives: requests of the controller read, answers made.
+
+This is a wire: its nodes count from 0. Node 2 is the drive of joint 3, and node 6 the gripper. A drive answers each
+:class:`Move` with :func:`joint_answer`, each :class:`ChangeState` with :func:`state_answer`, and each :class:`Configure` with
+:func:`configured_answer`; the gripper with :func:`gripper_answer` in place of the first. Resets are not answered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from openjtc import _native
+
+__all__ = [
+    "ENABLED",
+    "FAULT",
+    "GRIPPER",
+    "INIT",
+    "READY",
+    "ChangeState",
+    "Configure",
+    "Move",
+    "Request",
+    "Reset",
+    "configured_answer",
+    "gripper_answer",
+    "joint_answer",
+    "parse",
+    "state_answer",
+]
+
+#: Node of the gripper.
+GRIPPER = 6
+#: State of a node: motor off, waits for its configuration.
+INIT = 1
+#: State of a node: configured, motor off.
+READY = 2
+#: State of a node: it follows its command.
+ENABLED = 3
+#: State of a node: fault.
+FAULT = 255
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """Torques (6,) at the joints, N·m, and the pump."""
+
+    torque: NDArray[np.float64]
+    pump: bool
+
+
+@dataclass(frozen=True)
+class ChangeState:
+    """The state that each of the seven nodes shall have; 0: stay as it is."""
+
+    target: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Configure:
+    """Mode (1: torque) and configuration bits of each joint, and the bits of the gripper."""
+
+    mode: tuple[int, ...]
+    config: tuple[int, ...]
+    gripper: int
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Restart of one node, or of all (None)."""
+
+    node: int | None
+
+
+Request = Move | ChangeState | Configure | Reset
+
+
+def parse(frame: tuple[int, bytes]) -> Request:
+    """What the controller asks for with a frame.
+
+    Raises:
+        UsageError: It is no request of this bus.
+    """
+    kind, numbers = _native.bus_request(*frame)
+    values = cast(Any, numbers)
+    if kind == "move":
+        return Move(*values)
+    if kind == "state":
+        return ChangeState(tuple(values))
+    if kind == "configure":
+        return Configure(tuple(values[0]), tuple(values[1]), values[2])
+    return Reset(values)
+
+
+def joint_answer(
+    node: int,
+    position: float,
+    velocity: float,
+    *,
+    torque: float = 0.0,
+    state: int = ENABLED,
+    temperature: int = 25,
+    errors: int = 0,
+    warnings: int = 0,
+) -> tuple[int, bytes]:
+    """A drive's answer to a :class:`Move`; numbers beyond the scale of the bus are at its end.
+
+    Args:
+        node: 0 to 5.
+        position: rad.
+        velocity: rad/s.
+        torque: That it gives, N·m.
+        state: :data:`INIT`, :data:`READY`, :data:`ENABLED` or :data:`FAULT`.
+        temperature: Of the bearing, °C.
+        errors: Error bits.
+        warnings: Warning bits.
+    """
+    return _native.bus_joint_answer(node, position, velocity, torque, temperature, state, errors, warnings)
+
+
+def gripper_answer(*, pump: bool = False, part: bool = False, state: int = READY, errors: int = 0) -> tuple[int, bytes]:
+    """The gripper's answer to a :class:`Move`; ``part``: both vacuum levels are reached."""
+    return _native.bus_gripper_answer(pump, part, state, errors)
+
+
+def state_answer(node: int, state: int) -> tuple[int, bytes]:
+    """A node's answer to a :class:`ChangeState`: the state that it has when it receives it."""
+    return _native.bus_state_answer(node, state)
+
+
+def configured_answer(node: int, accepted: bool = True) -> tuple[int, bytes]:
+    """A node's answer to a :class:`Configure`."""
+    return _native.bus_configured_answer(node, accepted)

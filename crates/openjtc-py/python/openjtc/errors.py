@@ -1,0 +1,82 @@
+"""Errors: what was asked for, where, value and limit, the likely cause, and what helps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from openjtc.results import Run
+
+
+class Error(Exception):
+    """Any error of openjtc.
+
+    Attributes:
+        message: What was asked for, where, value and limit.
+        code: A short name for programs, as ``jtc explain CODE`` knows it.
+        joint: The joint, counted from 1; None where it is about none.
+        point: The point of the trajectory, counted from 0; in motion the millisecond of its path.
+        value: What was found, in the unit of the message.
+        limit: What is allowed, in the same unit.
+        cause: What usually causes it; empty where that is not known.
+        next: The next act that helps; empty where there is none.
+        board: The UCoM board, by its number; None where it is about none, or about several.
+        run: What was seen of a motion that ended in this error; None of any other error.
+    """
+
+    run: Run | None = None
+
+    def __init__(
+        self,
+        message: str,
+        code: str = "error",
+        joint: int | None = None,
+        point: int | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        cause: str | None = None,
+        next: str = "",
+        board: int | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.code = code
+        self.joint = joint
+        self.point = point
+        self.value = value
+        self.limit = limit
+        self.cause = cause or ""
+        self.next = next
+        self.board = board
+
+    def __str__(self) -> str:
+        lines = [self.message]
+        if self.cause and self.cause not in self.message:
+            lines.append(f"cause: {self.cause}")
+        if self.next:
+            lines.append(f"next: {self.next}")
+        return "\n".join(lines)
+
+    def __reduce__(self) -> tuple[type[Error], tuple[object, ...]]:
+        facts = (self.joint, self.point, self.value, self.limit, self.cause, self.next, self.board)
+        return (type(self), (self.message, self.code, *facts))
+
+
+class UsageError(Error, ValueError):
+    """A wrong argument, or a file that cannot be understood. Nothing was sent."""
+
+
+class RefusedError(Error):
+    """A check refuses it: nothing was sent, moved or changed."""
+
+
+class DeviceError(Error):
+    """The controller or a board reports an error."""
+
+
+class NoLinkError(Error, ConnectionError):
+    """There is no port or bus, or nobody answers."""
+
+
+class FaultError(Error):
+    """It went wrong on the way, or was cancelled there. The message says whether the arm may be moving."""

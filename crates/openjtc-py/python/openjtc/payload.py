@@ -1,0 +1,31 @@
+"""What the flange of an arm carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from openjtc.errors import UsageError
+
+__all__ = ["Payload"]
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What the flange carries.
+
+    Attributes:
+        mass: kg.
+        com: Centre of mass in the flange's frame, m.
+        inertia: xx, xy, xz, yy, yz, zz about the centre of mass, kg·m².
+    """
+
+    mass: float
+    com: Sequence[float] = (0.0, 0.0, 0.0)
+    inertia: Sequence[float] = (0.0,) * 6
+
+    def _numbers(self) -> tuple[float, list[float], list[float]]:
+        """Mass, centre of mass, inertia, as the compiled part takes them."""
+        if len(self.com) != 3 or len(self.inertia) != 6:
+            raise UsageError("a payload has a centre of mass of 3 numbers and an inertia of 6", "payload")
+        return (float(self.mass), [float(x) for x in self.com], [float(x) for x in self.inertia])

@@ -1,0 +1,329 @@
+"""What came of a motion, a plan, a check or a flight recorder: arrays, tables, figures, plots, reports."""
+
+from __future__ import annotations
+
+import html
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from openjtc import _native
+from openjtc._native import Trajectory
+from openjtc.errors import RefusedError, UsageError
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    from matplotlib.figure import Figure
+
+__all__ = ["Check", "FlightLog", "JointFigures", "Plan", "Run", "Samples"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointFigures:
+    """Figures of one joint over a motion; None where a value is not known.
+
+    Attributes:
+        name: Name in the arm file.
+        rms_error_mrad: Root mean square of the position error, mrad.
+        max_error_mrad: Largest absolute position error, mrad.
+        peak_torque_nm: Largest absolute torque, N·m.
+        torque_limit_nm: Its limit, N·m.
+        torque_share: Peak torque as a share of the limit, 0 to 1.
+        peak_velocity_rad_s: Largest absolute velocity, rad/s.
+        peak_temperature_c: Highest bearing temperature, °C.
+    """
+
+    name: str
+    rms_error_mrad: float | None
+    max_error_mrad: float | None
+    peak_torque_nm: float | None
+    torque_limit_nm: float | None
+    torque_share: float | None
+    peak_velocity_rad_s: float | None
+    peak_temperature_c: float | None
+
+
+class Samples:
+    """Samples with their arm: of a run, of a plan, of a flight recorder.
+
+    Over a line there are as many samples as the controller sends statuses, 25 per second; in the simulator and in a flight recorder one
+    each millisecond. Values that a source does not know are NaN.
+    """
+
+    def __init__(self, native: _native.Samples) -> None:
+        self._native = native
+
+    def __len__(self) -> int:
+        return len(self._native)
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of the six joints, base to wrist."""
+        return self._native.joint_names
+
+    def arrays(self) -> dict[str, Array]:
+        """Every column as an array.
+
+        Returns:
+            ``time`` (s) and ``point`` (ms of the path) of shape (N,); of shape (N, 6) ``set_position``, ``position``, ``error`` (rad),
+            ``set_velocity``, ``velocity`` (rad/s), ``set_acceleration`` (rad/s²), ``torque`` and its parts ``torque_model``,
+            ``torque_p``, ``torque_i``, ``torque_d``, ``torque_friction`` (N·m), ``temperature`` (°C).
+        """
+        return self._native.arrays()
+
+    @property
+    def joints(self) -> list[JointFigures]:
+        """Figures of each joint while the trajectory was executed."""
+        return [JointFigures(**figures) for figures in self._native.summary()["joints"]]
+
+    def _columns(self) -> dict[str, Any]:
+        columns: dict[str, Any] = {}
+        for name, values in self.arrays().items():
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns.update({f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])})
+        columns["state"] = self._native.states
+        return columns
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A table of all samples: ``time``, ``point``, ``state``, and of each value and joint a column, ``position_1`` to ``position_6``."""
+        import pandas
+
+        return pandas.DataFrame(self._columns())
+
+    def to_polars(self) -> polars.DataFrame:
+        """As `to_pandas`, with Polars."""
+        import polars
+
+        return polars.DataFrame(self._columns())
+
+    def plot(self) -> Figure:
+        """Commanded and measured positions and their error, by Matplotlib."""
+        from matplotlib.figure import Figure
+
+        a = self.arrays()
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        for j, name in enumerate(self.joint_names):
+            (line,) = top.plot(a["time"], a["position"][:, j], label=f"{j + 1} {name}")
+            top.plot(a["time"], a["set_position"][:, j], "--", color=line.get_color(), linewidth=0.8)
+            bottom.plot(a["time"], 1e3 * a["error"][:, j], color=line.get_color())
+        top.set_ylabel("position / rad (dashed: commanded)")
+        top.legend(fontsize="small", ncols=3)
+        bottom.set_ylabel("error / mrad")
+        bottom.set_xlabel("time / s")
+        return figure
+
+    def report(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Writes the report: one page with figures and interactive plots that opens offline.
+
+        Args:
+            path: The file, as ``run.html``.
+            overwrite: Whether a file that is there is written over.
+
+        Raises:
+            UsageError: The file exists.
+        """
+        path = Path(path)
+        try:
+            with open(path, "w" if overwrite else "x", encoding="utf-8") as file:
+                file.write(self._native.html())
+        except FileExistsError as error:
+            next = "name another file, or pass overwrite=True"
+            raise UsageError(f"{path}: the file exists", "file", next=next) from error
+        return path
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Writes a recording: MCAP, which Foxglove, PlotJuggler and Rerun open, or CSV, by the ending of the name."""
+        self._native.write(path, overwrite)
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        page = html.escape(self._native.html(), quote=True)
+        return f'<iframe srcdoc="{page}" style="width:100%;height:640px;border:0" title="report"></iframe>'
+
+    def _repr_svg_(self) -> str:
+        return self._native.svg()
+
+    def _table(self) -> str:
+        head = f"{'':<20}{'RMS mrad':>10}{'max mrad':>10}{'rad/s':>8}{'N·m':>8}{'share %':>9}"
+        rows = [head]
+        for number, joint in enumerate(self.joints, 1):
+            cells = (
+                (joint.rms_error_mrad, 10, 3, 1.0),
+                (joint.max_error_mrad, 10, 3, 1.0),
+                (joint.peak_velocity_rad_s, 8, 2, 1.0),
+                (joint.peak_torque_nm, 8, 1, 1.0),
+                (joint.torque_share, 9, 0, 100.0),
+            )
+            text = (f"{v * k:>{w}.{d}f}" if v is not None else f"{'-':>{w}}" for v, w, d, k in cells)
+            rows.append(f"{f'{number} {joint.name}':<20}" + "".join(text))
+        return "\n".join(rows)
+
+
+class Run(Samples):
+    """A motion that was run: how it ended, its samples and its figures."""
+
+    @property
+    def outcome(self) -> str:
+        """``finished``, ``stopped`` (on the way, here or by somebody else) or ``fault``."""
+        return self._native.outcome
+
+    @property
+    def duration(self) -> float:
+        """How long the trajectory was executed, s."""
+        return float(self._native.summary()["executed_s"])
+
+    @property
+    def failure(self) -> str | None:
+        """What broke first, in a line; None where nothing did."""
+        return self._native.failure
+
+    @property
+    def notes(self) -> list[str]:
+        """What was changed for the check."""
+        return self._native.notes
+
+    def __repr__(self) -> str:
+        return f"Run({self.outcome!r}, {self.duration:.2f} s, {len(self)} samples)"
+
+    def __str__(self) -> str:
+        head = self.failure or f"{self.outcome}: {self.duration:.2f} s, {len(self)} samples"
+        return f"{head}\n{self._table()}"
+
+
+class Check:
+    """What the check of a trajectory found: the one that guards each run.
+
+    True in a condition where nothing forbids to run it.
+    """
+
+    def __init__(self, verdict: dict[str, Any]) -> None:
+        self._verdict = verdict
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    @property
+    def ok(self) -> bool:
+        """Nothing forbids to run it."""
+        return bool(self._verdict["ok"])
+
+    @property
+    def refusals(self) -> list[str]:
+        """What forbids it, the worst first: joint, point, value, limit."""
+        return list(self._verdict["refusals"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is near a limit."""
+        return list(self._verdict["warnings"])
+
+    @property
+    def problems(self) -> list[dict[str, Any]]:
+        """Refusals and warnings as values: ``kind``, ``joint`` (from 1), ``point``, ``value``, ``limit``."""
+        return list(self._verdict["problems"])
+
+    @property
+    def joints(self) -> list[dict[str, Any]]:
+        """Peaks of each joint: velocity (rad/s), acceleration (rad/s²), torque (N·m) and their shares of the limits."""
+        return list(self._verdict["joints"])
+
+    @property
+    def next(self) -> str:
+        """What helps; empty where nothing is wrong."""
+        return str(self._verdict["next"])
+
+    def raise_if_refused(self) -> None:
+        """Raises `RefusedError` where something forbids to run it."""
+        if not self.ok:
+            raise RefusedError(str(self), "check", next=self.next)
+
+    def __repr__(self) -> str:
+        return f"Check(ok={self.ok}, {len(self.refusals)} refusals, {len(self.warnings)} warnings)"
+
+    def __str__(self) -> str:
+        return str(self._verdict["text"])
+
+
+class Plan(Samples):
+    """A motion that was planned: it is within the limits, and passed the check. Its samples are what is commanded, with the torques."""
+
+    def __init__(self, native: _native.Plan) -> None:
+        super().__init__(native.samples())
+        self._plan = native
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """What `Robot.run` runs."""
+        return self._plan.trajectory
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return self.trajectory.duration
+
+    @property
+    def waypoint_times(self) -> Array:
+        """When the motion is nearest to each waypoint, s: (W,)."""
+        return self._plan.waypoint_times
+
+    @property
+    def binding(self) -> list[dict[str, Any]]:
+        """Which limit of which joint is used up from when to when: ``from_s``, ``to_s``, ``joint``, ``limit``."""
+        return self._plan.binding()
+
+    @property
+    def notes(self) -> list[str]:
+        """What was changed for the check."""
+        return self._plan.notes
+
+    @property
+    def check(self) -> Check:
+        """What the check found."""
+        return Check(self._plan.check())
+
+    def __repr__(self) -> str:
+        return f"Plan({self.duration:.3f} s, {len(self.trajectory)} points)"
+
+
+class FlightLog(Samples):
+    """Every tick of the last seconds before the first error, read from the controller and run again by the same program."""
+
+    def __init__(self, native: _native.FlightLog) -> None:
+        super().__init__(native.samples())
+        self._log = native
+
+    @property
+    def story(self) -> list[str]:
+        """What happened in words, what broke first in front."""
+        return self._log.story
+
+    @property
+    def replayed(self) -> tuple[int, int]:
+        """Ticks in the log, and those for which the replay gave the same bits."""
+        return self._log.replayed
+
+    @property
+    def state(self) -> str:
+        """``recording``, or why the recorder stopped."""
+        return self._log.state
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Writes an MCAP recording that holds the log itself, too: ``jtc log replay`` reads it."""
+        self._log.save(path, overwrite)
+        return Path(path)
+
+    def __repr__(self) -> str:
+        return f"FlightLog({self.state!r}, {self.replayed[0]} ticks)"
+
+    def __str__(self) -> str:
+        return "\n".join(self.story)

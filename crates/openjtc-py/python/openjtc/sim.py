@@ -1,0 +1,411 @@
+"""The simulated arm: with the real controller (:class:`Simulator`), or for a controller of your own (:class:`Plant`).
+
+Time is virtual: it passes with ``step`` only, many times faster than the clock. The same arguments and calls give the same numbers,
+bit for bit. Arrays are (6,), base to wrist; positions are rad, velocities rad/s, torques N·m, times s.
+
+    >>> from openjtc.sim import Plant
+    >>> plant = Plant(seed=3)
+    >>> state = plant.step([0, 0, 0, 0, 0, 0], ms=10)
+    >>> round(state.time, 3)
+    0.01
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from openjtc import _native
+from openjtc._native import Arm
+from openjtc.control import Frame, Inputs, Outputs, Status, StatusReader, Telemetry, encode
+from openjtc.payload import Payload
+from openjtc.errors import DeviceError, FaultError, NoLinkError
+
+__all__ = ["ModelError", "Plant", "PlantState", "Simulator"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """How far the true arm is from the one that its file describes.
+
+    Attributes:
+        mass: Each link's mass, and its inertia with it, times 1 ± up to this, drawn from the seed.
+        friction: Each joint's friction times 1 ± up to this, drawn from the seed.
+        mass_factors: Factors of the base's and the six links' masses in place of drawn ones.
+        friction_factors: Factors of the six joints' frictions in place of drawn ones.
+    """
+
+    mass: float = 0.10
+    friction: float = 0.20
+    mass_factors: Sequence[float] | None = None
+    friction_factors: Sequence[float] | None = None
+
+
+def _arm(
+    arm: Arm | None,
+    seed: int,
+    payload: Payload | None,
+    model_error: ModelError | None,
+    start: ArrayLike | None,
+    friction: bool,
+) -> dict[str, object]:
+    error = None
+    if model_error is not None:
+        masses, frictions = model_error.mass_factors, model_error.friction_factors
+        error = (
+            float(model_error.mass),
+            float(model_error.friction),
+            None if masses is None else [float(f) for f in masses],
+            None if frictions is None else [float(f) for f in frictions],
+        )
+    return {
+        "arm": arm,
+        "seed": seed,
+        "payload": None if payload is None else payload._numbers(),
+        "model_error": error,
+        "start": None if start is None else np.asarray(start, dtype=np.float64).tolist(),
+        "friction": friction,
+    }
+
+
+class Simulator:
+    """Host line, the real controller, joint bus, drives and arm. All power was just switched on.
+
+    Args:
+        arm: The arm, which the controller has stored, where its file gives all of it. None: the built-in one, and a controller as new.
+        seed: Of all that is drawn by chance.
+        payload: What the arm really carries. The controller does not know of it until it is told (:func:`openjtc.control.encode.payload`).
+        model_error: How far the true arm is from its file; None: not at all.
+        start: Positions at the start; 0 where the joint gets there.
+        friction: Joints have the friction of the arm's file.
+        support: What holds the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they first are, or ``"none"``.
+        baud: Rate of the serial line, bit/s; None: bytes take no time.
+        answer_jitter_ms: Answers of the drives are late by up to so many milliseconds.
+        faults: What goes wrong and when, as the text of a fault file (``jtc help faults``).
+        watch: Keep what goes into the controller and comes out of it, for :attr:`inputs` and :attr:`outputs`.
+
+    Raises:
+        UsageError: An argument that there cannot be.
+    """
+
+    def __init__(
+        self,
+        arm: Arm | None = None,
+        *,
+        seed: int = 1,
+        payload: Payload | None = None,
+        model_error: ModelError | None = ModelError(),
+        start: ArrayLike | None = None,
+        friction: bool = True,
+        support: str = "brakes",
+        baud: int | None = 115_200,
+        answer_jitter_ms: int = 0,
+        faults: str | None = None,
+        watch: bool = False,
+    ) -> None:
+        simulated = _arm(arm, seed, payload, model_error, start, friction)
+        self._native = _native.Simulator(
+            simulated, support=support, baud=baud, answer_jitter_ms=answer_jitter_ms, faults=faults, watch=watch
+        )
+        self._reader = StatusReader()
+        self._status: Status | None = None
+
+    def step(self, ms: int = 1) -> None:
+        """Milliseconds pass."""
+        self._native.step(ms)
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self._native.time_ms / 1000
+
+    @property
+    def position(self) -> Floats:
+        """Where the arm really is, rad."""
+        return self._native.truth("position")
+
+    @property
+    def velocity(self) -> Floats:
+        """How fast it really is, rad/s."""
+        return self._native.truth("velocity")
+
+    @property
+    def torque(self) -> Floats:
+        """What the drives really give, N·m."""
+        return self._native.truth("torque")
+
+    @property
+    def outside_torque(self) -> Floats:
+        """What pushes and hands do to the joints, N·m."""
+        return self._native.truth("outside")
+
+    @property
+    def temperature(self) -> Floats:
+        """Of the bearings, °C."""
+        return self._native.truth("temperature")
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """What the controller's last tick computed."""
+        return self._native.telemetry
+
+    @property
+    def inputs(self) -> Inputs:
+        """What the controller was given in the last millisecond: :meth:`openjtc.control.Controller.tick` takes it. Needs ``watch=True``."""
+        return Inputs(*self._exchange()[0])
+
+    @property
+    def outputs(self) -> Outputs:
+        """What came out of it; where the tick did not come, nothing. Needs ``watch=True``."""
+        return Outputs(*self._exchange()[1], self._native.telemetry)
+
+    def _exchange(
+        self,
+    ) -> tuple[tuple[list[Frame], bytes, bool, bool, bool, bool, bool], tuple[Frame | None, bytes, bool]]:
+        exchange = self._native.exchange()
+        if exchange is None:
+            raise RuntimeError("inputs and outputs are kept with Simulator(watch=True)")
+        return exchange
+
+    def write(self, data: bytes) -> None:
+        """The host sends bytes; they reach the controller at the rate of the line."""
+        self._native.write(data)
+
+    def read(self) -> bytes:
+        """Bytes that have reached the host since the last call. :meth:`command` takes them, too."""
+        return self._native.read()
+
+    @property
+    def status(self) -> Status | None:
+        """The newest status that reached the host; it takes what :meth:`read` would return."""
+        self._responses()
+        return self._status
+
+    def _responses(self) -> list[Status]:
+        statuses = self._reader.feed(self._native.read())
+        if statuses:
+            self._status = statuses[-1]
+        return [status for status in statuses if status.response is not None]
+
+    def command(self, *frames: bytes, limit: float = 10.0) -> None:
+        """Sends frames one after the other, and steps until the controller has answered each.
+
+        Args:
+            frames: As :mod:`openjtc.control.encode` makes them.
+            limit: Longest time for a frame, s.
+
+        Raises:
+            DeviceError: The controller did not accept one.
+            NoLinkError: It did not answer one within the limit.
+        """
+        for frame in frames:
+            self.write(frame)
+            until = self.time + limit
+            while True:
+                self.step()
+                answers = [s.response for s in self._responses() if s.response and s.response.frame_type == frame[1]]
+                if answers:
+                    break
+                if self.time >= until:
+                    raise NoLinkError(f"frame 0x{frame[1]:02X}: no answer within {limit} s", "no-answer")
+            if not answers[0].accepted:
+                raise DeviceError(f"frame 0x{frame[1]:02X}: {answers[0].words}", "not-accepted")
+
+    def wait(self, state: str, *, limit: float = 20.0) -> None:
+        """Steps until the controller is in a state, such as ``"HoldPos"``.
+
+        Raises:
+            FaultError: It was not within the limit (s).
+        """
+        until = self.time + limit
+        while self.telemetry.state != state:
+            if self.time >= until:
+                status = self.status
+                causes = ", ".join(status.causes) if status else ""
+                raise FaultError(
+                    f"the controller is in {self.telemetry.state} after {limit} s, not in {state}", "timeout", cause=causes
+                )
+            self.step()
+
+    def bring_up(self, arm: Arm | None = None) -> None:
+        """Gives the controller its parameters, and steps until it holds the arm with every drive enabled.
+
+        Args:
+            arm: With the parameters of this arm; None: with those that it has stored or built in.
+
+        Raises:
+            DeviceError: The controller did not accept them.
+            FaultError: It does not hold the arm after 20 s.
+        """
+        self.command(*(encode.use_defaults() if arm is None else encode.parameters(arm)))
+        self.wait("HoldPos")
+        until = self.time + 20.0
+        while set(self.telemetry.drives) != {"OperationEnable"} or self.telemetry.state != "HoldPos":
+            if self.time >= until:
+                drives = ", ".join(self.telemetry.drives)
+                raise FaultError(f"the drives are not all enabled after 20 s: {drives}", "timeout")
+            self.step()
+
+    def inject(self, fault: Mapping[str, object]) -> None:
+        """One more fault, with the keys of a fault file (``jtc help faults``): ``{"kind": "encoder-jump", "joint": 3, "rad": 0.1}``.
+
+        Without ``at_s``, ``in_state`` or ``at_point`` it begins now; ``at_s`` counts from the start.
+
+        Raises:
+            UsageError: There is no such fault.
+        """
+        entry = dict(fault)
+        if not {"at_s", "in_state", "at_point"} & entry.keys():
+            entry["at_s"] = self.time
+        # Keys and values of TOML: strings and numbers are those of JSON.
+        lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
+        self._native.inject(f"format = 2\n[[fault]]\n{lines}\n")
+
+    def push(self, joint: int, torque: float, seconds: float) -> None:
+        """Someone pushes a joint (from 1) with a torque (N·m), from now on."""
+        self.inject({"kind": "push", "joint": joint, "torque_nm": float(torque), "for_s": float(seconds)})
+
+    def lead(self, path: ArrayLike, step: float = 0.01) -> None:
+        """A hand leads the arm along a path (N, 6), rad, ``step`` seconds from row to row, as soon as it is taught."""
+        self._native.lead(path, step)
+
+    def set_safety_input(self, level: bool) -> None:
+        """Level of the controller's safety input; True is no error."""
+        self._native.set_safety_input(level)
+
+    @property
+    def safety_output(self) -> bool:
+        """Level of the controller's safety output; True is no error."""
+        return self._native.safety_output
+
+    @property
+    def bus_frames(self) -> list[Frame]:
+        """All frames on the joint bus in the last millisecond, in their order."""
+        return self._native.bus_frames()
+
+    @property
+    def events(self) -> list[tuple[float, str]]:
+        """What happened, oldest first: time in s, and words."""
+        return self._native.events()
+
+    @property
+    def statistics(self) -> dict[str, float]:
+        """Counted since the start: bytes, frames, resets, and the load of the joint bus."""
+        return self._native.statistics()
+
+
+@dataclass(frozen=True, eq=False)
+class PlantState:
+    """What a controller has to go by. Arrays are (6,).
+
+    Attributes:
+        time: s since the start.
+        position: rad, as the drives read it 2 ms before a torque that is computed from it acts: in steps of 0.1 mrad.
+        velocity: rad/s, a mean over 10 ms.
+        temperature: Of the bearings, °C.
+        enabled: The drive carries its joint. One that has tripped lets its brake hold it.
+        errors: Error bits of the drives.
+    """
+
+    time: float
+    position: Floats
+    velocity: Floats
+    temperature: Floats
+    enabled: list[bool] = field(default_factory=list)
+    errors: list[int] = field(default_factory=list)
+
+    @property
+    def faulted(self) -> bool:
+        """A drive has tripped: the arm stands until :meth:`Plant.reset`."""
+        return not all(self.enabled)
+
+
+class Plant:
+    """Arm and drives without a controller: each millisecond a torque goes in and a measurement comes out.
+
+    It is the plant of :class:`Simulator`: the same bodies, friction and stops, the same drives with their encoders, over-speed trip,
+    working area and torque limit, and the same delay over the joint bus. The drives are enabled; brakes hold an arm whose drives trip.
+
+    Args:
+        arm: The arm; None: the built-in one.
+        seed: Of all that is drawn by chance: with the same ``model_error`` the true arm is that of a :class:`Simulator` of this seed.
+        payload: What it carries.
+        model_error: How far the true arm is from its file; None: not at all.
+        start: Positions at the start; 0 where the joint gets there.
+        friction: Joints have the friction of the arm's file; False: none.
+        drives: False: the arm alone. Torques act at once, states are exact, and nothing trips.
+
+    Raises:
+        UsageError: An argument that there cannot be.
+    """
+
+    def __init__(
+        self,
+        arm: Arm | None = None,
+        *,
+        seed: int = 1,
+        payload: Payload | None = None,
+        model_error: ModelError | None = ModelError(),
+        start: ArrayLike | None = None,
+        friction: bool = True,
+        drives: bool = True,
+    ) -> None:
+        simulated = _arm(arm, seed, payload, model_error, start, friction)
+        self._native = _native.Plant(simulated, drives=drives)
+
+    def step(self, torque: ArrayLike, ms: int = 1) -> PlantState:
+        """Milliseconds under torques (6,), N·m. The drives round them to 0.011 N·m and reach :attr:`torque_max` at most.
+
+        Raises:
+            UsageError: Not six finite numbers.
+        """
+        self._native.step(torque, ms)
+        return self.state
+
+    def reset(self, position: ArrayLike) -> PlantState:
+        """The same arm, cold and at rest at these positions (6,), its drives enabled, at time 0.
+
+        Raises:
+            UsageError: A position beyond an end stop.
+        """
+        self._native.reset(position)
+        return self.state
+
+    @property
+    def state(self) -> PlantState:
+        """What was measured last."""
+        native = self._native
+        return PlantState(
+            native.time_ms / 1000, native.position, native.velocity, native.temperature, native.enabled, native.errors
+        )
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self._native.time_ms / 1000
+
+    @property
+    def true_position(self) -> Floats:
+        """Where the arm really is, rad."""
+        return self._native.truth("position")
+
+    @property
+    def true_velocity(self) -> Floats:
+        """How fast it really is, rad/s."""
+        return self._native.truth("velocity")
+
+    @property
+    def true_torque(self) -> Floats:
+        """What the drives really give, N·m."""
+        return self._native.truth("torque")
+
+    @property
+    def torque_max(self) -> Floats:
+        """What the drives reach, N·m."""
+        return self._native.torque_max

@@ -1,0 +1,62 @@
+"""What a controller reports, and what a look at it finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Finding", "Status"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the controller reports of itself and the arm.
+
+    Attributes:
+        state: State of the controller: ``Init``, ``HoldPos``, ``Operate``, ``Teaching``, ``Error`` …
+        trajectory: What becomes of its trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
+        point: Millisecond of the path.
+        position: Measured positions (6,), rad.
+        velocity: Measured velocities (6,), rad/s.
+        torque: Torques that the drives report (6,), N·m.
+        temperature: Bearing temperatures (6,), °C.
+        joint_states: State of each drive.
+        errors: What is wrong now, in words.
+        warnings: What the drives warn of.
+        waiting_for: What the controller does or waits for, in a line.
+        next: What helps, or comes next.
+    """
+
+    state: str
+    trajectory: str
+    point: int
+    position: Array
+    velocity: Array
+    torque: Array
+    temperature: Array
+    joint_states: list[str]
+    errors: list[str]
+    warnings: list[str]
+    waiting_for: str
+    next: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a look at link, bus and set-up found.
+
+    Attributes:
+        severity: ``problem``, ``warning`` or ``good``.
+        what: What was found.
+        why: The likely cause.
+        next: What helps.
+    """
+
+    severity: str
+    what: str
+    why: str
+    next: str

@@ -1,0 +1,169 @@
+//! An arm: kinematics, masses, limits, gains, friction, named poses.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use jtc_core::JOINTS;
+use jtc_host::arm::{Arm as HostArm, ArmChoice};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::array;
+use crate::error::Failure;
+
+/// An arm, as a file describes it. It does not change.
+#[pyclass(frozen, module = "openjtc")]
+pub struct Arm {
+    pub inner: Arc<HostArm>,
+}
+
+impl Arm {
+    /// As Python has it.
+    pub fn of(arm: HostArm) -> Self {
+        Self { inner: Arc::new(arm) }
+    }
+}
+
+#[pymethods]
+impl Arm {
+    /// From a TOML or URDF file, recognised by its content.
+    #[staticmethod]
+    fn load(path: PathBuf) -> Result<Self, Failure> {
+        Ok(Self::of(HostArm::load(&path)?))
+    }
+
+    /// From the text of such a file.
+    #[staticmethod]
+    fn parse(text: &str) -> Result<Self, Failure> {
+        Ok(Self::of(HostArm::parse(text)?))
+    }
+
+    /// From a robot description; what it lacks is proposed and marked.
+    #[staticmethod]
+    #[pyo3(signature = (path, joints=None, tip=None))]
+    fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {
+        Ok(Self::of(HostArm::import(&path, &ArmChoice { joints, tip })?))
+    }
+
+    /// The arm that is built in.
+    #[staticmethod]
+    fn avena() -> Self {
+        Self::of(HostArm::avena())
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    #[getter]
+    fn joint_names(&self) -> Vec<&str> {
+        self.inner.joint_names.iter().map(String::as_str).collect()
+    }
+
+    /// Named joint positions, rad.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = PyDict::new(py);
+        for (name, position) in &self.inner.poses {
+            poses.set_item(name, PyArray1::from_slice(py, position))?;
+        }
+        Ok(poses)
+    }
+
+    fn pose<'py>(&self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
+        let position = self.inner.pose(name).map_err(|error| Failure::of(&error))?;
+        Ok(PyArray1::from_slice(py, &position))
+    }
+
+    /// The limits that count, an array each.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let config = self.inner.config();
+        let limits = PyDict::new(py);
+        type Of = fn(&jtc_core::JointConfig) -> f64;
+        let columns: [(&str, Of); 5] = [
+            ("position_min", |j| j.position_min),
+            ("position_max", |j| j.position_max),
+            ("velocity_max", |j| j.velocity_max),
+            ("acceleration_max", |j| j.acceleration_max),
+            ("torque_max", |j| j.torque_max),
+        ];
+        for (name, of) in columns {
+            limits.set_item(name, PyArray1::from_slice(py, &config.joints.each_ref().map(of)))?;
+        }
+        Ok(limits)
+    }
+
+    /// Gains, friction polynomial and rotor inertia; `None` where the file does not give them.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let gains = self.inner.pid?;
+        Some(array::wide(py, &gains.map(|g| [g.kp, g.ki, g.kd])))
+    }
+
+    #[getter]
+    fn friction<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        self.inner.polynomial.as_ref().map(|all| array::wide(py, all))
+    }
+
+    #[getter]
+    fn rotor_inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.config().joints.each_ref().map(|j| j.rotor_inertia))
+    }
+
+    #[getter]
+    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.model.links.each_ref().map(|link| link.mass))
+    }
+
+    /// Acceleration of gravity in the base frame, m/s².
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.config().gravity)
+    }
+
+    /// What was not carried over from its file, filled in or proposed.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings.iter().map(ToString::to_string).collect()
+    }
+
+    /// What `jtc arm check` finds: severity, what, why, next.
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let list = PyList::empty(py);
+        for found in self.inner.check().findings {
+            let value = serde_json::to_value(&found).unwrap_or_default();
+            list.append(crate::json::to_python(py, &value)?)?;
+        }
+        Ok(list)
+    }
+
+    /// The arm file.
+    fn to_toml(&self) -> String {
+        self.inner.to_toml()
+    }
+
+    /// A robot description of it.
+    fn to_urdf(&self) -> String {
+        self.inner.to_urdf()
+    }
+
+    /// A pose is saved in an arm file, whose comments and order stay.
+    #[staticmethod]
+    #[pyo3(signature = (path, name, position, force=false))]
+    fn save_pose(path: PathBuf, name: &str, position: &Bound<'_, PyAny>, force: bool) -> Result<(), Failure> {
+        let position: [f64; JOINTS] = array::joints(position, "position")?;
+        jtc_host::arm::save_pose(&path, name, &position, force).map_err(|error| Failure::of(&error))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Arm({:?})", self.inner.name)
+    }
+}
+
+/// The class.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Arm>()
+}

@@ -1,0 +1,79 @@
+//! Arrays of numpy as arrays of joints, and back: one row a state, one column a joint, base to wrist.
+
+use jtc_core::JOINTS;
+use numpy::{
+    PyArray1, PyArray2, PyArrayDyn, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _,
+};
+use pyo3::prelude::*;
+
+use crate::error::Failure;
+
+/// An array of numpy or anything that becomes one (lists, tuples), as floats.
+pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyArrayDyn<'py, f64>, Failure> {
+    let made = || -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let numpy = value.py().import("numpy")?;
+        let array = numpy.call_method1("ascontiguousarray", (value, "float64"))?;
+        // `ascontiguousarray` gives scalars a dimension; nothing here is a scalar.
+        Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+    };
+    made().map(|array| array.readonly()).map_err(|error| {
+        Failure::usage(format!("{what}: is no array of numbers: {error}"))
+            .next("pass six numbers, or rows of six")
+    })
+}
+
+/// Six finite numbers, base to wrist; `what` names them in the error.
+pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
+    let array = floats(value, what)?;
+    let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
+    let numbers = numbers.filter(|_| array.ndim() == 1).ok_or_else(|| {
+        Failure::usage(format!("{what}: has the shape {:?}, not (6,)", array.shape()))
+            .next("pass one number a joint, base to wrist")
+    })?;
+    finite(&[numbers], what)?;
+    Ok(numbers)
+}
+
+/// Rows of six finite numbers, and whether it was one row without a second dimension.
+pub fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
+    let array = floats(value, what)?;
+    let shape = array.shape().to_vec();
+    let one = shape == [JOINTS];
+    if !one && (shape.len() != 2 || shape[1] != JOINTS) {
+        return Err(Failure::usage(format!("{what}: has the shape {shape:?}, not (6,) or (N, 6)"))
+            .next("pass one number a joint, base to wrist, in each row"));
+    }
+    let numbers = array.as_slice().map_err(|e| Failure::usage(format!("{what}: {e}")))?;
+    let rows: Vec<[f64; JOINTS]> = numbers.as_chunks::<JOINTS>().0.to_vec();
+    finite(&rows, what)?;
+    Ok((rows, one))
+}
+
+fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
+    for (number, row) in rows.iter().enumerate() {
+        if let Some(joint) = row.iter().position(|value| !value.is_finite()) {
+            let place = if rows.len() > 1 { format!("row {number}, ") } else { String::new() };
+            return Err(Failure::usage(format!("{what}: {place}joint {} is {}", joint + 1, row[joint])));
+        }
+    }
+    Ok(())
+}
+
+/// An (N, 6) array.
+pub fn matrix<'py>(py: Python<'py>, rows: &[[f64; JOINTS]]) -> Bound<'py, PyArray2<f64>> {
+    wide(py, rows)
+}
+
+/// An (N, M) array.
+pub fn wide<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> Bound<'py, PyArray2<f64>> {
+    let flat = PyArray1::from_slice(py, rows.as_flattened());
+    flat.reshape([rows.len(), M]).unwrap_or_else(|_| PyArray2::zeros(py, [rows.len(), M], false))
+}
+
+/// A (6,) array where there was one row, else an (N, 6) array.
+pub fn as_given<'py>(py: Python<'py>, rows: &[[f64; JOINTS]], one: bool) -> Bound<'py, PyAny> {
+    match rows {
+        [row] if one => PyArray1::from_slice(py, row).into_any(),
+        rows => matrix(py, rows).into_any(),
+    }
+}

@@ -1,0 +1,104 @@
+//! The real control code, one tick a call.
+
+use jtc_bus::{Format, Frame};
+use jtc_core::{BusState, Config};
+use jtc_host::Arm as HostArm;
+use jtc_sim::{Board, Pins, SimConfig};
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
+
+use crate::arm::Arm;
+use crate::error::Failure;
+use crate::telemetry::Telemetry;
+
+/// A frame of the joint bus as Python has it.
+pub type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
+
+/// What comes out of a tick: frame for the bus, bytes for the host, safety output, and whether the watchdog reset the controller.
+type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool);
+
+/// A frame of the joint bus from what Python has.
+pub fn frame(id: u32, data: &[u8]) -> Result<Frame, Failure> {
+    Frame::received(id, Format::BUS, data).map_err(|error| Failure::usage(error.to_string()))
+}
+
+/// The same for Python.
+pub fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
+    (frame.id, PyBytes::new(py, frame.data()))
+}
+
+/// The settings of a controller for an arm, and the image of the arm that its board has stored. Without an arm it is as new.
+pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
+    let Some(arm) = arm else { return Ok((Config::avena(), None)) };
+    let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
+    // With an image all that it knows comes from there, as on a board; else it has the limits, and waits for parameters.
+    Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
+}
+
+/// A controller on its board. Time passes with its ticks only.
+#[pyclass(module = "openjtc._native")]
+pub struct Controller {
+    board: Board,
+    now_us: u64,
+}
+
+#[pymethods]
+impl Controller {
+    #[new]
+    #[pyo3(signature = (arm=None))]
+    fn new(arm: Option<&Arm>) -> Result<Self, Failure> {
+        let (config, stored) = of_arm(arm.map(|arm| &*arm.inner))?;
+        let world = SimConfig::default();
+        let board = Board::new(config, stored, world.inter_byte_timeout_us, world.watchdog_ms);
+        Ok(Self { board, now_us: 0 })
+    }
+
+    /// One millisecond.
+    #[expect(clippy::too_many_arguments, reason = "the inputs of a tick; Python has them in one object")]
+    fn tick<'py>(
+        &mut self,
+        py: Python<'py>,
+        bus: Vec<(u32, PyBackedBytes)>,
+        host: &[u8],
+        acknowledged: bool,
+        bus_off: bool,
+        safety_input: bool,
+        status_free: bool,
+        ticked: bool,
+    ) -> Result<PyOutputs<'py>, Failure> {
+        let frames = bus.iter().map(|(id, data)| frame(*id, data)).collect::<Result<Vec<_>, _>>()?;
+        self.board.receive(self.now_us, host);
+        self.now_us += 1_000;
+        if !ticked {
+            let reset = self.board.miss();
+            return Ok((None, PyBytes::new(py, &[]), false, reset));
+        }
+        let outputs = self.board.tick(&Pins {
+            bus: &frames,
+            bus_state: BusState { acknowledged, bus_off },
+            safety_input,
+            status_free,
+        });
+        let sent = outputs.bus.map(|frame| to_python(py, &frame));
+        let to_host = PyBytes::new(py, &self.board.bytes_to_host(&outputs));
+        Ok((sent, to_host, outputs.safety_output, false))
+    }
+
+    /// What the last tick computed.
+    #[getter]
+    fn telemetry(&self) -> Telemetry {
+        Telemetry(*self.board.telemetry())
+    }
+
+    /// Time since the start, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.now_us as f64 * 1e-6
+    }
+}
+
+/// The class.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Controller>()
+}

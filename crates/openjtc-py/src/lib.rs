@@ -1,0 +1,41 @@
+#![doc = include_str!("../README.md")]
+
+mod arm;
+mod array;
+mod controller;
+mod dynamics;
+mod error;
+mod json;
+mod log;
+mod planner;
+mod plant;
+mod robot;
+mod run;
+mod simulated;
+mod simulator;
+mod telemetry;
+mod trajectory;
+mod ucom;
+mod wire;
+
+use pyo3::prelude::*;
+
+/// The compiled part of the package `openjtc`; its Python files are what people import.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    arm::register(module)?;
+    trajectory::register(module)?;
+    planner::register(module)?;
+    run::register(module)?;
+    log::register(module)?;
+    robot::register(module)?;
+    telemetry::register(module)?;
+    controller::register(module)?;
+    dynamics::register(module)?;
+    plant::register(module)?;
+    simulator::register(module)?;
+    wire::register(module)?;
+    ucom::register(module)?;
+    Ok(())
+}

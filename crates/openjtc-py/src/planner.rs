@@ -1,0 +1,266 @@
+//! Motions from poses and waypoints, and the check that guards each upload.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use jtc_core::Payload;
+use jtc_host::check::{Checker, Verdict};
+use jtc_host::error::Facts;
+use jtc_host::plan::kinematics::{Orientation, Target};
+use jtc_host::plan::{COLD, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint};
+use jtc_host::recording::RecordingInfo;
+use jtc_host::waypoints::{WaypointError, WaypointFile};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+use crate::arm::Arm;
+use crate::error::Failure;
+use crate::run::Samples;
+use crate::trajectory::Trajectory;
+use crate::{array, json};
+
+/// A verdict as plain values, with what refuses and what warns in words.
+pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, PyAny>> {
+    let all = json::plain(py, verdict)?;
+    all.set_item("ok", verdict.is_ok())?;
+    all.set_item("text", verdict.to_string())?;
+    all.set_item("refusals", verdict.refusals().map(ToString::to_string).collect::<Vec<_>>())?;
+    all.set_item("warnings", verdict.warnings().map(ToString::to_string).collect::<Vec<_>>())?;
+    all.set_item("next", if verdict.is_ok() { String::new() } else { verdict.hint() })?;
+    Ok(all)
+}
+
+/// A motion that was planned, and passed the check.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct Plan {
+    planned: Planned,
+    samples: Vec<jtc_host::Sample>,
+    info: RecordingInfo,
+}
+
+#[pymethods]
+impl Plan {
+    #[getter]
+    fn trajectory(&self) -> Trajectory {
+        Trajectory::of(self.planned.trajectory.clone())
+    }
+
+    #[getter]
+    fn waypoint_times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.planned.waypoint_times)
+    }
+
+    /// Which limit of which joint binds from when to when.
+    fn binding<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
+        json::plain(py, &self.planned.binding)
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.planned.notes.clone()
+    }
+
+    fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        verdict(py, &self.planned.verdict)
+    }
+
+    /// What is commanded at each point, with its torques.
+    fn samples(&self) -> Samples {
+        let Planned { binding, notes, .. } = &self.planned;
+        Samples::of_plan(self.info.clone(), self.samples.clone(), binding.clone(), notes.clone())
+    }
+}
+
+/// Plans for one arm.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct Planner {
+    arm: Arc<jtc_host::Arm>,
+    config: jtc_core::Config,
+    speed: f64,
+    blend: f64,
+    blend_m: f64,
+    line: bool,
+    jerk: bool,
+    temperature: f64,
+}
+
+impl Planner {
+    fn plan(
+        &self,
+        py: Python<'_>,
+        plan: impl FnOnce(&HostPlanner<'_>) -> Result<Planned, Failure> + Send,
+    ) -> PyResult<Plan> {
+        let planned = py.detach(|| {
+            let friction = self.arm.friction();
+            let planner = HostPlanner {
+                model: Some(&self.arm.model),
+                friction: friction.as_ref(),
+                temperature: self.temperature,
+                speed_pct: self.speed,
+                blend: self.blend,
+                jerk: self.jerk,
+                ..HostPlanner::new(&self.config)
+            };
+            let planned = plan(&planner)?;
+            let samples = planner.samples(&planned.trajectory);
+            let (source, trajectory) = ("planned, not run".to_owned(), "plan".to_owned());
+            let info = RecordingInfo { source, trajectory, ..RecordingInfo::of(&self.arm) };
+            Ok::<_, Failure>(Plan { planned, samples, info })
+        });
+        Ok(planned?)
+    }
+
+    fn waypoints(&self, py: Python<'_>, file: WaypointFile) -> PyResult<Plan> {
+        self.plan(py, |planner| {
+            let options = WayOptions { line: self.line, blend: self.blend, blend_m: self.blend_m };
+            let way = Way::of(&file, &self.arm, options).map_err(|error| of_waypoints(&error))?;
+            way.planned(planner).map_err(|error| Failure { message: file.located(&error), ..error.into() })
+        })
+    }
+}
+
+fn of_waypoints(error: &WaypointError) -> Failure {
+    Failure::with(error, Facts::of_waypoints(error))
+}
+
+#[pymethods]
+impl Planner {
+    #[new]
+    #[pyo3(signature = (arm, speed, blend, blend_m, line, jerk, temperature, payload))]
+    #[allow(clippy::too_many_arguments, reason = "Python names them")]
+    fn new(
+        arm: &Arm,
+        speed: f64,
+        blend: f64,
+        blend_m: f64,
+        line: bool,
+        jerk: bool,
+        temperature: Option<f64>,
+        payload: Option<(f64, [f64; 3], [f64; 6])>,
+    ) -> Result<Self, Failure> {
+        let payload = payload.map(|(mass, com, inertia)| Payload { mass, com, inertia }).unwrap_or_default();
+        payload.check().map_err(|error| Failure::usage(format!("payload: {error}")))?;
+        for (what, value) in [("blend", blend), ("blend_m", blend_m)] {
+            if !value.is_finite() || value < 0.0 {
+                return Err(Failure::usage(format!("{what}: {value} is no distance")));
+            }
+        }
+        let config = jtc_core::Config { payload, ..arm.inner.config() };
+        let temperature = temperature.unwrap_or(COLD);
+        Ok(Self { arm: Arc::clone(&arm.inner), config, speed, blend, blend_m, line, jerk, temperature })
+    }
+
+    /// From a position at rest to another one.
+    fn to(&self, py: Python<'_>, start: &Bound<'_, PyAny>, to: &Bound<'_, PyAny>) -> PyResult<Plan> {
+        let target = Target::Joints(array::joints(to, "to")?);
+        let start = array::joints(start, "start")?;
+        self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
+    }
+
+    /// From a position at rest to a pose of the flange: x y z (m), roll pitch yaw (rad).
+    fn to_flange(
+        &self,
+        py: Python<'_>,
+        start: &Bound<'_, PyAny>,
+        flange: &Bound<'_, PyAny>,
+    ) -> PyResult<Plan> {
+        let [x, y, z, angles @ ..] = array::joints(flange, "flange")?;
+        let pose = Orientation::Rpy(angles).at([x, y, z]);
+        let target = Target::Flange(pose.map_err(|error| Failure::usage(error.to_string()))?);
+        let start = array::joints(start, "start")?;
+        self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
+    }
+
+    /// Through positions (N, 6), with times (s from the first, NaN: as soon as the limits allow).
+    #[pyo3(signature = (positions, times=None))]
+    fn through(
+        &self,
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        times: Option<Vec<f64>>,
+    ) -> PyResult<Plan> {
+        let (positions, _) = array::rows(positions, "waypoints")?;
+        let times = times.unwrap_or_else(|| vec![f64::NAN; positions.len()]);
+        if times.len() != positions.len() {
+            let (count, given) = (positions.len(), times.len());
+            return Err(Failure::usage(format!("{count} waypoints and {given} times: each has one")).into());
+        }
+        let waypoints: Vec<Waypoint> = positions
+            .into_iter()
+            .zip(times)
+            .map(|(position, time)| Waypoint { position, time: time.is_finite().then_some(time) })
+            .collect();
+        self.plan(py, |planner| Ok(planner.through(&waypoints)?))
+    }
+
+    /// Through the waypoints of a file, CSV or JSON.
+    fn through_file(&self, py: Python<'_>, path: PathBuf, degrees: bool) -> PyResult<Plan> {
+        let file = WaypointFile::load(&path).map_err(Failure::from)?;
+        let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
+        self.waypoints(py, file)
+    }
+
+    /// Through the waypoints of the text of such a file.
+    fn through_text(&self, py: Python<'_>, text: &str, degrees: bool) -> PyResult<Plan> {
+        let file = WaypointFile::parse(text).map_err(Failure::from)?;
+        let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
+        self.waypoints(py, file)
+    }
+
+    /// Checks a trajectory, from `start` where it is given.
+    #[pyo3(signature = (trajectory, start=None))]
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+        trajectory: &Trajectory,
+        start: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let start = start.map(|start| array::joints(start, "start")).transpose()?;
+        let found = py.detach(|| {
+            let friction = self.arm.friction();
+            let checker = Checker {
+                model: Some(&self.arm.model),
+                friction: friction.as_ref(),
+                start,
+                ..Checker::new(&self.config)
+            };
+            checker.check(&trajectory.inner)
+        });
+        verdict(py, &found)
+    }
+}
+
+/// Trajectories and files to try, by their names: the text of one.
+#[pyfunction]
+fn example_text(name: &str) -> Result<String, Failure> {
+    let all = &jtc_host::example::EXAMPLES;
+    all.iter().find(|example| example.name == name).map(|example| example.text().into()).ok_or_else(|| {
+        let names: Vec<_> = all.iter().map(|example| example.name).collect();
+        Failure::usage(format!("there is no example {name:?}"))
+            .next(format!("there are {}", names.join(", ")))
+    })
+}
+
+/// As few of the positions (N, 6) as keep every other one within a tolerance (rad) of the legs between them.
+#[pyfunction]
+fn thinned<'py>(
+    py: Python<'py>,
+    positions: &Bound<'py, PyAny>,
+    tolerance: f64,
+) -> Result<Bound<'py, numpy::PyArray2<f64>>, Failure> {
+    if !(1e-6..=1.0).contains(&tolerance) {
+        return Err(Failure::usage(format!("a tolerance of {tolerance} rad is outside 0.000001..1"))
+            .next("0.01 rad is half a degree"));
+    }
+    let (rows, _) = array::rows(positions, "positions")?;
+    let kept = jtc_host::waypoints::thinned(&rows, tolerance);
+    Ok(array::matrix(py, &kept.into_iter().map(|i| rows[i]).collect::<Vec<_>>()))
+}
+
+/// The classes and functions.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Planner>()?;
+    module.add_class::<Plan>()?;
+    module.add_function(wrap_pyfunction!(thinned, module)?)?;
+    module.add_function(wrap_pyfunction!(example_text, module)?)
+}

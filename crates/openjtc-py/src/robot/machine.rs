@@ -1,0 +1,339 @@
+//! What the worker has: the port, the session over it, and the arm that motions are checked against.
+
+use std::cell::{Cell, RefCell};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use jtc_client::agents::{owner_of, registered};
+use jtc_client::{AgentPort, Options};
+use jtc_core::Payload;
+use jtc_host::port::SerialPort;
+use jtc_host::port::sim::SimPort;
+use jtc_host::recording::SampleSink;
+use jtc_host::session::BRING_UP;
+use jtc_host::{Arm, Port, PortError, Sample, Session};
+use jtc_sim::{FaultPlan, SimConfig, World};
+
+use super::worker::{Asked, Shared};
+use crate::error::Failure;
+
+/// How long a status is waited for while nothing else is to do.
+const IDLE: Duration = Duration::from_millis(10);
+/// A simulator that is behind the clock by more than this goes on from there: nothing is made up for.
+const BEHIND: Duration = Duration::from_millis(100);
+
+/// A simulated controller with its arm.
+pub struct Simulated {
+    pub seed: u64,
+    /// Times real time; `None`: as fast as the computer is, and only while somebody waits for something.
+    pub speed: Option<f64>,
+    pub faults: FaultPlan,
+    /// On the simulated arm; the controller is not given it.
+    pub payload: Payload,
+}
+
+/// What is connected to.
+pub enum Way {
+    Simulated(Box<Simulated>),
+    /// A serial port and its rate, or the agent that owns it.
+    Serial {
+        path: String,
+        baud: u32,
+    },
+    /// `http://…` or `https://…`.
+    Agent {
+        url: String,
+    },
+}
+
+/// What is connected to, and as whom.
+pub struct Target {
+    pub way: Way,
+    /// The arm that was named.
+    pub arm: Option<Arc<Arm>>,
+    /// As agents show it to others.
+    pub name: String,
+    pub token: Option<String>,
+    pub certificates: Option<PathBuf>,
+}
+
+/// A port of any kind; a simulator remains one.
+pub enum AnyPort {
+    Simulated(SimPort),
+    Other(Box<dyn Port>),
+}
+
+macro_rules! each_port {
+    ($port:ident, $own:ident => $do:expr) => {
+        match $own {
+            AnyPort::Simulated($port) => $do,
+            AnyPort::Other($port) => $do,
+        }
+    };
+}
+
+impl Port for AnyPort {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        each_port!(port, self => port.read(buffer, timeout))
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        each_port!(port, self => port.write_all(bytes))
+    }
+    fn now(&self) -> Duration {
+        each_port!(port, self => port.now())
+    }
+    fn baud(&self) -> Option<u32> {
+        each_port!(port, self => port.baud())
+    }
+    fn name(&self) -> String {
+        each_port!(port, self => port.name())
+    }
+    fn take_denial(&mut self) -> Option<String> {
+        each_port!(port, self => port.take_denial())
+    }
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        each_port!(port, self => port.ask_to_move())
+    }
+}
+
+/// What is recorded of a motion.
+#[derive(Default)]
+pub struct Tape {
+    on: Cell<bool>,
+    zero: Cell<Option<f64>>,
+    samples: RefCell<Vec<Sample>>,
+    sink: RefCell<Option<SampleSink>>,
+}
+
+impl Tape {
+    /// From now on samples are kept, and written where there is a file; those before stay.
+    pub fn record(&self, sink: Option<SampleSink>) {
+        self.on.set(true);
+        self.zero.set(None);
+        *self.sink.borrow_mut() = sink;
+    }
+
+    /// Takes a sample on a clock of its own; the recording's begins at 0, and a further motion behind the last one.
+    pub fn push(&self, sample: &Sample) {
+        if !self.on.get() {
+            return;
+        }
+        let zero = self.zero.get().unwrap_or_else(|| {
+            let last = self.samples.borrow().last().map_or(0.0, |last| last.time_s + 1e-3);
+            let zero = sample.time_s - last;
+            self.zero.set(Some(zero));
+            zero
+        });
+        let sample = Sample { time_s: sample.time_s - zero, ..*sample };
+        if let Some(sink) = &*self.sink.borrow() {
+            sink.write(&sample);
+        }
+        self.samples.borrow_mut().push(sample);
+    }
+
+    /// A sample that was kept before stays.
+    pub fn keep(&self, sample: &Sample) {
+        self.samples.borrow_mut().push(*sample);
+    }
+
+    /// Nothing more is kept.
+    pub fn pause(&self) {
+        self.on.set(false);
+        self.sink.borrow_mut().take();
+    }
+
+    /// What was kept.
+    pub fn take(&self) -> Vec<Sample> {
+        self.pause();
+        self.samples.take()
+    }
+}
+
+/// What the worker has.
+pub struct Machine {
+    pub session: Session<AnyPort>,
+    /// The arm that was named, else the built-in one; a controller with extensions has its own.
+    pub arm: Arc<Arm>,
+    /// It was named.
+    pub named: bool,
+    pub shared: Arc<Shared>,
+    pub tape: Rc<Tape>,
+    /// Real time goes on without us.
+    time_passes: bool,
+    /// Teaching was switched on here.
+    pub teaching: bool,
+    /// A motion was started here and did not end yet.
+    pub in_motion: bool,
+}
+
+impl Machine {
+    /// Connects; a simulator is given its parameters and holds its arm.
+    pub fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
+        let arm = target.arm.clone().unwrap_or_else(|| Arc::new(Arm::avena()));
+        let (tape, pace) = (Rc::<Tape>::default(), Rc::<Cell<Option<f64>>>::default());
+        let (port, speed, stored) = match target.way {
+            Way::Simulated(simulated) => {
+                let speed = simulated.speed;
+                let (port, stored) = simulator(*simulated, &arm, &target.arm, &tape, &pace)?;
+                (AnyPort::Simulated(port), Some(speed), stored)
+            }
+            Way::Agent { ref url } => (AnyPort::Other(agent(url, &target)?), None, false),
+            Way::Serial { ref path, baud } => (AnyPort::Other(serial(path, baud, &target)?), None, false),
+        };
+        let time_passes = speed.is_none_or(|speed| speed.is_some());
+        let session = Session::new(port);
+        let named = target.arm.is_some();
+        let mut machine =
+            Self { session, arm, named, shared, tape, time_passes, teaching: false, in_motion: false };
+        if let Some(speed) = speed {
+            machine.bring_up(stored, asked)?;
+            pace.set(speed);
+        } else {
+            // Who does not answer is an error here, and not at the first motion.
+            machine.session.fresh_status()?;
+        }
+        machine.publish();
+        Ok(machine)
+    }
+
+    /// A simulated controller that holds its arm, as fast as the computer is.
+    fn bring_up(&mut self, stored: bool, asked: &Asked) -> Result<(), Failure> {
+        let status = self.session.fresh_status()?;
+        if status.jtc_init != 0 && stored {
+            self.session.use_defaults()?;
+        } else if status.jtc_init != 0 {
+            let set = self.arm.parameter_set();
+            self.session.push_until(&set, || asked.is_halted(), |_| {})?;
+        }
+        self.session.wait_ready(2 * BRING_UP)?;
+        Ok(())
+    }
+
+    /// Real time goes on without us: statuses come, and are taken.
+    pub fn time_passes(&self) -> bool {
+        self.time_passes
+    }
+
+    /// Takes what comes while nothing is asked for. A line that is lost is reported by the next thing that is.
+    pub fn idle(&mut self) {
+        match self.session.poll(IDLE) {
+            Ok(_) => self.publish(),
+            Err(_) => std::thread::sleep(IDLE),
+        }
+    }
+
+    /// The last status is everybody's.
+    pub fn publish(&self) {
+        if let Some(status) = self.session.last() {
+            self.shared.publish(status);
+        }
+    }
+
+    /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.
+    pub fn device_arm(&mut self) -> Result<Arm, Failure> {
+        let mut arm = match self.session.info()? {
+            None => return Ok((*self.arm).clone()),
+            Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
+            Some(_) => self.session.device_arm()?,
+        };
+        if self.named {
+            let differences = self.arm.differences(&arm);
+            if let Some(first) = differences.first() {
+                return Err(Failure::refused(
+                    "other-arm",
+                    format!(
+                        "the controller has another arm than {}: {} differences, the first is {first}; nothing was sent",
+                        self.arm.name,
+                        differences.len()
+                    ),
+                    "`robot.push_arm(arm)` gives it this one, in Init or Error; without `arm=` the controller's own counts",
+                ));
+            }
+        }
+        // No controller has poses.
+        arm.poses = self.arm.poses.clone();
+        Ok(arm)
+    }
+
+    /// The simulated world, where there is one.
+    pub fn world(&mut self) -> Result<&mut World, Failure> {
+        match self.session.port_mut() {
+            AnyPort::Simulated(port) => Ok(port.world_mut()),
+            AnyPort::Other(port) => Err(Failure::usage(format!("{} is no simulator", port.name()))
+                .next("only `openjtc.connect(\"sim:\")` can be touched")),
+        }
+    }
+}
+
+/// A port to a simulated controller, and whether that has the arm in its memory.
+fn simulator(
+    simulated: Simulated,
+    arm: &Arm,
+    named: &Option<Arc<Arm>>,
+    tape: &Rc<Tape>,
+    pace: &Rc<Cell<Option<f64>>>,
+) -> Result<(SimPort, bool), Failure> {
+    let image = named.as_ref().map(|arm| arm.image()).transpose();
+    let image = image.map_err(|error| Failure::usage(format!("{}: {error}", arm.name)))?.flatten();
+    let stored = image.is_some();
+    let mut config = SimConfig::new(arm.config(), &arm.parameters());
+    if stored {
+        // What the controller knows of the arm it has as a board has it: from its memory.
+        (config.controller, config.stored_arm) = (jtc_core::Config::avena(), image);
+    }
+    let Simulated { seed, faults, payload, .. } = simulated;
+    (config.seed, config.faults, config.arm.payload) = (seed, faults, payload);
+    let mut port = SimPort::new(World::new(config));
+    let (tape, pace) = (Rc::clone(tape), Rc::clone(pace));
+    let mut since = None;
+    port.observe(move |world| {
+        if world.ticked() {
+            tape.push(&Sample::from(world.telemetry()));
+        }
+        let Some(speed) = pace.get() else { return };
+        let now = Duration::from_micros(world.now_us());
+        let (start, zero) = *since.get_or_insert((Instant::now(), now));
+        let due = (now - zero).div_f64(speed);
+        let real = start.elapsed();
+        if real > due + BEHIND {
+            since = Some((Instant::now(), now));
+        }
+        std::thread::sleep(due.saturating_sub(real));
+    });
+    Ok((port, stored))
+}
+
+/// An agent's line.
+fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
+    let own = registered().into_iter().find(|agent| agent.url == url.trim_end_matches('/'));
+    let token = match (&target.token, &own) {
+        (Some(token), _) => Some(token.clone()),
+        (None, Some(own)) => operator(&own.token_file),
+        (None, None) => None,
+    };
+    let certificates =
+        target.certificates.clone().or_else(|| own.as_ref().and_then(|own| own.certificate.clone()));
+    // What this program started is not to go on without it.
+    let options = Options { name: target.name.clone(), token, policy: Some("stop"), certificates };
+    Ok(Box::new(AgentPort::open(url, &options)?))
+}
+
+/// The operator's token in the file of an agent of this user; an agent that does not let one in says so itself.
+fn operator(file: &std::path::Path) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Tokens {
+        operator: String,
+    }
+    let tokens: Tokens = toml::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
+    Some(tokens.operator)
+}
+
+/// A serial port, or the line of the agent that owns it.
+fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failure> {
+    match owner_of(path) {
+        Some(owner) => agent(&owner.url, target),
+        None => Ok(Box::new(SerialPort::open(path, baud)?)),
+    }
+}

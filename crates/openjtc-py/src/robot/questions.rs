@@ -1,0 +1,264 @@
+//! What a controller is asked and given besides motions: its arm, settings, payload, errors, flight recorder; and what is done to a
+//! simulated one.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use jtc_core::settings;
+use jtc_host::log::Account;
+use jtc_host::session::ParameterSource;
+use jtc_host::{doctor, words};
+use jtc_sim::{HandPath, TypedEvent};
+use jtc_wire::{SettingValue, Status};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use super::{Link, PayloadNumbers, payload};
+use crate::arm::Arm;
+use crate::error::Failure;
+use crate::log::FlightLog;
+use crate::run::Samples;
+use crate::trajectory::Trajectory;
+use crate::{array, json};
+
+/// How long a doctor looks.
+const LOOK: Duration = Duration::from_millis(1500);
+
+/// A status as plain values.
+pub fn status<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("state", status.state.name())?;
+    all.set_item("trajectory", status.trajectory.name())?;
+    all.set_item("point", status.point)?;
+    let joints = &status.joints;
+    let column = |of: fn(&jtc_wire::JointStatus) -> f32| {
+        PyArray1::from_slice(py, &joints.each_ref().map(|joint| f64::from(of(joint))))
+    };
+    all.set_item("position", column(|joint| joint.position))?;
+    all.set_item("velocity", column(|joint| joint.velocity))?;
+    all.set_item("torque", column(|joint| joint.torque))?;
+    let temperature = joints.each_ref().map(|joint| f64::from(joint.temperature));
+    all.set_item("temperature", PyArray1::from_slice(py, &temperature))?;
+    all.set_item("joint_states", joints.each_ref().map(|joint| joint.state.name()).to_vec())?;
+    all.set_item("errors", words::causes(status))?;
+    all.set_item("warnings", words::warnings(status))?;
+    all.set_item("waiting_for", words::waiting_for(status))?;
+    all.set_item("next", words::next_step(status))?;
+    Ok(all)
+}
+
+#[pymethods]
+impl Link {
+    /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.
+    fn arm(&self, py: Python<'_>) -> PyResult<Arm> {
+        Ok(Arm::of(self.call(py, |machine, _| machine.device_arm())?))
+    }
+
+    /// Gives the controller a whole arm, and lets it keep it over a loss of power where that is asked for.
+    fn push_arm(&self, py: Python<'_>, arm: &Arm, store: bool) -> PyResult<()> {
+        let arm = Arc::clone(&arm.inner);
+        self.call(py, move |machine, asked| {
+            let session = &mut machine.session;
+            if store {
+                session.push_and_store_arm_until(&arm, || asked.is_halted(), |_| {})?;
+            } else if session.info()?.is_some() {
+                session.push_arm_until(&arm, || asked.is_halted(), |_| {})?;
+            } else {
+                // Such a controller has no more of an arm than friction, gains and model.
+                let device = session.device_config()?;
+                let differences = arm.device_differences(&device);
+                if !differences.is_empty() {
+                    let arm = arm.name.clone();
+                    return Err(jtc_host::CheckError::DeviceLimits { arm, differences }.into());
+                }
+                session.push_until(&arm.parameter_set(), || asked.is_halted(), |_| {})?;
+            }
+            (machine.arm, machine.named) = (arm, true);
+            Ok(())
+        })
+    }
+
+    /// The controller uses the friction, gains and arm model that are built into it, or that it has stored.
+    fn use_defaults(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |machine, _| Ok(machine.session.use_defaults()?))
+    }
+
+    /// Mass (kg), centre of mass (m), inertia (kg·m²).
+    fn payload(&self, py: Python<'_>) -> PyResult<PayloadNumbers> {
+        let payload = self.call(py, |machine, _| Ok(machine.session.payload()?))?;
+        Ok((payload.mass, payload.com, payload.inertia))
+    }
+
+    fn set_payload(&self, py: Python<'_>, numbers: PayloadNumbers) -> PyResult<()> {
+        self.call(py, move |machine, _| Ok(machine.session.set_payload(&payload(numbers))?))
+    }
+
+    /// The whole way back to HoldPos; returns its steps in words.
+    #[pyo3(signature = (arm=None, defaults=false))]
+    fn recover(&self, py: Python<'_>, arm: Option<&Arm>, defaults: bool) -> PyResult<Vec<String>> {
+        let arm = arm.map(|arm| Arc::clone(&arm.inner));
+        self.call(py, move |machine, asked| {
+            let set = arm.as_ref().map(|arm| arm.parameter_set());
+            let source = match (&arm, &set) {
+                (Some(arm), Some(set)) => ParameterSource::Arm { name: &arm.name, set },
+                _ if defaults => ParameterSource::ControllerDefaults,
+                _ => ParameterSource::None,
+            };
+            let mut steps = Vec::new();
+            machine.session.recover_until(
+                source,
+                || asked.is_halted(),
+                |step| steps.push(step.to_string()),
+            )?;
+            Ok(steps)
+        })
+    }
+
+    fn clear(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |machine, _| Ok(machine.session.clear_all()?))
+    }
+
+    fn disable(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |machine, _| Ok(machine.session.disable()?))
+    }
+
+    fn gripper(&self, py: Python<'_>, pump: bool) -> PyResult<()> {
+        self.call(py, move |machine, _| Ok(machine.session.gripper(pump)?))
+    }
+
+    /// Who the controller is; `None` for one without extensions.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(info) = self.call(py, |machine, _| Ok(machine.session.info()?))? else { return Ok(None) };
+        let all = PyDict::new(py);
+        all.set_item("board", info.board.to_string())?;
+        all.set_item("firmware", info.firmware())?;
+        all.set_item("revision", info.revision())?;
+        all.set_item("arm", info.arm.to_string())?;
+        all.set_item("hash", format!("{:016x}", info.hash))?;
+        all.set_item("boots", info.boots)?;
+        all.set_item("uptime", info.uptime_ms as f64 * 1e-3)?;
+        all.set_item("log", info.log.name())?;
+        Ok(Some(all))
+    }
+
+    /// Settings by their names; those of joints are lists of six.
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let values = self.call(py, |machine, _| Ok(machine.session.settings()?))?;
+        let all = PyDict::new(py);
+        for value in values {
+            let Some(setting) = settings::setting(value.setting) else { continue };
+            if value.joint == 0 {
+                all.set_item(setting.name, value.value)?;
+            } else if let Some(list) = all.get_item(setting.name)? {
+                list.cast::<PyList>()?.append(value.value)?;
+            } else {
+                all.set_item(setting.name, PyList::new(py, [value.value])?)?;
+            }
+        }
+        Ok(all)
+    }
+
+    /// Settings as (name, joint from 1, or 0, value), all or none.
+    fn set_settings(&self, py: Python<'_>, values: Vec<(String, u8, f64)>) -> PyResult<()> {
+        let mut given = Vec::new();
+        for (name, joint, value) in values {
+            let setting = settings::named(&name).ok_or_else(|| {
+                Failure::usage(format!("there is no setting {name:?}")).next("`robot.settings` lists them")
+            })?;
+            given.push(SettingValue { setting: setting.number, joint, value });
+        }
+        self.call(py, move |machine, _| Ok(machine.session.set_settings(&given)?))
+    }
+
+    /// What `jtc doctor` finds, the worst first.
+    fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = self.call(py, |machine, _| {
+            let seen = machine.session.examine(LOOK)?;
+            Ok(doctor::findings(&seen))
+        })?;
+        Ok(json::plain(py, &found)?)
+    }
+
+    /// The flight recorder, run again.
+    fn fetch_log(&self, py: Python<'_>) -> PyResult<FlightLog> {
+        let account = self.call(py, |machine, _| {
+            let log = machine.session.fetch_log(|_, _| {})?;
+            let source = jtc_host::Port::name(machine.session.port());
+            Ok(Account::of(log, None, &source))
+        })?;
+        Ok(FlightLog::of(account))
+    }
+
+    fn clear_log(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |machine, _| Ok(machine.session.clear_log()?))
+    }
+
+    /// Checks a trajectory as a run would, from where the arm stands or from `start`.
+    #[pyo3(signature = (trajectory, start=None, accept_device_limits=false))]
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+        trajectory: &Trajectory,
+        start: Option<&Bound<'py, PyAny>>,
+        accept_device_limits: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let start = start.map(|start| array::joints(start, "start")).transpose()?;
+        let trajectory = Arc::clone(&trajectory.inner);
+        let verdict = self.call(py, move |machine, _| {
+            let arm = machine.device_arm()?;
+            let device = machine.session.device_config()?;
+            let start = match start {
+                Some(start) => start,
+                None => machine.session.fresh_status()?.positions(),
+            };
+            let options =
+                jtc_host::CheckOptions { accept_device_limits, device, ..jtc_host::CheckOptions::default() };
+            match jtc_host::CheckedTrajectory::check(&trajectory, &arm, &start, &options) {
+                Ok(checked) => Ok(checked.verdict().clone()),
+                Err(jtc_host::CheckError::Refused(verdict)) => Ok(*verdict),
+                Err(error) => Err(error.into()),
+            }
+        })?;
+        crate::planner::verdict(py, &verdict)
+    }
+
+    /// An event as `jtc sim` takes it: `push 3 12 0.5`.
+    fn simulate(&self, py: Python<'_>, event: &str) -> PyResult<()> {
+        let event = TypedEvent::parse(event).map_err(|error| Failure::usage(error.to_string()))?;
+        self.call(py, move |machine, _| {
+            if let Some(TypedEvent::Push { joint, torque, seconds }) = event {
+                machine.world()?.push(joint, torque, (seconds * 1e3) as u64);
+            }
+            Ok(())
+        })
+    }
+
+    /// A hand leads the simulated arm along a trajectory while it is taught.
+    fn lead(&self, py: Python<'_>, trajectory: &Trajectory) -> PyResult<()> {
+        let trajectory = &trajectory.inner;
+        let points = trajectory.points.iter().map(|point| point.position).collect();
+        let path = HandPath::new(points, f64::from(trajectory.step_ms) * 1e-3);
+        let path = path.ok_or_else(|| Failure::usage("the trajectory has no points"))?;
+        self.call(py, move |machine, _| {
+            machine.world()?.lead(path);
+            Ok(())
+        })
+    }
+
+    /// Faults of a fault file; their times are those since the start of the simulation.
+    fn inject(&self, py: Python<'_>, faults: &str) -> PyResult<()> {
+        let plan =
+            jtc_sim::FaultPlan::from_toml(faults).map_err(|error| Failure::usage(error.to_string()))?;
+        self.call(py, move |machine, _| {
+            let world = machine.world()?;
+            plan.faults.into_iter().for_each(|fault| world.inject(fault));
+            Ok(())
+        })
+    }
+}
+
+/// What is recorded at each tick, with what broke first.
+pub fn samples(account: &Account) -> Samples {
+    Samples::of_log(account.info.clone(), account.replayed.samples(), account.failure.clone())
+}

@@ -1,0 +1,165 @@
+//! What a run was: its samples as arrays, its figures, its report.
+
+use std::path::PathBuf;
+
+use jtc_host::recording::{RecordingInfo, write_all};
+use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html, picture_svg};
+use jtc_host::sample::JointSample;
+use jtc_host::plan::Bound as Binding;
+use jtc_host::Sample;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::Failure;
+use crate::robot::motion::Ran;
+use crate::{array, json};
+
+/// Samples with what belongs to them: of a run, of a plan, of a flight recorder.
+#[pyclass(frozen, module = "openjtc._native")]
+pub struct Samples {
+    outcome: String,
+    info: RecordingInfo,
+    samples: Vec<Sample>,
+    facts: Vec<Facts>,
+    broken: Option<RunFailure>,
+    binding: Option<Vec<Binding>>,
+    notes: Vec<String>,
+}
+
+impl Samples {
+    /// Of a run.
+    pub fn of_run(ran: Ran) -> Self {
+        let Ran { outcome, broken, info, samples, upload, link, baud, notes, .. } = ran;
+        let facts = upload.map(|upload| Facts::of_link(&upload, &link, baud)).into_iter().collect();
+        Self { outcome: outcome.into(), info, samples, facts, broken, binding: None, notes }
+    }
+
+    /// Of a motion that was planned and not run.
+    pub fn of_plan(
+        info: RecordingInfo,
+        samples: Vec<Sample>,
+        binding: Vec<Binding>,
+        notes: Vec<String>,
+    ) -> Self {
+        let (outcome, facts) = ("planned".into(), Vec::new());
+        Self { outcome, info, samples, facts, broken: None, binding: Some(binding), notes }
+    }
+
+    /// Of a flight recorder.
+    pub fn of_log(info: RecordingInfo, samples: Vec<Sample>, broken: Option<RunFailure>) -> Self {
+        let outcome = "log".into();
+        Self { outcome, info, samples, facts: Vec::new(), broken, binding: None, notes: Vec::new() }
+    }
+
+    fn input<'a>(&'a self, digest: &'a Digest) -> ReportInput<'a> {
+        ReportInput {
+            facts: &self.facts,
+            failure: self.broken.as_ref(),
+            plan: self.binding.as_deref(),
+            ..ReportInput::new(&self.info, digest)
+        }
+    }
+}
+
+type Of = fn(&JointSample) -> f64;
+
+/// Columns of joints, by the names that Python gives them.
+const COLUMNS: [(&str, Of); 13] = [
+    ("set_position", |j| j.set_position),
+    ("set_velocity", |j| j.set_velocity),
+    ("set_acceleration", |j| j.set_acceleration),
+    ("position", |j| j.position),
+    ("velocity", |j| j.velocity),
+    ("error", JointSample::position_error),
+    ("torque", |j| j.torque),
+    ("torque_model", |j| j.torque_model),
+    ("torque_p", |j| j.torque_p),
+    ("torque_i", |j| j.torque_i),
+    ("torque_d", |j| j.torque_d),
+    ("torque_friction", |j| j.torque_friction),
+    ("temperature", |j| j.temperature),
+];
+
+#[pymethods]
+impl Samples {
+    #[getter]
+    fn outcome(&self) -> &str {
+        &self.outcome
+    }
+
+    #[getter]
+    fn arm(&self) -> &str {
+        &self.info.arm
+    }
+
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        (0..self.info.joints.len()).map(|j| self.info.joint_name(j)).collect()
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    /// What broke first, in a line.
+    #[getter]
+    fn failure(&self) -> Option<String> {
+        self.broken.as_ref().map(RunFailure::headline)
+    }
+
+    fn __len__(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Each column as an array: (N,) of all, (N, 6) of the joints; NaN where a value is not known.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        all.set_item("time", PyArray1::from_iter(py, self.samples.iter().map(|s| s.time_s)))?;
+        all.set_item("point", PyArray1::from_iter(py, self.samples.iter().map(|s| s.point)))?;
+        for (name, of) in COLUMNS {
+            let rows: Vec<_> = self.samples.iter().map(|s| s.joints.each_ref().map(of)).collect();
+            all.set_item(name, array::matrix(py, &rows))?;
+        }
+        Ok(all)
+    }
+
+    /// The state of the controller at each sample.
+    #[getter]
+    fn states(&self) -> Vec<&'static str> {
+        self.samples.iter().map(|sample| sample.state.name()).collect()
+    }
+
+    /// Figures: recorded_s, executed_s, samples, and those of each joint.
+    fn summary<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
+        let summary = Digest::of(&self.samples).summary(&self.info);
+        json::plain(py, &summary)
+    }
+
+    /// The report: one page that opens offline.
+    fn html(&self, py: Python<'_>) -> String {
+        py.detach(|| html(&self.input(&Digest::of(&self.samples))))
+    }
+
+    /// Commanded and measured positions and their error, as a picture.
+    fn svg(&self, py: Python<'_>) -> String {
+        py.detach(|| picture_svg(&self.input(&Digest::of(&self.samples))))
+    }
+
+    /// A recording, MCAP or CSV by the ending.
+    #[pyo3(signature = (path, overwrite=false))]
+    fn write(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
+        if path.exists() && !overwrite {
+            return Err(Failure::usage(format!("{}: the file exists", path.display()))
+                .next("name another file, or pass overwrite=True"));
+        }
+        py.detach(|| write_all(&path, &self.info, &self.samples)).map_err(|error| Failure::of(&error))?;
+        Ok(())
+    }
+}
+
+/// The class.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Samples>()
+}

@@ -1,0 +1,92 @@
+//! The settings of a simulated arm, as Python gives them.
+
+use jtc_core::JOINTS;
+use jtc_host::trajectory::Loaded;
+use jtc_sim::{FaultPlan, HandPath, ModelError, SimArm, SimConfig, SimFriction, Support};
+use pyo3::prelude::*;
+
+use crate::arm::Arm;
+use crate::controller::of_arm;
+use crate::dynamics::{PayloadNumbers, payload};
+use crate::error::Failure;
+
+/// What `openjtc.sim` has in its arguments; `model_error`: mass, friction, factors of the masses, factors of the frictions.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct SimulatedArm<'py> {
+    arm: Option<Bound<'py, Arm>>,
+    seed: u64,
+    payload: Option<PayloadNumbers>,
+    model_error: Option<(f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>)>,
+    start: Option<[f64; JOINTS]>,
+    friction: bool,
+}
+
+impl SimulatedArm<'_> {
+    /// The world around it: the settings of the controller and its stored arm are there, too.
+    pub fn config(&self) -> Result<SimConfig, Failure> {
+        let arm = self.arm.as_ref().map(|arm| &*arm.get().inner);
+        let mut config = match arm {
+            None => SimConfig::default(),
+            Some(arm) => SimConfig::new(arm.config(), &arm.parameters()),
+        };
+        (config.controller, config.stored_arm) = of_arm(arm)?;
+        config.seed = self.seed;
+        config.arm.payload = payload(self.payload)?;
+        config.model_error = ModelError::NONE;
+        if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
+            let factors = mass_factors.iter().flatten().chain(friction_factors.iter().flatten());
+            if let Some(bad) = factors.chain([&mass, &friction]).find(|f| !(0.0..=10.0).contains(*f)) {
+                return Err(Failure::usage(format!("model_error: {bad} is not within 0..10")));
+            }
+            config.model_error = ModelError { mass, friction, mass_factors, friction_factors };
+        }
+        if let Some(start) = self.start {
+            for (joint, (q, (low, high))) in start.iter().zip(&config.arm.stops).enumerate() {
+                if !(*low..=*high).contains(q) {
+                    let joint = joint + 1;
+                    let what = format!(
+                        "start: joint {joint} at {q} rad is not between its stops at {low} and {high} rad"
+                    );
+                    return Err(Failure::usage(what));
+                }
+            }
+            config.start = start;
+        }
+        if !self.friction {
+            config.arm = SimArm { friction: [const { SimFriction::Frictionless }; JOINTS], ..config.arm };
+        }
+        Ok(config)
+    }
+}
+
+/// What supports the arm while its drives are not enabled.
+pub fn support(name: &str) -> Result<Support, Failure> {
+    Ok(match name {
+        "brakes" => Support::Brakes,
+        "stand" => Support::Stand,
+        "none" => Support::None,
+        other => {
+            let what = format!("support: {other:?} is none of \"brakes\", \"stand\" and \"none\"");
+            return Err(Failure::usage(what));
+        }
+    })
+}
+
+/// Faults in the words of a fault file; files of hands are looked for where Python runs.
+pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
+    let load = |file: &str| {
+        let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;
+        let points = trajectory.points.iter().map(|point| point.position).collect();
+        hand(points, f64::from(trajectory.step_ms) * 1e-3).map_err(|failure| failure.message)
+    };
+    FaultPlan::from_toml_with(text, load)
+        .map_err(|error| Failure::usage(error.to_string()).next("`jtc help faults` lists kinds and keys"))
+}
+
+/// The path of a hand.
+pub fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
+    HandPath::new(points, step_s).ok_or_else(|| {
+        Failure::usage(format!("hand: it needs points, and a step above 0 s; step_s is {step_s}"))
+    })
+}

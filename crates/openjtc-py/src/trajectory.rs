@@ -1,0 +1,156 @@
+//! A trajectory: points of six joints at a fixed step.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use jtc_core::JOINTS;
+use jtc_host::trajectory::{Loaded, Trajectory as HostTrajectory, overshoot_words};
+use jtc_host::{Point, plan};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::arm::Arm;
+use crate::array;
+use crate::error::Failure;
+
+/// Points at a fixed step. It does not change.
+#[pyclass(frozen, module = "openjtc")]
+pub struct Trajectory {
+    pub inner: Arc<HostTrajectory>,
+    /// What was derived, resampled or left out when it was read.
+    notes: Vec<String>,
+}
+
+impl Trajectory {
+    /// As Python has it.
+    pub fn of(trajectory: HostTrajectory) -> Self {
+        Self { inner: Arc::new(trajectory), notes: Vec::new() }
+    }
+
+    fn loaded(loaded: Loaded, degrees: bool) -> Result<Self, Failure> {
+        let loaded = if degrees { loaded.in_degrees()? } else { loaded };
+        let notes = loaded.notes.into_iter().chain(overshoot_words(&loaded.overshoot)).collect();
+        Ok(Self { inner: Arc::new(loaded.trajectory), notes })
+    }
+
+    fn channel<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&Point) -> [f64; JOINTS],
+    ) -> Bound<'py, PyArray2<f64>> {
+        array::matrix(py, &self.inner.points.iter().map(of).collect::<Vec<_>>())
+    }
+}
+
+#[pymethods]
+impl Trajectory {
+    /// From points: positions, and their velocities and accelerations.
+    #[new]
+    fn new(
+        step_ms: u16,
+        position: &Bound<'_, PyAny>,
+        velocity: &Bound<'_, PyAny>,
+        acceleration: &Bound<'_, PyAny>,
+    ) -> Result<Self, Failure> {
+        let [(position, _), (velocity, _), (acceleration, _)] = [
+            array::rows(position, "position")?,
+            array::rows(velocity, "velocity")?,
+            array::rows(acceleration, "acceleration")?,
+        ];
+        let count = position.len();
+        if velocity.len() != count || acceleration.len() != count {
+            return Err(Failure::usage(format!(
+                "{count} positions, {} velocities and {} accelerations: a point has one of each",
+                velocity.len(),
+                acceleration.len()
+            )));
+        }
+        let points = position.into_iter().zip(velocity).zip(acceleration);
+        let points =
+            points.map(|((position, velocity), acceleration)| Point { position, velocity, acceleration });
+        Ok(Self::of(HostTrajectory { step_ms, points: points.collect() }))
+    }
+
+    /// From a file of any form that `jtc traj run` reads.
+    #[staticmethod]
+    #[pyo3(signature = (path, arm=None, degrees=false))]
+    fn load(path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
+        Self::loaded(Loaded::load(&path, arm.map(|arm| &arm.inner.joint_names))?, degrees)
+    }
+
+    /// From the text of such a file.
+    #[staticmethod]
+    #[pyo3(signature = (text, arm=None, degrees=false))]
+    fn parse(text: &str, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
+        Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees)
+    }
+
+    /// As a recording measured it.
+    #[staticmethod]
+    fn load_measured(path: PathBuf) -> Result<Self, Failure> {
+        Self::loaded(Loaded::load_measured(&path)?, false)
+    }
+
+    #[getter]
+    fn step_ms(&self) -> u16 {
+        self.inner.step_ms
+    }
+
+    #[getter]
+    fn duration(&self) -> f64 {
+        self.inner.duration_s()
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let step = f64::from(self.inner.step_ms) * 1e-3;
+        PyArray1::from_iter(py, (0..self.inner.points.len()).map(|k| k as f64 * step))
+    }
+
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.channel(py, |point| point.position)
+    }
+
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.channel(py, |point| point.velocity)
+    }
+
+    #[getter]
+    fn acceleration<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.channel(py, |point| point.acceleration)
+    }
+
+    /// The same way at another speed, 1 to 100 % of its own.
+    fn at_speed(&self, percent: f64) -> Result<Self, Failure> {
+        Ok(Self::of(plan::at_speed(&self.inner, percent)?))
+    }
+
+    /// As `jtc traj run` reads it, with all digits.
+    fn to_csv(&self) -> String {
+        self.inner.to_exact_csv()
+    }
+
+    fn to_json(&self) -> String {
+        self.inner.to_json()
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.points.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Trajectory({} points, {:.3} s)", self.inner.points.len(), self.inner.duration_s())
+    }
+}
+
+/// The class.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Trajectory>()
+}

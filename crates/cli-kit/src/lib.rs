@@ -10,6 +10,8 @@ mod lines;
 mod output;
 pub mod output_file;
 pub mod pages;
+#[cfg(feature = "trial")]
+pub mod reference;
 mod screen;
 mod signal;
 mod stdout;

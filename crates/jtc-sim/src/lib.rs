@@ -28,7 +28,7 @@ mod typed;
 mod world;
 
 pub use arm::{Arm, SimArm};
-pub use board::{RECORDER_BLOCKS, SimRecorder, Worked};
+pub use board::{Board, Pins, RECORDER_BLOCKS, SimRecorder, Worked};
 pub use bus::{Bus, BusFault, BusStatistics, TimedFrame, frame_us};
 pub use config::{ModelError, SimConfig, Support};
 pub use drive::{Drive, DriveConfig, DriveFault};
@@ -45,4 +45,4 @@ pub use request::NodeRequest;
 pub use serial::{Line, LineFault};
 pub use tap::BusTap;
 pub use typed::{TYPED_EVENTS_HELP, TypedEvent, TypedEventError};
-pub use world::{Statistics, World};
+pub use world::{Exchange, Statistics, World};

@@ -123,6 +123,18 @@ impl Plant {
         self.step_arm();
     }
 
+    /// One millisecond of the arm alone: these torques (N·m) act on its joints, within what the drives reach, brakes are open, and drives and
+    /// gripper do nothing. For a controller without a joint bus; NaN is no torque.
+    pub fn step_free(&mut self, torque: &JointVec) {
+        let ceiling = self.arm.parts().torque_ceiling;
+        self.truth.torque = core::array::from_fn(|j| {
+            let torque = if torque[j].is_nan() { 0.0 } else { torque[j] };
+            torque.max(-ceiling[j]).min(ceiling[j])
+        });
+        self.arm.braked = [false; JOINTS];
+        self.move_arm();
+    }
+
     fn step_nodes(&mut self, safety_output: bool) {
         let wired = self.safety_wired && !safety_output;
         for (j, drive) in self.nodes.drives.iter_mut().enumerate() {
@@ -152,6 +164,10 @@ impl Plant {
                 Support::Brakes => !enabled(drive),
             };
         }
+        self.move_arm();
+    }
+
+    fn move_arm(&mut self) {
         self.truth.outside = core::array::from_fn(|j| self.push[j] + self.hand[j]);
         let total = core::array::from_fn(|j| self.truth.torque[j] + self.truth.outside[j]);
         self.arm.step(&total, TICK);

@@ -13,8 +13,10 @@ use crate::plant::Plant;
 use crate::serial::{Line, LineFault};
 
 mod access;
+mod exchange;
 
 pub use access::Statistics;
+pub use exchange::Exchange;
 
 /// Length of a tick, µs.
 const TICK_US: u64 = 1000;
@@ -47,6 +49,8 @@ pub struct World {
     good_frames: u64,
     bad_frames: u64,
     log: Log,
+    /// What goes into the board and comes out of it, while somebody wants it.
+    exchange: Option<Box<Exchange>>,
 }
 
 /// What of the controller was logged last.
@@ -93,6 +97,7 @@ impl World {
             good_frames: 0,
             bad_frames: 0,
             log: Log::new(config.log_entries),
+            exchange: None,
             config,
         };
         world.bus.monitored = world.config.bus_monitored;
@@ -196,6 +201,9 @@ impl World {
                 self.line_fault.apply(&mut fresh, &mut self.line_rng);
             }
         }
+        if let Some(exchange) = &mut self.exchange {
+            **exchange = Exchange { host: fresh.clone(), ..Exchange::default() };
+        }
         self.board.receive(now, &fresh);
     }
 
@@ -209,12 +217,16 @@ impl World {
             }
             return;
         }
-        let outputs = self.board.tick(&Pins {
+        let pins = Pins {
             bus: &self.received,
             bus_state: self.bus_state,
             safety_input: self.safety_input && !self.input_fault,
             status_free: self.to_host.is_idle(),
-        });
+        };
+        let outputs = self.board.tick(&pins);
+        if let Some(exchange) = &mut self.exchange {
+            exchange.note(&pins, &outputs, &self.board);
+        }
         self.received.clear();
         self.sent = outputs.bus;
         self.safety_output = outputs.safety_output;

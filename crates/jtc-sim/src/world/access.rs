@@ -4,12 +4,12 @@ use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
 use jtc_wire::RawPoint;
 
-use super::{TICK_US, World};
+use super::{Exchange, TICK_US, World};
 use crate::board::{SimRecorder, Worked};
 use crate::bus::{BusStatistics, TimedFrame};
 use crate::config::SimConfig;
 use crate::event::Log;
-use crate::faults::{Fault, FaultKind, Trigger};
+use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
 use crate::hand::HandPath;
 use crate::invariants::Moment;
 use crate::plant::Truth;
@@ -113,6 +113,17 @@ impl World {
         self.sent.as_ref()
     }
 
+    /// From now on [`exchange`](Self::exchange) has what goes into the controller's board and what comes out of it.
+    pub fn watch_board(&mut self) {
+        self.exchange.get_or_insert_default();
+    }
+
+    /// What went into the controller's board in the last millisecond, and what came out; nothing unless it is
+    /// [watched](Self::watch_board).
+    pub fn exchange(&self) -> Option<&Exchange> {
+        self.exchange.as_deref()
+    }
+
     /// The controller had its tick in the last millisecond.
     pub fn ticked(&self) -> bool {
         self.ticked
@@ -162,6 +173,18 @@ impl World {
     /// One more fault; `Trigger::At` counts from the start of the world.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
+    }
+
+    /// More faults, as a fault file has them; `Trigger::At` counts from the start of the world.
+    pub fn inject_all(&mut self, plan: FaultPlan) {
+        let known = self.hands.len();
+        self.hands.extend(plan.hands);
+        for mut fault in plan.faults {
+            if let FaultKind::Hand { path } = &mut fault.kind {
+                *path += known;
+            }
+            self.inject(fault);
+        }
     }
 
     /// Someone pushes a joint with a torque (N·m) for some milliseconds, from now on.

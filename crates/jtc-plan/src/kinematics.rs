@@ -77,6 +77,13 @@ impl Kinematics {
         self.chain.flange(q)
     }
 
+    /// The geometric Jacobian of the flange at the joint positions `q`, row major: the flange's velocity in the base frame (rows 0..3, m/rad) and
+    /// its angular velocity (rows 3..6, rad/rad), a column a joint.
+    pub fn jacobian(&self, q: &JointVec) -> [[f64; JOINTS]; 6] {
+        let jacobian = self.chain.at(q).jacobian();
+        std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
+    }
+
     /// The joint positions within the limits that bring the flange to `target`, of all solutions the nearest to `near`: with the
     /// smallest sum of squares of the joints' ways.
     ///

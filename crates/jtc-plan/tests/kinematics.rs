@@ -382,3 +382,35 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     let error = resolve(&kin, &far, &way[0]).unwrap_err();
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
+
+/// By central differences of forward kinematics that share no code with it: the velocity of the flange and the rate of its rotation.
+#[test]
+fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
+    let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];
+    let h = 1e-6;
+    for model in robots::all() {
+        let jacobian = Kinematics::new(&model, &TURN).jacobian(&q);
+        for joint in 0..JOINTS {
+            let at = |s: f64| {
+                let mut moved = q;
+                moved[joint] += s;
+                robots::pose(&model, &moved)
+            };
+            let (before, here, after) = (at(-h), at(0.0), at(h));
+            // The rate of the rotation times the rotation's transpose: the angular velocity as a skew matrix.
+            let spin = |i: usize, k: usize| {
+                let rate = |m: usize| (after.rotation[i][m] - before.rotation[i][m]) / (2.0 * h);
+                (0..3).map(|m| rate(m) * here.rotation[k][m]).sum::<f64>()
+            };
+            let turned = [spin(2, 1), spin(0, 2), spin(1, 0)];
+            for axis in 0..3 {
+                let moved = (after.position[axis] - before.position[axis]) / (2.0 * h);
+                assert!((jacobian[axis][joint] - moved).abs() < 1e-8, "joint {joint}, axis {axis}");
+                assert!(
+                    (jacobian[axis + 3][joint] - turned[axis]).abs() < 1e-8,
+                    "joint {joint}, axis {axis}"
+                );
+            }
+        }
+    }
+}

@@ -1,27 +1,19 @@
-"""Chains of boards, on a simulated chain; what is on its bus is seen by a client of its own that shares no code with the package."""
+"""Chains of boards by name, on a simulated chain; what is on its bus is seen by a client of its own."""
 
 from __future__ import annotations
 
-import _thread
 import os
 import re
-import shutil
-import signal
 import socket
 import subprocess
 import sys
-import threading
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from ucom_bus import Bus, bus, numbered, numbered_bus, sim  # noqa: F401  # fixtures
 
 from openjtc import errors, ucom
-
-#: Identifier of MCA_ADMIN_DATA to and from board 0.
-ADMIN_TO = 0x600
 
 HEAD = """
 [[board]]
@@ -31,105 +23,6 @@ flash_id = 0x22
 [[board]]
 flash_id = 0x23
 """
-
-
-class Bus:
-    """A socketcand client in raw mode: every frame as (identifier, data)."""
-
-    def __init__(self, url: str) -> None:
-        host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
-        self.socket = socket.create_connection((host, int(port)))
-        self.frames: list[tuple[int, bytes]] = []
-        self.text, self.ended = "", False
-        self.thread = threading.Thread(target=self._read)
-        self.thread.start()
-        self.wait(lambda: "< hi >" in self.text)
-        self.socket.sendall(f"< open {channel} >".encode())
-        self.wait(lambda: "< ok >" in self.text)
-        self.socket.sendall(b"< rawmode >")
-        self.wait(lambda: self.text.count("< ok >") == 2)
-
-    def _read(self) -> None:
-        while not self.ended:
-            try:
-                self.text += self.socket.recv(65536).decode()
-            except OSError:
-                return
-            for found in re.finditer(r"< frame ([0-9A-Fa-f]+) [\d.]+ ([0-9A-Fa-f ]*)>", self.text):
-                self.frames.append((int(found[1], 16), bytes.fromhex(found[2].replace(" ", ""))))
-            self.text = re.sub(r"< frame [^>]*>", "", self.text)
-
-    def wait(self, condition: Callable[[], object]) -> None:
-        since = time.monotonic()
-        while not condition():
-            assert time.monotonic() - since < 30, f"never: {self.text!r} {self.frames[-20:]}"
-            time.sleep(0.002)
-
-    def send(self, identifier: int, data: bytes = b"") -> None:
-        listed = " ".join(f"{byte:02X}" for byte in data)
-        self.socket.sendall(f"< send {identifier:X} {len(data)} {listed} >".encode())
-
-    def status(self, board: int) -> int:
-        """The status byte in the answer of a board to PC_INFO (0x200 + number), the first frame of DSP_INFO (0x140 + number)."""
-        before = len(self.frames)
-        self.send(0x200 + board)
-
-        def answers() -> list[bytes]:
-            return [data for identifier, data in self.frames[before:] if identifier == 0x140 + board and len(data) == 8]
-
-        self.wait(answers)
-        return answers()[0][3]
-
-    def runs(self, board: int) -> bool:
-        """MCARUN (0x20) of its status."""
-        return bool(self.status(board) & 0x20)
-
-    def started(self, board: int) -> bool:
-        """MSTART (0x80) of its status."""
-        return bool(self.status(board) & 0x80)
-
-    def sends_outputs(self, board: int) -> bool:
-        """Its sensor outputs (0x380 + number) come within a moment."""
-        before = len(self.frames)
-        time.sleep(0.1)
-        return any(identifier == 0x380 + board for identifier, _ in self.frames[before:])
-
-    def close(self) -> None:
-        self.ended = True
-        self.socket.shutdown(socket.SHUT_RDWR)
-        self.thread.join()
-        self.socket.close()
-
-
-@pytest.fixture
-def sim() -> Iterator[ucom.SimulatedChain]:
-    simulated = ucom.sim(boards=3)
-    yield simulated
-    simulated.end()
-
-
-@pytest.fixture(scope="module")
-def numbered() -> Iterator[ucom.SimulatedChain]:
-    """A chain whose three boards have numbers, for tests that leave it as it was."""
-    simulated = ucom.sim(boards=3)
-    with ucom.connect(simulated) as chain:
-        chain.init()
-    yield simulated
-    simulated.end()
-
-
-@pytest.fixture
-def bus(sim: ucom.SimulatedChain) -> Iterator[Bus]:
-    client = Bus(sim.url)
-    yield client
-    client.close()
-
-
-@pytest.fixture
-def numbered_bus(numbered: ucom.SimulatedChain) -> Iterator[Bus]:
-    client = Bus(numbered.url)
-    yield client
-    client.close()
 
 
 def test_a_chain_is_numbered_listed_and_driven_by_name(sim: ucom.SimulatedChain, bus: Bus) -> None:
@@ -262,122 +155,6 @@ def test_an_update_is_proved_by_the_board(numbered: ucom.SimulatedChain, numbere
         assert not kept.verified and "0x7777" in kept.boards[0].error
 
 
-def test_ctrl_c_and_a_progress_function_that_fails_end_an_update(
-    numbered: ucom.SimulatedChain, tmp_path: Path
-) -> None:
-    image = tmp_path / "image.bin"
-    image.write_bytes(bytes(i * i % 251 for i in range(4000)))
-
-    def fails(_: ucom.Progress) -> None:
-        raise KeyError("mine")
-
-    with ucom.connect(numbered) as chain:
-        with pytest.raises(KeyError, match="mine"):
-            chain.update(image, 1, progress=fails)
-        timer = threading.Timer(0.9, _thread.interrupt_main)
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            while True:
-                chain.update(image, 1, progress=False, force=True)
-        timer.join()
-        assert chain.update(image, 1, force=True).verified, "the chain is there as before"
-
-
-def test_a_board_that_goes_silent_is_reported(sim: ucom.SimulatedChain, bus: Bus) -> None:
-    with pytest.raises(errors.FaultError) as not_stopped:
-        with ucom.connect(sim) as chain:
-            chain.init()
-            chain.run(active=True)
-            sim.fault("silent board=3")
-            with pytest.raises(errors.FaultError) as lost:
-                for _ in chain.monitor(seconds=60):
-                    pass
-            assert lost.value.code == "lost" and lost.value.board == 3
-            kinds = [event.kind for event in chain.events() if event.board == 3]
-            assert kinds.index("late") < kinds.index("lost")
-            with pytest.raises(errors.NoLinkError) as stale:
-                chain["3.position"]
-            assert stale.value.code == "stale" and stale.value.board == 3
-            bus.wait(lambda: not bus.runs(1) and not bus.runs(2))
-            assert not chain.doctor().healthy
-    assert not_stopped.value.code == "not-stopped"
-
-
-def test_what_nobody_has_looked_at_is_an_error_at_the_end(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
-    with pytest.raises(errors.FaultError) as left:
-        with ucom.connect(numbered) as chain:
-            chain.run()
-            # MCA_ADMIN_DATA of another PC, all flags 0, to board 2.
-            numbered_bus.send(ADMIN_TO + 2, bytes(4))
-            numbered_bus.wait(lambda: any(event.kind == "left-loop" for event in chain.events()))
-    assert left.value.code == "left-loop" and left.value.board == 2
-
-
-def test_ctrl_c_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
-    with ucom.connect(numbered) as chain:
-        chain.run([1, 2], active=True)
-        chain.start(3)
-        assert numbered_bus.runs(1) and numbered_bus.sends_outputs(1)
-        timer = threading.Timer(0.2, _thread.interrupt_main)
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            # Its control loop does not run: this waits.
-            next(chain.monitor(3))
-        timer.join()
-        # Before the context ends.
-        assert not any(numbered_bus.started(board) for board in (1, 2, 3)) and not numbered_bus.sends_outputs(1)
-        assert chain.board_values(1)[1].stale
-
-
-CHILD = """
-import sys
-from openjtc import ucom
-chain = ucom.connect(sys.argv[1])
-chain.run([1, 2], active=True)
-print("runs", flush=True)
-if sys.argv[2] == "monitor":
-    list(chain.monitor())
-"""
-
-
-@pytest.mark.parametrize("how", ["monitor", "end"])
-def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus, how: str) -> None:
-    """Without a context manager, too: by Ctrl-C in a call, and at the end of the program."""
-    before = len(numbered_bus.frames)
-    child = subprocess.Popen([sys.executable, "-c", CHILD, numbered.url, how], stdout=subprocess.PIPE, text=True)
-    assert child.stdout is not None and child.stdout.readline() == "runs\n"
-    if how == "monitor":
-        assert numbered_bus.sends_outputs(1)
-        child.send_signal(signal.SIGINT)
-    assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
-    child.stdout.close()
-    # Stopped by it, not by themselves for want of heartbeats: their applications have ended, too.
-    assert not numbered_bus.started(1) and not numbered_bus.started(2)
-    assert [data for identifier, data in numbered_bus.frames[before:] if identifier == ADMIN_TO + 1 and not any(data)]
-
-
-def test_a_stop_from_another_thread_goes_first(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
-    with ucom.connect(numbered) as chain:
-        chain.run([1, 2], active=True)
-        failed: list[errors.Error] = []
-
-        def examine() -> None:
-            try:
-                while True:
-                    chain.doctor()
-            except errors.Error as error:
-                failed.append(error)
-
-        thread = threading.Thread(target=examine)
-        thread.start()
-        while thread.is_alive():
-            stopped = chain.stop()
-            thread.join(0.3)
-        assert failed[0].code == "cancelled"
-        assert all(board.state == "exloader" for board in stopped.values())
-        assert not numbered_bus.started(1) and not numbered_bus.started(2)
-
-
 def test_outputs_and_single_acts(sim: ucom.SimulatedChain) -> None:
     with ucom.connect(sim) as chain:
         chain.init()
@@ -453,56 +230,6 @@ def test_probe_and_conformance(numbered: ucom.SimulatedChain) -> None:
         assert chain.probe().boards == (1, 2, 3)
         report = chain.conformance(1)
         assert report.tests and not report.failed and not report.left
-
-
-def test_another_master_is_not_disturbed(sim: ucom.SimulatedChain, bus: Bus) -> None:
-    with ucom.connect(sim) as chain:
-        chain.init()
-        sim.fault("foreign-master for_s=60")
-        bus.wait(lambda: (0x680, b"") in bus.frames[-50:])
-        with pytest.raises(errors.RefusedError) as other:
-            chain.run(1)
-        assert other.value.code == "foreign-master"
-
-
-@pytest.mark.skipif(not os.environ.get("UCOM"), reason="UCOM names no program `ucom`")
-def test_python_can_sees_what_a_chain_does_on_the_bus_of_the_program() -> None:
-    can = pytest.importorskip("can")
-    program = os.environ["UCOM"]
-    assert shutil.which(program) or Path(program).exists()
-    child = subprocess.Popen(
-        [program, "sim", "--boards", "2", "--listen", "127.0.0.1:0", "--json"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert child.stdout is not None
-        found = re.search(r"socketcand:([\d.]+):(\d+)/(\w+)", child.stdout.readline())
-        assert found is not None
-        host, port, channel = found.groups()
-        with can.Bus(interface="socketcand", host=host, port=int(port), channel=channel) as peer:
-            with ucom.connect(found[0]) as chain:
-                assert len(chain.init().boards) == 2
-                chain.run(active=True, inputs={"1.set_position": 700})
-                since = time.monotonic()
-                outputs: dict[int, int] = {}
-                while abs(outputs.get(1, 0) - 700) > 60:
-                    assert time.monotonic() - since < 30, outputs
-                    message = peer.recv(1)
-                    # Packages of sensor outputs: offset, then up to three words.
-                    if message is not None and 0x381 <= message.arbitration_id <= 0x39F and message.data[:2] == b"\0\0":
-                        outputs[message.arbitration_id - 0x380] = int.from_bytes(message.data[2:4], "little", signed=True)
-                assert abs(float(chain["1.position"] or 0) - 700) < 80
-            while peer.recv(0) is not None:
-                pass
-            peer.send(can.Message(arbitration_id=0x201, is_extended_id=False))
-            while (answer := peer.recv(5)) is not None and (answer.arbitration_id, answer.dlc) != (0x141, 8):
-                pass
-            assert answer is not None and not answer.data[3] & 0xA0, "neither started nor running"
-    finally:
-        child.terminate()
-        child.wait(30)
 
 
 def test_the_example_runs(capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,34 @@
+"""The examples of simulation run as their first lines say, and do what they are for."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def run(name):
+    """What an example prints; it runs where no file of it is."""
+    path = EXAMPLES / name
+    assert len(path.read_text().splitlines()) < 60
+    done = subprocess.run([sys.executable, path], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    return done.stdout
+
+
+def test_own_controller():
+    means = [float(m) for m in re.findall(r"mean ([\d.]+) mrad", run("own_controller.py"))]
+    ours, own = means
+    assert 0 < ours < own < 100
+
+
+def test_gym_environment():
+    pytest.importorskip("gymnasium")
+    printed = run("gym_environment.py")
+    assert "as Gymnasium wants it" in printed and "tripped" not in printed
+    distances = [float(d) for d in re.findall(r"([\d.]+) rad from the goal", printed)]
+    assert len(distances) == 3 and max(distances) < 0.1

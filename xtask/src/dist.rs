@@ -144,16 +144,18 @@ fn empty(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The files that a release without building any program for it would have: those of the programs that `folder` has already.
-fn assembled(folder: &Path) -> Result<Vec<Made>> {
-    let graph = graph::shipped()?;
-    let release = Release {
-        version: version()?,
-        time: programs::time()?,
-        third_party: licences::third_party(&graph)?,
-        images: images::build()?,
+/// The packages and archives with the programs that `folder` has already, made twice from one commit and the same images of the boards.
+fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
+    let (time, own) = (programs::time()?, programs::own()?);
+    let mut images = images::build()?;
+    let mut again = || -> Result<Vec<Made>> {
+        let third_party = licences::third_party(&graph::shipped()?)?;
+        let release = Release { version: version()?, time, third_party, images: std::mem::take(&mut images) };
+        let made = release.packages(own, folder, folder)?;
+        images = release.images;
+        Ok(made)
     };
-    release.packages(programs::own()?, folder, folder)
+    Ok([again()?, again()?])
 }
 
 /// Writes files into a folder of their own; their paths.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::chroot::Root;
-use super::{assembled, programs, write};
+use super::{assembled_twice, programs, write};
 use crate::shell::{self, run};
 use crate::tally::{Outcome, Tally};
 
@@ -25,7 +25,7 @@ pub fn steps(tally: &mut Tally) {
 fn cheaply() -> Result<()> {
     crate::python::commands()?;
     let release = shell::target().join("release");
-    let (first, second) = (assembled(&release)?, assembled(&release)?);
+    let [first, second] = assembled_twice(&release)?;
     for (first, second) in first.iter().zip(&second) {
         ensure!(first.bytes == second.bytes, "{} is other bytes when it is made again", first.name);
         println!("{}: {} B, twice the same", first.name, first.bytes.len());

@@ -16,6 +16,16 @@ const REVISION: u32 = 1;
 /// Rules of udev, the same in both packages under names of their own.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
+/// What lintian would find, and why it is meant.
+const OVERRIDES: &str = "\
+# One program for every distribution.
+NAME: statically-linked-binary
+# Made by the project, and not uploaded to Debian.
+NAME: initial-upload-closes-no-bugs
+# A motion is stopped before the program of its agent goes; where systemd runs, and nothing is enabled.
+NAME: maintainer-script-calls-systemctl
+";
+
 /// What all packages of a release share.
 pub struct Release {
     /// The version, such as `0.2.0`.
@@ -70,6 +80,7 @@ impl Release {
             self.version
         );
         tree.put(format!("{doc}/changelog.Debian.gz"), gzip(changes.as_bytes())?);
+        tree.put(format!("usr/share/lintian/overrides/{name}"), OVERRIDES.replace("NAME", name));
         let jtc = name == "jtc";
         if jtc {
             images::install(&self.images, &self.version, "usr/share/openjtc/firmware", &mut tree)?;

@@ -297,6 +297,14 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
+    /// docs/commands-jtc.md; `UPDATE_DOCS=1` writes it again.
+    #[test]
+    fn the_page_of_the_commands_is_made_from_them() {
+        let opening = "Made from the command line's own definition, as `jtc help COMMAND` and the manual pages are. The variable in brackets sets an option \
+                       where it is not typed. What commands print when something is wrong: [troubles](troubles.md); what a code means: [codes](codes.md).";
+        test_kit::page::whole("commands-jtc.md", &cli_kit::reference::markdown::<Cli>(opening));
+    }
+
     #[test]
     fn the_command_line_is_sound_and_has_an_example_for_each_command() {
         Cli::command().debug_assert();

@@ -55,7 +55,7 @@ impl Controller {
     }
 
     /// One millisecond.
-    #[expect(clippy::too_many_arguments, reason = "the inputs of a tick; Python has them in one object")]
+    #[allow(clippy::too_many_arguments, reason = "the inputs of a tick; Python has them in one object")]
     fn tick<'py>(
         &mut self,
         py: Python<'py>,

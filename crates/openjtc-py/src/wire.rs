@@ -193,7 +193,7 @@ fn node(node: u8, below: usize) -> Result<u8, Failure> {
 /// A joint's answer to a move.
 #[pyfunction]
 #[pyo3(name = "bus_joint_answer")]
-#[expect(clippy::too_many_arguments, reason = "the numbers of a frame; Python has them as keywords")]
+#[allow(clippy::too_many_arguments, reason = "the numbers of a frame; Python has them as keywords")]
 fn joint_answer(
     py: Python<'_>,
     number: u8,

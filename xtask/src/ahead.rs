@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use anyhow::Result;
 
-use crate::{emulate, firmware, python, shell};
+use crate::{emulate, firmware, package, python, shell};
 
 /// What is being made.
 pub struct Ahead(Option<JoinHandle<()>>);
@@ -31,6 +31,7 @@ impl Drop for Ahead {
 fn make() -> Result<()> {
     python::environment("requirements.txt")?;
     python::programs()?;
+    package::build()?;
     emulate::programs()?;
     firmware::lints()?;
     for board in firmware::BOARDS {

@@ -13,6 +13,7 @@ mod emulate;
 mod firmware;
 mod links;
 // For the checks of the board's program.
+mod package;
 mod panics;
 mod prove;
 mod python;

@@ -9,7 +9,8 @@ use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{
-    book, deny, dependencies, dist, emulate, firmware, links, python, rules, size, suite, web, worked_bytes,
+    book, deny, dependencies, dist, emulate, firmware, links, package, python, rules, size, suite, web,
+    worked_bytes,
 };
 
 /// Crates that run on the board.
@@ -54,6 +55,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         python::checks(&mut tally, scratch.path());
+        package::steps(&mut tally);
         emulate::steps(&mut tally, false);
         dist::steps(&mut tally);
     }

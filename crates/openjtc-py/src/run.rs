@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use jtc_host::Sample;
+use jtc_host::plan::Bound as Binding;
 use jtc_host::recording::{RecordingInfo, write_all};
 use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html, picture_svg};
 use jtc_host::sample::JointSample;
-use jtc_host::plan::Bound as Binding;
-use jtc_host::Sample;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -340,6 +340,16 @@ def test_a_controller_recovers_and_says_how(robot):
     assert all(found.severity == "good" for found in robot.doctor())
 
 
+def test_an_arm_is_pushed_while_it_moves(live):
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: motion.progress[0] == "motion" and motion.progress[1] > 0.3)
+    live.push(1, 390, 2.0)
+    with pytest.raises(openjtc.Error) as caught:
+        motion.wait(60)
+    assert caught.value.joint == 1 and caught.value.run.outcome == "fault" and len(caught.value.run) > 100
+    assert "joint 1" in caught.value.run.failure
+
+
 def test_settings_info_and_arm_are_those_of_the_controller(robot):
     settings = robot.settings
     assert len(settings["position_max_rad"]) == 6

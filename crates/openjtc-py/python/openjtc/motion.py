@@ -115,7 +115,7 @@ def options_of(
     approach: bool,
     speed: float,
     repeat: int,
-    record: Path_ | None,
+    record: FilePath | None,
     overwrite: bool,
     accept_device_limits: bool,
 ) -> dict[str, Any]:

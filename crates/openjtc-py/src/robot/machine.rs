@@ -16,7 +16,7 @@ use jtc_host::session::BRING_UP;
 use jtc_host::{Arm, Port, PortError, Sample, Session};
 use jtc_sim::{FaultPlan, SimConfig, World};
 
-use super::worker::{Asked, Shared};
+use super::worker::{Asked, Shared, lock};
 use crate::error::Failure;
 
 /// How long a status is waited for while nothing else is to do.
@@ -59,16 +59,16 @@ pub struct Target {
     pub certificates: Option<PathBuf>,
 }
 
-/// A port of any kind; a simulator remains one.
+/// A port of any kind; a simulator remains one, and is touched whatever the session does.
 pub enum AnyPort {
-    Simulated(SimPort),
+    Simulated(SimPort, Arc<Shared>),
     Other(Box<dyn Port>),
 }
 
 macro_rules! each_port {
     ($port:ident, $own:ident => $do:expr) => {
         match $own {
-            AnyPort::Simulated($port) => $do,
+            AnyPort::Simulated($port, _) => $do,
             AnyPort::Other($port) => $do,
         }
     };
@@ -76,6 +76,11 @@ macro_rules! each_port {
 
 impl Port for AnyPort {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        if let AnyPort::Simulated(port, shared) = self {
+            for touch in std::mem::take(&mut *lock(&shared.touches)) {
+                touch(port.world_mut());
+            }
+        }
         each_port!(port, self => port.read(buffer, timeout))
     }
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
@@ -177,7 +182,7 @@ impl Machine {
             Way::Simulated(simulated) => {
                 let speed = simulated.speed;
                 let (port, stored) = simulator(*simulated, &arm, &target.arm, &tape, &pace)?;
-                (AnyPort::Simulated(port), Some(speed), stored)
+                (AnyPort::Simulated(port, Arc::clone(&shared)), Some(speed), stored)
             }
             Way::Agent { ref url } => (AnyPort::Other(agent(url, &target)?), None, false),
             Way::Serial { ref path, baud } => (AnyPort::Other(serial(path, baud, &target)?), None, false),
@@ -255,15 +260,6 @@ impl Machine {
         // No controller has poses.
         arm.poses = self.arm.poses.clone();
         Ok(arm)
-    }
-
-    /// The simulated world, where there is one.
-    pub fn world(&mut self) -> Result<&mut World, Failure> {
-        match self.session.port_mut() {
-            AnyPort::Simulated(port) => Ok(port.world_mut()),
-            AnyPort::Other(port) => Err(Failure::usage(format!("{} is no simulator", port.name()))
-                .next("only `openjtc.connect(\"sim:\")` can be touched")),
-        }
     }
 }
 

@@ -142,7 +142,7 @@ impl Machine {
             runs: Some(order.repeat),
             ..RecordingInfo::of(&arm)
         };
-        if let AnyPort::Simulated(_) = self.session.port() {
+        if let AnyPort::Simulated(..) = self.session.port() {
             info.start_unix_ns = 0;
         }
         drop(self.tape.take());
@@ -234,7 +234,7 @@ impl Machine {
             };
             self.tape.record(sink);
         }
-        let simulated = matches!(self.session.port(), AnyPort::Simulated(_));
+        let simulated = matches!(self.session.port(), AnyPort::Simulated(..));
         let (tape, total) = (Rc::clone(&self.tape), checked.trajectory().duration_s());
         // Both callbacks have it, one after the other.
         let current = Cell::new(None);

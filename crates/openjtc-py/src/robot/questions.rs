@@ -224,37 +224,28 @@ impl Link {
     }
 
     /// An event as `jtc sim` takes it: `push 3 12 0.5`.
-    fn simulate(&self, py: Python<'_>, event: &str) -> PyResult<()> {
+    fn simulate(&self, event: &str) -> Result<(), Failure> {
         let event = TypedEvent::parse(event).map_err(|error| Failure::usage(error.to_string()))?;
-        self.call(py, move |machine, _| {
-            if let Some(TypedEvent::Push { joint, torque, seconds }) = event {
-                machine.world()?.push(joint, torque, (seconds * 1e3) as u64);
-            }
-            Ok(())
-        })
+        if let Some(TypedEvent::Push { joint, torque, seconds }) = event {
+            self.worker.touch(move |world| world.push(joint, torque, (seconds * 1e3) as u64))?;
+        }
+        Ok(())
     }
 
     /// A hand leads the simulated arm along a trajectory while it is taught.
-    fn lead(&self, py: Python<'_>, trajectory: &Trajectory) -> PyResult<()> {
+    fn lead(&self, trajectory: &Trajectory) -> Result<(), Failure> {
         let trajectory = &trajectory.inner;
         let points = trajectory.points.iter().map(|point| point.position).collect();
         let path = HandPath::new(points, f64::from(trajectory.step_ms) * 1e-3);
         let path = path.ok_or_else(|| Failure::usage("the trajectory has no points"))?;
-        self.call(py, move |machine, _| {
-            machine.world()?.lead(path);
-            Ok(())
-        })
+        self.worker.touch(move |world| world.lead(path))
     }
 
     /// Faults of a fault file; their times are those since the start of the simulation.
-    fn inject(&self, py: Python<'_>, faults: &str) -> PyResult<()> {
+    fn inject(&self, faults: &str) -> Result<(), Failure> {
         let plan =
             jtc_sim::FaultPlan::from_toml(faults).map_err(|error| Failure::usage(error.to_string()))?;
-        self.call(py, move |machine, _| {
-            let world = machine.world()?;
-            plan.faults.into_iter().for_each(|fault| world.inject(fault));
-            Ok(())
-        })
+        self.worker.touch(move |world| plan.faults.into_iter().for_each(|fault| world.inject(fault)))
     }
 }
 

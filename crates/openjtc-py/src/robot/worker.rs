@@ -12,10 +12,11 @@ use std::time::{Duration, Instant};
 
 use host_kit::ErrorKind;
 use jtc_host::session::Flow;
+use jtc_sim::World;
 use jtc_wire::Status;
 use pyo3::prelude::*;
 
-use super::machine::{Machine, Target};
+use super::machine::{Machine, Target, Way};
 use crate::error::Failure;
 
 /// How often a waiting thread looks for Ctrl-C.
@@ -24,6 +25,8 @@ const LOOK: Duration = Duration::from_millis(50);
 const STANDSTILL: Duration = Duration::from_secs(15);
 
 type Job = Box<dyn FnOnce(&mut Machine) + Send>;
+/// What happens to a simulated arm.
+pub type Touch = Box<dyn FnOnce(&mut World) + Send>;
 
 /// Something that a motion on its way is to do, and who waits for what came of it.
 pub struct Wish {
@@ -51,6 +54,8 @@ pub struct Shared {
     pub moving: AtomicBool,
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
+    /// What is to happen to a simulated arm, in whatever its controller is doing.
+    pub touches: Mutex<Vec<Touch>>,
     /// Counts the statuses.
     pub seen: AtomicU64,
     pub progress: Mutex<Progress>,
@@ -98,6 +103,7 @@ impl Asked {
 
 /// The connection's thread.
 pub struct Worker {
+    simulated: bool,
     jobs: Mutex<Option<Sender<Job>>>,
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
@@ -113,6 +119,7 @@ impl Worker {
     /// Connects, in its thread.
     pub fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
+        let simulated = matches!(target.way, Way::Simulated(_));
         let (jobs, waiting) = channel::<Job>();
         let (opened, is_open) = channel::<Result<(), Failure>>();
         let own = Arc::clone(&shared);
@@ -125,7 +132,8 @@ impl Worker {
             }
         };
         let thread = std::thread::Builder::new().name("openjtc".into()).spawn(body)?;
-        let worker = Self { jobs: Mutex::new(Some(jobs)), shared, thread: Mutex::new(Some(thread)) };
+        let worker =
+            Self { simulated, jobs: Mutex::new(Some(jobs)), shared, thread: Mutex::new(Some(thread)) };
         worker.wait(py, is_open)??;
         Ok(worker)
     }
@@ -198,6 +206,19 @@ impl Worker {
                 return Ok(Err(came));
             }
         }
+    }
+
+    /// Does something to the simulated arm, whatever its controller is doing.
+    pub fn touch(&self, touch: impl FnOnce(&mut World) + Send + 'static) -> Result<(), Failure> {
+        if self.is_closed() {
+            return Err(closed());
+        }
+        if !self.simulated {
+            return Err(Failure::usage("this is no simulator, and nobody can touch it from here")
+                .next("`openjtc.connect(\"sim:\")` is one"));
+        }
+        lock(&self.shared.touches).push(Box::new(touch));
+        Ok(())
     }
 
     /// No further jobs; the thread ends with the connection.

@@ -140,7 +140,7 @@ pub(super) async fn fetch(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
 ) -> Result<([(HeaderName, String); 2], Vec<u8>), ErrorObject> {
-    let file = told(&agent, &caller, written).await?;
+    let file = from_log(&agent, &caller, written).await?;
     let attached = format!("attachment; filename=\"{FILE}\"");
     let headers = [
         (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
@@ -171,11 +171,11 @@ pub(super) async fn values(
             .unreadable());
     }
     let last = move |account: &Account| Ok(LogValues::of(&account.replayed.samples(), last_s));
-    told(&agent, &caller, last).await.map(Json)
+    from_log(&agent, &caller, last).await.map(Json)
 }
 
 /// Reads the log, and makes of it what is asked for: for operators, one at a time.
-async fn told<T: Send + 'static>(
+async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
     make: impl FnOnce(&Account) -> Result<T, ErrorObject> + Send + 'static,

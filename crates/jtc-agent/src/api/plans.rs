@@ -3,7 +3,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use agent_kit::api::Refusals;
-use agent_kit::gate::plain;
 use axum::extract::{Request, State};
 use axum::{Extension, Json};
 use jtc_core::Config;
@@ -19,7 +18,7 @@ use utoipa::ToSchema;
 use super::body::{blocking, read};
 use super::error::Denials;
 use super::objects::PayloadObject;
-use super::trajectories::TrajectoryObject;
+use super::trajectories::{TrajectoryObject, keep};
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::{NUMBER_MAX, StoreError};
 use crate::owner::ClientPort;
@@ -324,14 +323,8 @@ fn kept(
 ) -> Result<PlanObject, ErrorObject> {
     let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
     let text = trajectory.to_exact_csv();
-    let keep = |KeepRequest { number, name, new }: &KeepRequest| {
-        let (store, name) = (&agent.jobs.store, plain(name));
-        let stored = match new {
-            true => store.put_new(*number, &name, &text, false),
-            false => store.put(*number, &name, &text, false),
-        };
-        stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
-    };
+    let keep =
+        |KeepRequest { number, name, new }: &KeepRequest| keep(agent, (*number, *new), name, (&text, false));
     let kept = request.keep.as_ref().map(keep).transpose()?;
     Ok(PlanObject {
         duration_s: trajectory.duration_s(),

@@ -218,7 +218,8 @@ pub(super) async fn put(
     caller.operator()?;
     let own = agent.clone();
     let kept = read(&agent, request, move |request| {
-        let kept = keep(&own, (number, place), request);
+        let TrajectoryRequest { name, text, degrees } = request;
+        let kept = keep(&own, (number, place.new), &name, (&text, degrees));
         let (from, why) = (caller.peer.to_string(), kept.as_ref().err().map(|error| error.message.clone()));
         own.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
         kept
@@ -226,16 +227,17 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-fn keep(
+/// Keeps what a text says under a number; a `new` one in place of nothing.
+pub(super) fn keep(
     agent: &Agent,
-    (number, PlaceRequest { new }): (u16, PlaceRequest),
-    request: TrajectoryRequest,
+    (number, new): (u16, bool),
+    name: &str,
+    (text, degrees): (&str, bool),
 ) -> Result<TrajectoryObject, ErrorObject> {
-    let TrajectoryRequest { name, text, degrees } = request;
-    let (store, name) = (&agent.jobs.store, plain(&name));
+    let (store, name) = (&agent.jobs.store, plain(name));
     let stored = match new {
-        true => store.put_new(number, &name, &text, degrees),
-        false => store.put(number, &name, &text, degrees),
+        true => store.put_new(number, &name, text, degrees),
+        false => store.put(number, &name, text, degrees),
     };
     stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
 }

@@ -2,10 +2,11 @@
 mod rig;
 
 use jtc_core::ControllerState;
+use jtc_wire::fixed;
 use openjtc_emulator::BoardConfig;
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND};
 use openjtc_emulator::observe::ResetCause;
-use rig::{BOARDS, PORTS, Rig, elf, index, version};
+use rig::{BOARDS, PORTS, Rig, elf, index, program, version};
 
 /// A board is one of the two with a Cortex-M4.
 fn two_cores(board: &str) -> bool {
@@ -186,6 +187,18 @@ fn the_version_record_says_what_this_is() {
             [115, 115],
             "{board}"
         );
+    }
+}
+
+#[test]
+fn j67_the_program_reports_what_is_in_its_flash() {
+    for board in BOARDS {
+        let mut rig = Rig::new(board);
+        rig.run(500);
+        rig.ask(PORTS[0], &fixed::GET_INFO);
+        rig.run(50);
+        let info = rig.hosts[index(PORTS[0])].info.expect("an Info");
+        assert_eq!(info.program, Some(program(&elf(board))), "{board}");
     }
 }
 

@@ -13,6 +13,7 @@ use jtc_wire::{EventBatch, FRAME_MAX, ReceivedEvent, Receiver};
 use openjtc_firmware::{BAUD, lines};
 
 use crate::arm_store::Store;
+use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart;
 
@@ -173,11 +174,12 @@ fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
-/// Serves both lines for ever, and stores arms.
+/// Serves both lines for ever, stores arms, and reads the program in flash.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
     // Line whose turn it is: one that floods the slot does not keep the other from it.
     let mut turn = 0;
     let mut report = Report::new();
+    let mut program = program::Reader::new();
     loop {
         uart::WORK.wait().await;
         ROUNDS_DONE.fetch_add(1, Ordering::Relaxed);
@@ -199,6 +201,7 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
         }
         slot.send();
         store.step();
+        program.step();
         report.log(&mut links);
     }
 }

@@ -29,6 +29,7 @@ mod link;
 #[cfg(any(feature = "nucleo-h745zi-q", feature = "nucleo-h745zi-q-ldo"))]
 mod m4;
 mod memory;
+mod program;
 mod summary;
 mod tick;
 mod uart;

@@ -24,6 +24,7 @@ use crate::board::Pins;
 use crate::fault::Boot;
 use crate::fdcan::{Fdcan, ReceivedFrames};
 use crate::link::{self, SlotOut};
+use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart::{self, Lookahead, Transmitter};
 
@@ -140,6 +141,7 @@ pub fn start(parts: Parts) {
         revision: env!("OPENJTC_BUILD"),
         boots: boot.boots,
         boot_cause: BootCause::from_byte(boot.cause as u8).unwrap_or_default(),
+        program: None,
     });
     load_arm(tick.controller);
     if boot.cause.failed() {
@@ -227,6 +229,7 @@ impl Tick {
             line.send(self.controller.answer_frame());
         }
         self.store_arm(outputs.store);
+        self.controller.set_program(program::read());
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);
         self.flight.complete(&outputs, &telemetry);

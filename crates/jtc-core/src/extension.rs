@@ -5,8 +5,8 @@ mod image;
 mod log;
 
 use jtc_wire::{
-    Answer, BootCause, Command, DataStatus, Floats, Hash, Info, LogState, Name, PAGE_VALUES, RawPoint,
-    StoreState, VALUE_LEN, Values, capability,
+    Answer, BootCause, Command, DataStatus, Floats, Hash, Info, LogState, Name, PAGE_VALUES, Program,
+    RawPoint, StoreState, VALUE_LEN, Values, capability,
 };
 
 use crate::controller::Controller;
@@ -38,6 +38,8 @@ pub struct Identity {
     pub boots: u32,
     /// Why it started last.
     pub boot_cause: BootCause,
+    /// What stands in its flash; `None` where it has none, or has not read it (J-67).
+    pub program: Option<Program>,
 }
 
 /// What the controller remembers for the extensions.
@@ -92,6 +94,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
+    }
+
+    /// Gives the controller what stands in its flash, for boards that read it after the start (J-67).
+    pub fn set_program(&mut self, program: Option<Program>) {
+        self.extensions.identity.program = program;
     }
 
     /// What an extension request returns, to be sent when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
@@ -247,6 +254,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             log: *log,
             arm: *name,
             board: Name::cut(identity.board),
+            program: identity.program,
             ..Info::default()
         }
         .with_firmware(identity.firmware, identity.revision)

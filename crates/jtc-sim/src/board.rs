@@ -139,6 +139,7 @@ impl Board {
             revision: "",
             boots: 1 + self.watchdog_resets,
             boot_cause,
+            program: None,
         });
         let state = match &self.memory.arm {
             None => StoreState::Empty,

@@ -1,4 +1,5 @@
 //! The boards' programs, and the record in them that identifies them.
+use jtc_wire::Program;
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
 
@@ -65,4 +66,18 @@ pub fn version(elf: &Elf) -> Option<Version> {
     let (version, board, build) = (text(12..24), text(24..48), text(48..72));
     let [points, segments, segment_points, tick_hz, baud, core_hz] = core::array::from_fn(number);
     Some(Version { version, board, build, points, segments, segment_points, tick_hz, baud, core_hz })
+}
+
+/// What stands in flash bank 1 when this file was loaded into an erased chip, and its CRC-32, bit by bit as the definition has it.
+pub fn program(elf: &Elf) -> Program {
+    const BANK1: std::ops::Range<u32> = 0x0800_0000..0x0810_0000;
+    let mut flash = Vec::new();
+    for (start, data) in elf.segments.iter().filter(|(start, _)| BANK1.contains(start)) {
+        let at = (start - BANK1.start) as usize;
+        flash.resize(flash.len().max(at + data.len()), 0xFF);
+        flash[at..at + data.len()].copy_from_slice(data);
+    }
+    let bit = |register: u32, _| register >> 1 ^ 0xEDB8_8320 * (register & 1);
+    let byte = |register: u32, byte: &u8| (0..8).fold(register ^ u32::from(*byte), bit);
+    Program { bytes: flash.len() as u32, crc32: !flash.iter().fold(u32::MAX, byte) }
 }

@@ -20,7 +20,7 @@ use jtc_sim::{FaultKind, host as frames};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, Response, Status, StoreState};
 
 #[allow(unused_imports, reason = "each test uses its part")]
-pub use elf::{BOARDS, Version, elf, fast_elf, version};
+pub use elf::{BOARDS, Version, elf, fast_elf, program, version};
 pub use flight::{FLIGHT_SIZE, Flight};
 pub use host::Host;
 pub use shadow::Shadow;
@@ -61,6 +61,8 @@ pub struct Rig {
     invariants: Invariants,
     flight_at: u32,
     mailbox_at: u32,
+    /// Where the program leaves what it has read of its flash (J-67).
+    program_at: u32,
     resets: usize,
     /// Frames that the last ticks gave out and that were not on the bus yet.
     to_pass: Vec<jtc_bus::Frame>,
@@ -81,6 +83,7 @@ impl Rig {
     pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
         let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
         let mailbox_at = elf.symbol("ARM_STORE").expect("the mailbox").address;
+        let program_at = elf.symbol("PROGRAM").expect("what it has read of its flash").address;
         let board = Board::new(elf, config);
         Self {
             board,
@@ -94,6 +97,7 @@ impl Rig {
             invariants: Invariants::default(),
             flight_at,
             mailbox_at,
+            program_at,
             resets: 1,
             to_pass: Vec::new(),
         }
@@ -138,12 +142,16 @@ impl Rig {
         self.ticks = flight.tick;
         let start = self.shadow.is_none().then(|| self.start(flight.cause));
         let [state, _, sequence, ..] = self.mailbox();
+        let read = self.board.machine.word(self.program_at).expect("memory") != 0;
         let shadow = self.shadow.get_or_insert_with(|| Shadow::new(start.expect("it has just started")));
         shadow.tick(&flight, &mut self.hosts);
         match state {
             3 => shadow.stored(StoreState::Stored, sequence),
             4 => shadow.stored(StoreState::Failed, sequence),
             _ => {}
+        }
+        if read {
+            shadow.flash_is_read();
         }
         self.to_pass.extend(flight.sent);
         let level = flight.safety_output;
@@ -178,7 +186,8 @@ impl Rig {
             (image, sequence)
         });
         let version = version(self.board.machine.elf()).expect("the record of the version");
-        Start { cause, boots: self.resets as u32, version, arm, log: self.log.clone() }
+        let program = program(self.board.machine.elf());
+        Start { cause, boots: self.resets as u32, version, program, arm, log: self.log.clone() }
     }
 
     /// What the controller sent passes unchanged and in order, or not at all.

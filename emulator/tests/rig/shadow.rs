@@ -2,7 +2,9 @@
 use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::{RECORDER_BLOCKS, Worked};
-use jtc_wire::{BootCause, FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status, StoreState};
+use jtc_wire::{
+    BootCause, FrameRef, FrameStatus, LinkEvent, Program, RawPoint, Response, Status, StoreState,
+};
 
 use super::elf::Version;
 use super::flight::{Event, Flight};
@@ -25,6 +27,7 @@ pub struct Shadow {
     recorder: Recorder<Vec<Block>, 3>,
     /// What the last tick executed.
     pub worked: Vec<Worked>,
+    program: Program,
 }
 
 /// How a board started.
@@ -35,6 +38,8 @@ pub struct Start {
     pub boots: u32,
     /// What the program is.
     pub version: Version,
+    /// What stands in its flash (J-67).
+    pub program: Program,
     /// The arm that it found in its flash, and its number.
     pub arm: Option<(Vec<u8>, u32)>,
     /// What the flight recorder held before.
@@ -44,7 +49,7 @@ pub struct Start {
 impl Shadow {
     /// Beside a board that has just started.
     pub fn new(start: Start) -> Self {
-        let Start { cause, boots, version, arm, log } = start;
+        let Start { cause, boots, version, program, arm, log } = start;
         let points = vec![RawPoint::default(); POINTS_MAX];
         let mut controller = Controller::new(Config::default(), points);
         controller.set_identity(Identity {
@@ -53,6 +58,7 @@ impl Shadow {
             revision: version.build.leak(),
             boots,
             boot_cause: BootCause::from_byte(cause as u8).unwrap_or_default(),
+            program: None,
         });
         match &arm {
             None => controller.set_store_state(StoreState::Empty, 0),
@@ -66,7 +72,12 @@ impl Shadow {
             controller.raise_internal();
         }
         let recorder = Recorder::new(log, FAILED.contains(&cause));
-        Self { controller, recorder, worked: Vec::new() }
+        Self { controller, recorder, program, worked: Vec::new() }
+    }
+
+    /// The board has read its flash.
+    pub fn flash_is_read(&mut self) {
+        self.controller.set_program(Some(self.program));
     }
 
     /// What has become of the arm that was to be stored, as the board's mailbox has it after the tick.

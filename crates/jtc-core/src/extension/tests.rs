@@ -169,7 +169,7 @@ fn j51_a_line_that_asked_receives_what_others_do_not() {
 }
 
 #[test]
-fn j52_the_info_is_what_the_board_gave_the_controller() {
+fn j52_j67_the_info_is_what_the_board_gave_the_controller() {
     let mut bench = Bench::new();
     bench.controller.set_identity(Identity {
         board: "bench",
@@ -177,6 +177,7 @@ fn j52_the_info_is_what_the_board_gave_the_controller() {
         revision: "0123456789abcdef-too-long",
         boots: 7,
         boot_cause: BootCause::Watchdog,
+        program: Some(Program { bytes: 279_328, crc32: 0x1234_5678 }),
     });
     bench.controller.set_store_state(StoreState::Stored, 41);
     let info = bench.info(0);
@@ -189,6 +190,7 @@ fn j52_the_info_is_what_the_board_gave_the_controller() {
         (7, BootCause::Watchdog, StoreState::Stored, 41)
     );
     assert_eq!((info.arm.as_str(), info.defaults_stored), ("avena", false));
+    assert_eq!(info.program, Some(Program { bytes: 279_328, crc32: 0x1234_5678 }), "J-67");
     let later = bench.info(0);
     assert!(later.uptime_ms > info.uptime_ms);
 }

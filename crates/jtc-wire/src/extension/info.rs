@@ -1,13 +1,16 @@
 //! Who a device is, and what it runs (J-52).
 use core::fmt;
 
-use super::{EXTENSION_VERSION, LogState, NAME_LEN, Name};
+use super::{ANSWER_MAX, EXTENSION_VERSION, LogState, NAME_LEN, Name};
 use crate::bits::missing_parameter;
 use crate::code::codes;
+use crate::frame::FRAME_MIN;
 use crate::words::{self, Bits};
 
-/// Bytes of an [`Info`] of this version; later versions are longer.
+/// Least bytes of an [`Info`]; later versions are longer.
 pub const INFO_LEN: usize = 136;
+/// Bytes of an [`Info`] as this version writes it.
+pub const INFO_WRITTEN: usize = 144;
 /// Bytes of the firmware's version, and of its revision.
 const SHORT_TEXT: usize = 16;
 
@@ -33,6 +36,9 @@ mod field {
     pub const FIRMWARE: Range<usize> = 72..88;
     pub const REVISION: Range<usize> = 88..104;
     pub const BOARD: Range<usize> = 104..136;
+    // Added since (J-67).
+    pub const PROGRAM_BYTES: Range<usize> = 136..140;
+    pub const PROGRAM_CRC: Range<usize> = 140..144;
 }
 
 /// What a device can do beyond version 1 of the extensions, one bit each.
@@ -81,6 +87,21 @@ codes! {
     }
 }
 
+/// What stands in the flash that the device runs from, as it read it at its start (J-67).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Program {
+    /// Bytes of the program from the first byte of the flash on.
+    pub bytes: u32,
+    /// Their CRC-32 (ISO-HDLC, as zlib and Ethernet have it).
+    pub crc32: u32,
+}
+
+impl fmt::Display for Program {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} bytes, CRC-32 {:08x}", self.bytes, self.crc32)
+    }
+}
+
 /// What GetInfo returns (J-52).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Info {
@@ -118,6 +139,8 @@ pub struct Info {
     pub revision: [u8; SHORT_TEXT],
     /// The board.
     pub board: Name,
+    /// Its program in flash; `None` where the device does not report it.
+    pub program: Option<Program>,
 }
 
 impl Default for Info {
@@ -140,6 +163,7 @@ impl Default for Info {
             firmware: [0; SHORT_TEXT],
             revision: [0; SHORT_TEXT],
             board: Name::default(),
+            program: None,
         }
     }
 }
@@ -182,9 +206,9 @@ impl Info {
     }
 
     /// The body of its frame.
-    pub fn emit(&self) -> [u8; INFO_LEN] {
+    pub fn emit(&self) -> [u8; INFO_WRITTEN] {
         use field::*;
-        let mut b = [0; INFO_LEN];
+        let mut b = [0; INFO_WRITTEN];
         b[VERSION] = self.version;
         b[MISSING] = self.missing;
         b[NODES] = self.nodes_missing;
@@ -202,6 +226,10 @@ impl Info {
         b[FIRMWARE].copy_from_slice(&self.firmware);
         b[REVISION].copy_from_slice(&self.revision);
         b[BOARD].copy_from_slice(self.board.as_bytes());
+        if let Some(program) = self.program {
+            b[PROGRAM_BYTES].copy_from_slice(&program.bytes.to_be_bytes());
+            b[PROGRAM_CRC].copy_from_slice(&program.crc32.to_be_bytes());
+        }
         b
     }
 
@@ -210,8 +238,9 @@ impl Info {
     pub fn parse(body: &[u8]) -> Option<Self> {
         use field::*;
         let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
+        // Zero where the body of an earlier version ends before it (J-67).
         let word = |at: core::ops::Range<usize>| {
-            b.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
+            body.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
         };
         let long = |at: core::ops::Range<usize>| {
             b.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_be_bytes(*bytes))
@@ -235,6 +264,8 @@ impl Info {
             firmware: short(FIRMWARE)?,
             revision: short(REVISION)?,
             board: Name::parse(b.get(BOARD)?)?,
+            program: Some(Program { bytes: word(PROGRAM_BYTES), crc32: word(PROGRAM_CRC) })
+                .filter(|program| body.len() >= INFO_WRITTEN && program.bytes != 0),
         })
     }
 }
@@ -266,10 +297,14 @@ impl fmt::Display for Info {
             let stored = if self.defaults_stored { "stored" } else { "built in" };
             write!(f, "\n  defaults: {stored}; memory: {}, number {}", self.store, self.sequence)?;
             write!(f, "\n  flight recorder: {}", self.log)?;
+            if let Some(program) = self.program {
+                write!(f, "\n  program in flash: {program}")?;
+            }
             write!(f, "\n  capabilities: {:#x}", self.capabilities)?;
         }
         Ok(())
     }
 }
 
+const _: () = assert!(field::PROGRAM_CRC.end == INFO_WRITTEN && INFO_WRITTEN + FRAME_MIN <= ANSWER_MAX);
 const _: () = assert!(field::BOARD.end == INFO_LEN && field::NAME.end - field::NAME.start == NAME_LEN);

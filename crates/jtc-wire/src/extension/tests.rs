@@ -39,6 +39,23 @@ fn j52_an_info_comes_back_as_it_was_sent() {
 }
 
 #[test]
+fn j67_an_info_of_before_has_no_program() {
+    let program = Program { bytes: 0x0004_4328, crc32: 0x89AB_CDEF };
+    let info = Info { program: Some(program), ..info() };
+    let body = info.emit();
+    assert_eq!(body[136..], [0, 4, 0x43, 0x28, 0x89, 0xAB, 0xCD, 0xEF]);
+    assert_eq!(Info::parse(&body), Some(info));
+    let before = Info { program: None, ..info };
+    assert_eq!(Info::parse(&before.emit()), Some(before));
+    // A device of before sends 136 bytes. What ends within the new ones is no program either.
+    for end in INFO_LEN..INFO_WRITTEN {
+        assert_eq!(Info::parse(&body[..end]), Some(before), "{end}");
+    }
+    let shown = std::format!("{info:#}");
+    assert!(shown.contains("program in flash: 279336 bytes, CRC-32 89abcdef"), "{shown}");
+}
+
+#[test]
 fn j52_a_firmware_without_a_revision_is_shown_without_brackets() {
     for (revision, shown) in [("4334c10", "0.1.0 (4334c10)"), ("", "0.1.0")] {
         let info = info().with_firmware("0.1.0", revision);

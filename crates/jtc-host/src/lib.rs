@@ -8,6 +8,7 @@ pub mod error;
 pub mod example;
 pub mod explain;
 pub mod file;
+pub mod firmware;
 pub mod frame;
 #[cfg(any(test, feature = "fuzzing"))]
 #[doc(hidden)]

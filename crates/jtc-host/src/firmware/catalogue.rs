@@ -1,0 +1,193 @@
+//! The images that were installed beside the programs: a folder with `firmware.json`.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::{FLASH, FirmwareError, Image};
+
+/// Name of the file that lists the images.
+const FILE: &str = "firmware.json";
+/// Where packages put them.
+const INSTALLED: &str = "share/openjtc/firmware";
+/// Names a folder in place of those that are looked at else.
+const VARIABLE: &str = "OPENJTC_FIRMWARE";
+
+/// An image of the catalogue.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+pub struct CatalogueImage {
+    /// Board that it is for.
+    pub board: String,
+    /// Name of the file, in the folder of the catalogue.
+    pub file: String,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    /// Where its first byte goes.
+    pub address: u32,
+    /// Bytes of the file.
+    pub bytes: u64,
+}
+
+/// What `firmware.json` lists.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+pub struct Catalogue {
+    /// Version of the release that the images are of.
+    pub version: String,
+    /// The images.
+    pub images: Vec<CatalogueImage>,
+    /// The folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+impl Catalogue {
+    /// The folders in which a catalogue is looked for: the one that the environment names, or beside the program's installation and
+    /// where packages put it.
+    pub fn folders() -> Vec<PathBuf> {
+        if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
+            return vec![folder.into()];
+        }
+        let program = env::current_exe().and_then(fs::canonicalize).ok();
+        let beside = program.as_deref().and_then(Path::parent).and_then(Path::parent);
+        let mut folders: Vec<PathBuf> = beside.map(|prefix| prefix.join(INSTALLED)).into_iter().collect();
+        let system = Path::new("/usr").join(INSTALLED);
+        if !folders.contains(&system) {
+            folders.push(system);
+        }
+        folders
+    }
+
+    /// The first catalogue of these folders.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NoCatalogue`], and those of [`Catalogue::read`].
+    pub fn find(folders: &[PathBuf]) -> Result<Self, FirmwareError> {
+        match folders.iter().find(|folder| folder.join(FILE).exists()) {
+            Some(folder) => Self::read(folder),
+            None => Err(FirmwareError::NoCatalogue { folders: folders.to_vec() }),
+        }
+    }
+
+    /// The catalogue of a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::File`] and [`FirmwareError::BadCatalogue`].
+    pub fn read(folder: &Path) -> Result<Self, FirmwareError> {
+        let path = folder.join(FILE);
+        let text =
+            fs::read_to_string(&path).map_err(|source| FirmwareError::File { path: path.clone(), source })?;
+        let bad = |why: String| FirmwareError::BadCatalogue { path: path.clone(), why };
+        let mut catalogue: Self = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
+        for image in &catalogue.images {
+            if Path::new(&image.file).file_name() != Some(image.file.as_ref()) {
+                return Err(bad(format!("{:?} is no name of a file in this folder", image.file)));
+            }
+            if image.address != FLASH {
+                return Err(bad(format!(
+                    "{} is for {:#010x}; the drive of a board writes from {FLASH:#010x} on",
+                    image.file, image.address
+                )));
+            }
+        }
+        catalogue.folder = folder.to_owned();
+        Ok(catalogue)
+    }
+
+    /// The image of a board, once its file was found to be the one that was released.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NoBoard`], [`FirmwareError::Damaged`], [`FirmwareError::BadCatalogue`] when the file is for another board, and
+    /// those of [`Image::read`].
+    pub fn image(&self, board: &str) -> Result<Image, FirmwareError> {
+        let Some(listed) = self.images.iter().find(|image| image.board == board) else {
+            return Err(FirmwareError::NoBoard {
+                board: board.to_owned(),
+                known: self.images.iter().map(|image| image.board.clone()).collect(),
+            });
+        };
+        let path = self.folder.join(&listed.file);
+        let bytes = fs::read(&path).map_err(|source| FirmwareError::File { path: path.clone(), source })?;
+        let sha256: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        if bytes.len() as u64 != listed.bytes || !sha256.eq_ignore_ascii_case(&listed.sha256) {
+            return Err(FirmwareError::Damaged {
+                path,
+                sha256,
+                bytes: bytes.len() as u64,
+                listed: Box::new(listed.clone()),
+            });
+        }
+        let image = Image::parse(&path, bytes)?;
+        if image.record().board != board {
+            let why = format!("{} is listed for {board}, and is for {}", listed.file, image.record().board);
+            return Err(FirmwareError::BadCatalogue { path: self.folder.join(FILE), why });
+        }
+        Ok(image)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fake::{catalogue, image_bytes};
+    use super::*;
+
+    #[test]
+    fn an_image_is_taken_when_its_digest_is_the_listed_one() {
+        let folder = tempfile::tempdir().unwrap();
+        catalogue(folder.path(), &["nucleo-h745zi-q", "nucleo-h743zi2"]);
+        let found = Catalogue::find(&[folder.path().join("none"), folder.path().to_owned()]).unwrap();
+        assert_eq!((found.version.as_str(), found.images.len()), ("0.2.0", 2));
+        assert_eq!(found.image("nucleo-h743zi2").unwrap().record().board, "nucleo-h743zi2");
+        let said = found.image("nucleo-f401re").unwrap_err().to_string();
+        assert!(said.contains("nucleo-f401re") && said.contains("nucleo-h745zi-q, nucleo-h743zi2"), "{said}");
+        // One bit of the file.
+        let path = folder.path().join("nucleo-h743zi2.bin");
+        let mut bytes = fs::read(&path).unwrap();
+        bytes[0x800] ^= 1;
+        fs::write(&path, &bytes).unwrap();
+        assert!(matches!(found.image("nucleo-h743zi2"), Err(FirmwareError::Damaged { .. })));
+        assert!(found.image("nucleo-h745zi-q").is_ok());
+    }
+
+    #[test]
+    fn a_catalogue_that_leads_elsewhere_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |file: &str, address: u32| {
+            let text = format!(
+                r#"{{"version":"1","images":[{{"board":"b","file":"{file}","sha256":"","address":{address},"bytes":1}}]}}"#
+            );
+            fs::write(folder.path().join(FILE), text).unwrap();
+            Catalogue::read(folder.path())
+        };
+        assert!(write("b.bin", FLASH).is_ok());
+        for (file, address) in
+            [("../b.bin", FLASH), ("/etc/passwd", FLASH), ("..", FLASH), ("b.bin", 0x0810_0000)]
+        {
+            assert!(matches!(write(file, address), Err(FirmwareError::BadCatalogue { .. })), "{file}");
+        }
+        fs::write(folder.path().join(FILE), "{").unwrap();
+        assert!(matches!(Catalogue::read(folder.path()), Err(FirmwareError::BadCatalogue { .. })));
+        let nowhere = Catalogue::find(&[folder.path().join("x")]).unwrap_err();
+        assert!(matches!(nowhere, FirmwareError::NoCatalogue { .. }));
+    }
+
+    #[test]
+    fn a_file_that_is_listed_for_another_board_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        catalogue(folder.path(), &["nucleo-h745zi-q"]);
+        let text = fs::read_to_string(folder.path().join(FILE)).unwrap();
+        fs::write(
+            folder.path().join(FILE),
+            text.replace("\"board\":\"nucleo-h745zi-q\"", "\"board\":\"nucleo-h743zi2\""),
+        )
+        .unwrap();
+        let catalogue = Catalogue::read(folder.path()).unwrap();
+        let said = catalogue.image("nucleo-h743zi2").unwrap_err().to_string();
+        assert!(said.contains("and is for nucleo-h745zi-q"), "{said}");
+        assert_eq!(image_bytes("b", 1).len() % 4, 0);
+    }
+}

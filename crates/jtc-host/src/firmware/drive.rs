@@ -1,0 +1,203 @@
+//! The drive that an ST-LINK shows on USB: which board it belongs to, and what it reports.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::FirmwareError;
+
+/// Longest label that the file system of the drive has; longer ones are cut.
+const LABEL_MAX: usize = 11;
+/// Most that is read of the drive's small files.
+const TEXT_MAX: usize = 4096;
+
+/// What stands in front of the board in a label: firmware of the ST-LINK from 2019 on, and of before.
+const PREFIXES: [&str; 2] = ["NOD_", "NODE_"];
+
+/// Numbers of boards as `MBED.HTM` has them, and what their labels call them.
+const CODES: [(&str, &str); 6] = [
+    ("0813", "H743ZI"),
+    ("0836", "H743ZI2"),
+    ("0842", "H753ZI"),
+    ("0843", "H745ZIQ"),
+    ("0844", "H755ZIQ"),
+    ("0847", "H745I-DISCO"),
+];
+
+/// A drive, and what it says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Drive {
+    /// Where it is mounted.
+    pub path: PathBuf,
+    /// Its label, where the system knows it.
+    pub label: Option<String>,
+    /// Number of the board in `MBED.HTM`, where it has one.
+    pub code: Option<String>,
+    /// `DETAILS.TXT`: version of the ST-LINK, and when it was built; a line each.
+    pub details: String,
+    /// The device that is mounted there, such as `/dev/sda`, where the system says so.
+    pub device: Option<PathBuf>,
+}
+
+/// Whether a drive is that of a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fit {
+    /// It is.
+    Same,
+    /// It does not name its board, or not the whole name.
+    Unknown,
+    /// It is that of another board.
+    Other,
+}
+
+impl Drive {
+    /// The drive at a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NoDrive`] when the folder has none of the files of such a drive.
+    pub fn at(path: &Path) -> Result<Self, FirmwareError> {
+        let no_drive = |why: &str| FirmwareError::NoDrive { path: path.to_owned(), why: why.to_owned() };
+        if !path.is_dir() {
+            return Err(no_drive("there is no such folder"));
+        }
+        let (details, page) = (text(path, "DETAILS.TXT"), text(path, "MBED.HTM"));
+        if details.is_none() && page.is_none() {
+            return Err(no_drive("it has neither DETAILS.TXT nor MBED.HTM, as the drive of an ST-LINK has"));
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            // Where it is mounted by itself the folder has its name.
+            label: path.file_name().map(|name| name.to_string_lossy().into_owned()),
+            code: page.as_deref().and_then(code),
+            details: details.unwrap_or_default(),
+            device: None,
+        })
+    }
+
+    /// The same with what the system knows of it.
+    pub fn of_system(mut self, device: Option<PathBuf>, label: Option<String>) -> Self {
+        self.device = device;
+        self.label = label.or(self.label);
+        self
+    }
+
+    /// The board, as labels call it: `H745ZIQ`; and whether that is its whole name. `None` when it is not named.
+    pub fn board(&self) -> Option<(&str, bool)> {
+        let by_code =
+            |code: &String| CODES.iter().find(|(known, _)| known == code).map(|(_, name)| (*name, true));
+        let by_label = |label: &'_ String| {
+            let name =
+                PREFIXES.iter().find_map(|prefix| label.strip_prefix(prefix)).filter(|name| !name.is_empty());
+            let at = name.map(|name| label.len() - name.len())?;
+            Some((at, label.len() < LABEL_MAX))
+        };
+        self.code.as_ref().and_then(by_code).or_else(|| {
+            let label = self.label.as_ref()?;
+            let (at, whole) = by_label(label)?;
+            Some((&label[at..], whole))
+        })
+    }
+
+    /// Whether it is the drive of a board, which is named as in its firmware: `nucleo-h745zi-q`.
+    pub fn fit(&self, board: &str) -> Fit {
+        let wanted = short_name(board);
+        match self.board() {
+            Some((name, _)) if name == wanted => Fit::Same,
+            // A label of full length may be the beginning of a name.
+            Some((name, false)) if wanted.starts_with(name) => Fit::Unknown,
+            Some(_) => Fit::Other,
+            None => Fit::Unknown,
+        }
+    }
+
+    /// What `FAIL.TXT` says; `None` when there is none.
+    pub fn failure(&self) -> Option<String> {
+        text(&self.path, "FAIL.TXT").map(|text| text.trim().to_owned())
+    }
+
+    /// It is there.
+    pub fn is_there(&self) -> bool {
+        ["DETAILS.TXT", "MBED.HTM"].iter().any(|file| self.path.join(file).exists())
+    }
+}
+
+/// A board as labels call it: `nucleo-h745zi-q-ldo` is the same board as `nucleo-h745zi-q`, `H745ZIQ`.
+fn short_name(board: &str) -> String {
+    let name = same_board(board);
+    name.strip_prefix("nucleo-").unwrap_or(name).replace('-', "").to_uppercase()
+}
+
+/// The board without how its core is supplied.
+pub(super) fn same_board(board: &str) -> &str {
+    board.strip_suffix("-ldo").unwrap_or(board)
+}
+
+fn text(folder: &Path, file: &str) -> Option<String> {
+    let bytes = fs::read(folder.join(file)).ok()?;
+    Some(String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_MAX)]).into_owned())
+}
+
+/// The first four digits behind `code=` are those of the board.
+fn code(page: &str) -> Option<String> {
+    let (_, behind) = page.split_once("code=")?;
+    let code = behind.get(..4)?;
+    code.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| code.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(label: &str, code: Option<&str>) -> Drive {
+        Drive {
+            path: PathBuf::new(),
+            label: Some(label.into()),
+            code: code.map(Into::into),
+            details: String::new(),
+            device: None,
+        }
+    }
+
+    #[test]
+    fn a_drive_fits_the_board_that_it_names() {
+        use Fit::*;
+        let (h745, h743) = ("nucleo-h745zi-q", "nucleo-h743zi2");
+        for (label, code, of_h745, of_h743) in [
+            ("NOD_H745ZIQ", None, Same, Other),
+            ("NOD_H743ZI2", None, Other, Same),
+            // The older board of this name is another one, with other LEDs; its label and the cut label of the newer are alike.
+            ("NODE_H743ZI", None, Other, Unknown),
+            ("NODE_H743ZI", Some("0836"), Other, Same),
+            ("NODE_H743ZI", Some("0813"), Other, Other),
+            ("NODE_H745ZI", None, Unknown, Other),
+            ("NOD_F401RE", None, Other, Other),
+            ("NOD_H745", None, Other, Other),
+            ("NUCLEO", None, Unknown, Unknown),
+            ("D:", Some("0843"), Same, Other),
+            ("anything", Some("9999"), Unknown, Unknown),
+        ] {
+            let drive = drive(label, code);
+            assert_eq!((drive.fit(h745), drive.fit(h743)), (of_h745, of_h743), "{label} {code:?}");
+            assert_eq!(drive.fit("nucleo-h745zi-q-ldo"), of_h745, "it is the same board");
+        }
+    }
+
+    #[test]
+    fn a_folder_is_a_drive_when_it_has_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("NOD_H745ZIQ");
+        assert!(Drive::at(&path).unwrap_err().to_string().contains("no such folder"));
+        fs::create_dir(&path).unwrap();
+        assert!(Drive::at(&path).unwrap_err().to_string().contains("neither DETAILS.TXT"));
+        fs::write(path.join("DETAILS.TXT"), "Version: 0221\n").unwrap();
+        let found = Drive::at(&path).unwrap();
+        assert_eq!((found.fit("nucleo-h745zi-q"), found.failure()), (Fit::Same, None));
+        fs::write(path.join("MBED.HTM"), "<a href=\"https://os.mbed.com/platforms/?code=08360221FFFF\">")
+            .unwrap();
+        fs::write(path.join("FAIL.TXT"), "no target\r\n").unwrap();
+        let found = Drive::at(&path).unwrap();
+        assert_eq!((found.code.as_deref(), found.failure().as_deref()), (Some("0836"), Some("no target")));
+        assert_eq!(found.fit("nucleo-h745zi-q"), Fit::Other, "the number counts");
+    }
+}

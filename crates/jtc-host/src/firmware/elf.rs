@@ -1,0 +1,112 @@
+//! The bytes that an ELF file puts into flash: as much of the format as that needs.
+
+use super::image::{ERASED, FLASH, STORED_ARM};
+
+/// Begins an ELF file for 32 bits, the low byte first.
+const MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];
+/// Its type of a segment that is loaded.
+const PT_LOAD: u32 = 1;
+/// Machine: Arm.
+const EM_ARM: u16 = 40;
+/// More segments than a program has.
+const SEGMENTS_MAX: u16 = 64;
+
+/// The file is ELF, of whatever kind.
+pub(super) fn is_elf(bytes: &[u8]) -> bool {
+    bytes.starts_with(&MAGIC[..4])
+}
+
+/// What the file puts into flash, from the first byte of the flash on; gaps are as erased flash.
+pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    let damaged = || "an ELF file that is cut off or damaged".to_owned();
+    let half =
+        |at: usize| bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]])).ok_or_else(damaged);
+    let word = |at: usize| {
+        let at = bytes.get(at..at.checked_add(4)?)?;
+        Some(u32::from_le_bytes(*at.first_chunk()?))
+    };
+    let word = |at: usize| word(at).ok_or_else(damaged);
+    if !bytes.starts_with(&MAGIC) || half(18)? != EM_ARM {
+        return Err("an ELF file of another processor".into());
+    }
+    let (table, size, count) = (word(28)? as usize, usize::from(half(42)?), half(44)?);
+    if count > SEGMENTS_MAX || size < 32 {
+        return Err(damaged());
+    }
+    let mut flat = Vec::new();
+    for n in 0..usize::from(count) {
+        let head = table.checked_add(n * size).ok_or_else(damaged)?;
+        let field = |n: usize| word(head.saturating_add(4 * n));
+        let (kind, address) = (field(0)?, field(3)?);
+        let (offset, length) = (field(1)? as usize, field(4)? as usize);
+        if kind != PT_LOAD || length == 0 {
+            continue;
+        }
+        let data = offset.checked_add(length).and_then(|end| bytes.get(offset..end)).ok_or_else(damaged)?;
+        let at = address.checked_sub(FLASH).map(|at| at as usize);
+        let end = at.and_then(|at| at.checked_add(length)).filter(|end| *end <= STORED_ARM);
+        let (Some(at), Some(end)) = (at, end) else {
+            return Err(format!(
+                "{length} bytes for {address:#010x}, which is not where a program stands in flash"
+            ));
+        };
+        if flat.len() < end {
+            flat.resize(end, ERASED);
+        }
+        flat[at..end].copy_from_slice(data);
+    }
+    Ok(flat)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with these segments: address, bytes.
+    fn file(segments: &[(u32, &[u8])]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.resize(52, 0);
+        bytes[18] = 40;
+        bytes[28] = 52;
+        bytes[42] = 32;
+        bytes[44] = segments.len() as u8;
+        let mut offset = 52 + 32 * segments.len() as u32;
+        for (address, data) in segments {
+            let length = data.len() as u32;
+            for word in [1, offset, 0x2000_0000, *address, length, length, 0, 0] {
+                bytes.extend(word.to_le_bytes());
+            }
+            offset += length;
+        }
+        segments.iter().for_each(|(_, data)| bytes.extend(*data));
+        bytes
+    }
+
+    #[test]
+    fn segments_stand_where_they_are_loaded() {
+        let bytes = file(&[(FLASH + 8, &[1, 2]), (FLASH, &[3, 4, 5])]);
+        assert_eq!(flat(&bytes).unwrap(), [3, 4, 5, 255, 255, 255, 255, 255, 1, 2]);
+        // What has no bytes in the file is no part of the flash.
+        assert_eq!(flat(&file(&[(0x2000_0000, &[]), (FLASH, &[7])])).unwrap(), [7]);
+    }
+
+    #[test]
+    fn a_file_that_is_cut_off_or_for_another_place_is_refused() {
+        let bytes = file(&[(FLASH, &[1, 2, 3, 4])]);
+        for end in 0..bytes.len() {
+            assert!(flat(&bytes[..end]).is_err(), "{end}");
+        }
+        for address in [0x0700_0000, 0x2000_0000, FLASH + 0x1C_0000 - 1, u32::MAX] {
+            assert!(flat(&file(&[(address, &[1, 2])])).unwrap_err().contains("not where"), "{address:#x}");
+        }
+        let mut other = bytes.clone();
+        other[18] = 62;
+        assert!(flat(&other).unwrap_err().contains("another processor"));
+        // Numbers of any size.
+        for at in 28..bytes.len() - 4 {
+            let mut wild = bytes.clone();
+            wild[at..at + 4].fill(0xFF);
+            let _ = flat(&wild);
+        }
+    }
+}

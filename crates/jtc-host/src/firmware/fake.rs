@@ -1,0 +1,237 @@
+//! For tests: images, a board behind a line, and the drive of its ST-LINK.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use jtc_wire::{Answer, DataStatus, FrameType, Info, Name, Program, Response, Status, StoreState};
+
+use super::Drive;
+use crate::port::test::ScriptedPort;
+use crate::port::{Port, PortError};
+
+/// An image of a board, with a content that depends on `seed`.
+pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
+    let mut bytes = vec![0; 0x1000];
+    bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
+    bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
+    let record = &mut bytes[0x400..0x460];
+    record[..8].copy_from_slice(b"OPENJTC\0");
+    record[8..12].copy_from_slice(&[1, 0, 96, 0]);
+    for (at, text) in [(12, "0.2.0"), (24, board), (48, "0123456789abc")] {
+        record[at..at + text.len()].copy_from_slice(text.as_bytes());
+    }
+    record[88..92].copy_from_slice(&115_200u32.to_le_bytes());
+    for (n, byte) in bytes[0x500..].iter_mut().enumerate() {
+        *byte = (n as u8).wrapping_mul(31).wrapping_add(seed) | 1;
+    }
+    bytes
+}
+
+/// What a device reports that has these bytes in flash and nothing behind them; bit by bit, as the definition has it.
+pub fn program_of(bytes: &[u8]) -> Program {
+    let mut register = u32::MAX;
+    for byte in bytes {
+        register ^= u32::from(*byte);
+        for _ in 0..8 {
+            register = register >> 1 ^ 0xEDB8_8320 * (register & 1);
+        }
+    }
+    Program { bytes: bytes.len() as u32, crc32: !register }
+}
+
+/// A folder with images of these boards and their catalogue.
+pub fn catalogue(folder: &Path, boards: &[&str]) {
+    use sha2::{Digest, Sha256};
+    let images: Vec<_> = boards
+        .iter()
+        .map(|board| {
+            let (bytes, file) = (image_bytes(board, 7), format!("{board}.bin"));
+            fs::write(folder.join(&file), &bytes).unwrap();
+            let sha256: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02X}")).collect();
+            serde_json::json!({
+                "board": board, "file": file, "sha256": sha256, "address": 0x0800_0000, "bytes": bytes.len(),
+            })
+        })
+        .collect();
+    let text = serde_json::json!({ "version": "0.2.0", "images": images }).to_string();
+    fs::write(folder.join("firmware.json"), text).unwrap();
+}
+
+/// A processor and what is in its flash.
+#[derive(Clone)]
+pub struct Board(Arc<Mutex<Flashed>>);
+
+struct Flashed {
+    /// The ST-LINK holds the processor.
+    held: bool,
+    program: Option<Program>,
+    board: String,
+    started: Instant,
+    /// Time that it had run before the test began, ms.
+    before_ms: u64,
+    status: Status,
+}
+
+impl Board {
+    /// One that has run this image for an hour.
+    pub fn running(board: &str, program: Option<Program>) -> Self {
+        let status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
+        Self(Arc::new(Mutex::new(Flashed {
+            held: false,
+            program,
+            board: board.to_owned(),
+            started: Instant::now(),
+            before_ms: 3_600_000,
+            status,
+        })))
+    }
+
+    /// From now on it sends this.
+    pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
+        change(&mut self.0.lock().unwrap().status);
+    }
+
+    /// Nothing comes from it.
+    pub fn hold(&self, held: bool) {
+        self.0.lock().unwrap().held = held;
+    }
+
+    fn start_with(&self, board: &str, program: Option<Program>) {
+        let mut flashed = self.0.lock().unwrap();
+        (flashed.held, flashed.program, flashed.board) = (false, program, board.to_owned());
+        (flashed.started, flashed.before_ms) = (Instant::now(), 0);
+    }
+
+    fn info(&self) -> Option<Info> {
+        let flashed = self.0.lock().unwrap();
+        let info = Info {
+            uptime_ms: flashed.before_ms + flashed.started.elapsed().as_millis() as u64,
+            board: Name::cut(&flashed.board),
+            program: flashed.program,
+            store: StoreState::Stored,
+            ..Info::default()
+        };
+        (!flashed.held).then(|| info.with_firmware("0.2.0", "0123456789abc"))
+    }
+
+    fn status(&self) -> Option<Status> {
+        let flashed = self.0.lock().unwrap();
+        (!flashed.held).then_some(flashed.status)
+    }
+
+    /// A line to it.
+    pub fn port(&self) -> Box<dyn Port> {
+        let board = self.clone();
+        let mut next = Duration::ZERO;
+        Box::new(ScriptedPort::new(None, move |now, bytes| {
+            let mut out = Vec::new();
+            let Some(status) = board.status() else { return out };
+            if !bytes.is_empty() {
+                let response = Response::good(FrameType::GetInfo, DataStatus::NoError, 6);
+                out.extend(Status { response, ..status }.emit());
+                let mut frame = [0; jtc_wire::ANSWER_MAX];
+                let n = board.info().map_or(0, |info| Answer::Info(info).emit(&mut frame).unwrap());
+                out.extend(&frame[..n]);
+            } else if now >= next {
+                next = now + Duration::from_millis(40);
+                out.extend(status.emit());
+            }
+            out
+        }))
+    }
+
+    /// Opens it.
+    pub fn opener(&self) -> impl FnMut() -> Result<Box<dyn Port>, PortError> {
+        let board = self.clone();
+        move || Ok(board.port())
+    }
+}
+
+/// What an ST-LINK does with a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Behaviour {
+    /// Writes it into the flash; the drive vanishes and comes back.
+    Takes,
+    /// The same, with a part of the flash left empty, as it happens where the bytes come in another order.
+    LeavesHole,
+    /// `FAIL.TXT` appears.
+    Fails(&'static str),
+    /// Nothing happens.
+    Ignores,
+}
+
+/// The drive of a board, and a thread that is its ST-LINK.
+pub struct StLink {
+    pub folder: tempfile::TempDir,
+    pub path: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl StLink {
+    /// A drive with this label at this board.
+    pub fn new(label: &str, board: &Board, behaviour: Behaviour) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(label);
+        appear(&path);
+        let stop = Arc::new(AtomicBool::new(false));
+        let (at, end, board) = (path.clone(), stop.clone(), board.clone());
+        let thread = thread::spawn(move || {
+            let mut length = 0;
+            while !end.load(Ordering::Relaxed) {
+                thread::sleep(Duration::from_millis(5));
+                // As long as a file grows it is not whole.
+                let Ok(bytes) = fs::read(at.join("openjtc.bin")) else { continue };
+                if bytes.is_empty() || bytes.len() != length {
+                    length = bytes.len();
+                    continue;
+                }
+                fs::remove_file(at.join("openjtc.bin")).unwrap();
+                length = 0;
+                work(&at, &board, &behaviour, bytes);
+            }
+        });
+        Self { folder, path, stop, thread: Some(thread) }
+    }
+
+    /// It, as a program sees it.
+    pub fn drive(&self) -> Drive {
+        Drive::at(&self.path).unwrap()
+    }
+}
+
+impl Drop for StLink {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        let ended = self.thread.take().map(JoinHandle::join);
+        assert!(matches!(ended, Some(Ok(()))) || thread::panicking());
+    }
+}
+
+fn appear(path: &Path) {
+    fs::create_dir_all(path).unwrap();
+    fs::write(path.join("DETAILS.TXT"), "Version: V3J13M4B5S1\nBuild: Jan 1 2024\n").unwrap();
+}
+
+fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
+    match behaviour {
+        Behaviour::Ignores => {}
+        Behaviour::Fails(text) => fs::write(path.join("FAIL.TXT"), text).unwrap(),
+        Behaviour::Takes | Behaviour::LeavesHole => {
+            board.hold(true);
+            fs::remove_dir_all(path).unwrap();
+            let name = super::Record::parse(&bytes).unwrap().board;
+            if *behaviour == Behaviour::LeavesHole {
+                bytes[0x800..0xA00].fill(0);
+            }
+            // No processor starts within what the clocks may differ by.
+            thread::sleep(Duration::from_millis(400));
+            appear(path);
+            board.start_with(&name, Some(program_of(&bytes)));
+        }
+    }
+}

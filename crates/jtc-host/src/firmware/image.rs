@@ -1,0 +1,241 @@
+//! An image of the flash of a board: read from a file, and looked at before it goes anywhere.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use jtc_wire::Program;
+
+use super::FirmwareError;
+use super::elf;
+
+/// First address of the flash.
+pub const FLASH: u32 = 0x0800_0000;
+/// Bytes of bank 1, which holds the program.
+pub(super) const BANK1: usize = 1024 * 1024;
+/// Where the memory of the stored arm begins: an image ends before it.
+pub(super) const STORED_ARM: usize = 0x1C_0000;
+/// What erased flash reads as.
+pub(super) const ERASED: u8 = 0xFF;
+
+/// Memories in which a stack can be: the tightly coupled one, and that of the AXI bus; first byte, and the one behind the last.
+const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
+
+static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+
+/// The record in the image that says what it is.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Record {
+    /// Version of the firmware.
+    pub version: String,
+    /// Board that it is built for.
+    pub board: String,
+    /// Commit, with `+` when files were changed since.
+    pub build: String,
+    /// Rate of its serial lines, Bd.
+    pub baud: u32,
+}
+
+impl Record {
+    /// Where it stands in the image.
+    pub const OFFSET: usize = 0x400;
+    const MAGIC: &[u8] = b"OPENJTC\0";
+    /// Bytes of its first form; later ones are longer.
+    const LEN: usize = 96;
+
+    /// From an image; `None` when there is none at its place.
+    pub fn parse(image: &[u8]) -> Option<Self> {
+        let bytes = image.get(Self::OFFSET..Self::OFFSET + Self::LEN)?;
+        let size = u16::from_le_bytes([bytes[10], bytes[11]]);
+        if !bytes.starts_with(Self::MAGIC) || usize::from(size) < Self::LEN {
+            return None;
+        }
+        let text = |at: std::ops::Range<usize>| {
+            let text = bytes[at].split(|byte| *byte == 0).next().unwrap_or_default();
+            let printable = !text.is_empty() && text.iter().all(u8::is_ascii_graphic);
+            printable.then(|| String::from_utf8_lossy(text).into_owned())
+        };
+        Some(Self {
+            version: text(12..24)?,
+            board: text(24..48)?,
+            build: text(48..72)?,
+            baud: u32::from_le_bytes(*bytes[88..].first_chunk()?),
+        })
+    }
+}
+
+/// An image of the flash, from its first byte on.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Image {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    record: Record,
+}
+
+impl std::fmt::Debug for Image {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Image {{ {}, {} bytes, {:?} }}", self.path.display(), self.bytes.len(), self.record)
+    }
+}
+
+impl Image {
+    /// Reads a binary or an ELF file, and looks whether it is firmware of a board of this project.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::File`] when it cannot be read, [`FirmwareError::NoImage`] when it is no such firmware.
+    pub fn read(path: &Path) -> Result<Self, FirmwareError> {
+        let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
+        Self::parse(path, bytes)
+    }
+
+    /// The same of what the file at `path` holds.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NoImage`].
+    pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
+        let flat = if elf::is_elf(&bytes) { elf::flat(&bytes) } else { Ok(bytes) };
+        let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
+        let (record, bytes) =
+            looked_at.map_err(|why| FirmwareError::NoImage { path: path.to_owned(), why })?;
+        Ok(Self { path: path.to_owned(), bytes, record })
+    }
+
+    /// The file that it was read from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is written from [`FLASH`] on.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// What it says of itself.
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// What a device that runs it reports of its flash is this image (J-67): the CRC of as many bytes as the device has read is that of
+    /// the image, and the image has nothing behind them in bank 1 but what fills up gaps.
+    ///
+    /// # Errors
+    ///
+    /// Why it is not.
+    pub fn is_what_runs(&self, program: Program) -> Result<(), String> {
+        let bank1 = &self.bytes[..self.bytes.len().min(BANK1)];
+        let Some((read, rest)) = bank1.split_at_checked(program.bytes as usize) else {
+            return Err(format!("it has a program of {} bytes, the image {}", program.bytes, bank1.len()));
+        };
+        let fills = |byte: u8| rest.iter().all(|b| *b == byte);
+        if !fills(0) && !fills(ERASED) {
+            return Err(format!(
+                "its program ends after {} bytes, that of the image does not",
+                program.bytes
+            ));
+        }
+        match CRC.checksum(read) {
+            crc32 if crc32 == program.crc32 => Ok(()),
+            crc32 => Err(format!(
+                "the CRC-32 of its {} bytes is {:08x}, that of the image {crc32:08x}",
+                program.bytes, program.crc32
+            )),
+        }
+    }
+}
+
+/// What the image says it is; else why it is no firmware that may go onto a board.
+fn examine(bytes: &[u8]) -> Result<Record, String> {
+    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let (Some(stack), Some(reset)) = (word(0), word(4)) else {
+        return Err(format!("{} bytes, too few for a program", bytes.len()));
+    };
+    if bytes.len() > STORED_ARM {
+        return Err(format!("{} bytes, and from {STORED_ARM} on a board keeps its stored arm", bytes.len()));
+    }
+    if !STACKS.iter().any(|(first, end)| stack > *first && stack <= *end) || stack % 8 != 0 {
+        return Err(format!("its first word, {stack:#010x}, is no stack in the memory of these processors"));
+    }
+    let program = FLASH..FLASH + bytes.len().min(BANK1) as u32;
+    if reset % 2 == 0 || !program.contains(&(reset & !1)) {
+        return Err(format!("its second word, {reset:#010x}, is no entry of a program within it"));
+    }
+    Record::parse(bytes)
+        .ok_or_else(|| format!("no record of this project's firmware at {:#x}", Record::OFFSET))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fake::{image_bytes, program_of};
+    use super::*;
+
+    fn parsed(bytes: Vec<u8>) -> Result<Image, String> {
+        Image::parse(Path::new("x.bin"), bytes).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn an_image_says_what_it_is() {
+        let image = parsed(image_bytes("nucleo-h745zi-q", 7)).unwrap();
+        let record = image.record();
+        assert_eq!((record.board.as_str(), record.version.as_str()), ("nucleo-h745zi-q", "0.2.0"));
+        assert_eq!((record.build.as_str(), record.baud), ("0123456789abc", 115_200));
+    }
+
+    #[test]
+    fn what_is_no_firmware_of_these_boards_is_refused_with_the_reason() {
+        let good = || image_bytes("nucleo-h745zi-q", 7);
+        let with = |at: usize, bytes: &[u8]| {
+            let mut image = good();
+            image[at..at + bytes.len()].copy_from_slice(bytes);
+            image
+        };
+        let mut long = good();
+        long.resize(STORED_ARM + 1, 0);
+        for (bytes, why) in [
+            (vec![1, 2, 3], "3 bytes, too few"),
+            (good()[..0x400].to_vec(), "is no entry"),
+            (b"#!/bin/sh\necho this is no program at all".to_vec(), "is no stack"),
+            (with(0, &[0; 4]), "0x00000000, is no stack"),
+            (with(0, &0x2002_0008u32.to_le_bytes()), "is no stack"),
+            (with(4, &0x0800_0500u32.to_le_bytes()), "is no entry"),
+            (with(4, &0x0810_0001u32.to_le_bytes()), "is no entry"),
+            (with(0x400, b"openjtc"), "no record"),
+            (with(0x40A, &[95, 0]), "no record"),
+            (with(0x418, &[0]), "no record"),
+            (long, "stored arm"),
+        ] {
+            let said = parsed(bytes).unwrap_err();
+            assert!(said.starts_with("x.bin: ") && said.contains(why), "{why}: {said}");
+        }
+    }
+
+    #[test]
+    fn j67_what_runs_is_the_image_or_it_is_not() {
+        let image = parsed(image_bytes("nucleo-h745zi-q", 7)).unwrap();
+        let program = program_of(image.bytes());
+        assert_eq!(image.is_what_runs(program), Ok(()));
+        // The two words of the second core, far behind the program, change nothing; nor does what fills up the gap.
+        for gap in [0, 0xFF] {
+            let mut longer = image.bytes().to_vec();
+            longer.resize(BANK1, gap);
+            longer.extend([1, 2, 3, 4]);
+            assert_eq!(parsed(longer.clone()).unwrap().is_what_runs(program), Ok(()));
+            longer[BANK1 - 1] = 9;
+            let said = parsed(longer).unwrap().is_what_runs(program).unwrap_err();
+            assert!(said.contains("that of the image does not"), "{said}");
+        }
+        let other = parsed(image_bytes("nucleo-h745zi-q", 8)).unwrap();
+        assert!(other.is_what_runs(program).unwrap_err().contains("CRC-32"));
+        let more = Program { bytes: program.bytes + 1, ..program };
+        assert!(image.is_what_runs(more).unwrap_err().contains("the image"));
+        let less = Program { bytes: program.bytes - 4, ..program };
+        assert!(image.is_what_runs(less).unwrap_err().contains("ends after"));
+    }
+
+    /// The published check value of CRC-32/ISO-HDLC.
+    #[test]
+    fn j67_the_crc_is_that_of_ethernet_and_zlib() {
+        assert_eq!(CRC.checksum(b"123456789"), 0xCBF4_3926);
+    }
+}

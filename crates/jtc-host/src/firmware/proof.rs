@@ -1,0 +1,218 @@
+//! After an image was copied to a drive: what the drive reports, and what the program that runs now reports of the flash that it runs from.
+
+use std::thread::sleep;
+use std::time::Duration;
+
+use jtc_wire::{Info, Program, StoreState};
+
+use super::{Drive, FirmwareError, Image, Written};
+use crate::error::LinkError;
+use crate::port::{Port, PortError};
+use crate::session::{Session, Timeouts};
+
+/// A device has read its flash within this time after its start (J-67).
+const READ_WITHIN: Duration = Duration::from_secs(3);
+/// What two clocks may differ by: a share, and what a start may be seen late.
+const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
+
+/// How long is waited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// For the controller to start with the image, all in all.
+    pub wait: Duration,
+    /// Between two attempts.
+    pub pause: Duration,
+}
+
+impl Default for Limits {
+    /// A megabyte takes the ST-LINK half a minute, and a system that mounts drives some seconds more.
+    fn default() -> Self {
+        Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
+    }
+}
+
+/// Opens the serial port of the board.
+pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
+
+/// What became of the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveAfter {
+    /// It vanished and came back, as it does when an image was taken.
+    CameBack,
+    /// It vanished, and has not come back; where nobody mounts drives it does not.
+    Gone,
+    /// It was there all the time.
+    Stayed,
+}
+
+/// A controller that has proved that it runs the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proof {
+    /// Who it is.
+    pub info: Info,
+    /// What it read of its flash.
+    pub program: Program,
+    /// What became of the drive.
+    pub drive: DriveAfter,
+    /// Time from the copying to the proof.
+    pub took: Duration,
+}
+
+impl Proof {
+    /// The board keeps an arm.
+    pub fn stored_arm(&self) -> bool {
+        self.info.store == StoreState::Stored
+    }
+}
+
+/// Looks at a drive again and again.
+struct Watch<'a> {
+    drive: &'a Drive,
+    written: &'a Written,
+    seen: DriveAfter,
+}
+
+impl Watch<'_> {
+    /// An error when the drive reports one.
+    fn look(&mut self) -> Result<(), FirmwareError> {
+        self.seen = match (self.drive.is_there(), self.seen) {
+            (false, _) => DriveAfter::Gone,
+            (true, DriveAfter::Stayed) => DriveAfter::Stayed,
+            (true, _) => DriveAfter::CameBack,
+        };
+        // A report of before, which it shows until it has vanished, is none of this image.
+        let stale = |text: &String| {
+            self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
+        };
+        match self.drive.failure() {
+            Some(text) if !stale(&text) => {
+                Err(FirmwareError::Refused { drive: self.drive.path.clone(), text })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Waits until the drive has come back, or has not vanished at all for all the time; for boards without a serial line.
+///
+/// # Errors
+///
+/// [`FirmwareError::Refused`].
+pub fn wait_for_drive(drive: &Drive, written: &Written, limits: Limits) -> Result<DriveAfter, FirmwareError> {
+    let mut watch = Watch { drive, written, seen: DriveAfter::Stayed };
+    while written.began.elapsed() < limits.wait && watch.seen != DriveAfter::CameBack {
+        sleep(limits.pause);
+        watch.look()?;
+    }
+    Ok(watch.seen)
+}
+
+/// Waits until the controller on the line has started with the image, and proves it; `note` gets what is seen meanwhile.
+///
+/// # Errors
+///
+/// [`FirmwareError::Refused`] by the drive, [`FirmwareError::OtherProgram`] when something else runs, [`FirmwareError::NotReported`] when
+/// the program does not report its flash, [`FirmwareError::NotStarted`] when none started in time.
+pub fn prove(
+    image: &Image,
+    drive: &Drive,
+    written: &Written,
+    open: &mut OpenPort<'_>,
+    limits: Limits,
+) -> Result<Proof, FirmwareError> {
+    let mut watch = Watch { drive, written, seen: DriveAfter::Stayed };
+    loop {
+        watch.look()?;
+        let last = match open().map_err(LinkError::from).and_then(|port| ask(port, limits)) {
+            Ok(Some(info)) if !started_since(&info, written.began.elapsed()) => {
+                "the program of before still runs".into()
+            }
+            Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
+            Ok(Some(info)) => {
+                let program = compare(image, &info)?;
+                return Ok(Proof { info, program, drive: watch.seen, took: written.began.elapsed() });
+            }
+            Ok(None) => "a controller without extensions answers".into(),
+            Err(e) => e.to_string(),
+        };
+        if written.began.elapsed() >= limits.wait {
+            let waited_s = written.began.elapsed().as_secs_f64();
+            return Err(FirmwareError::NotStarted { waited_s, last, doubt: written.doubt.clone() });
+        }
+        sleep(limits.pause);
+    }
+}
+
+/// The device has started within this time.
+fn started_since(info: &Info, time: Duration) -> bool {
+    let (share, late) = CLOCKS_DIFFER;
+    Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
+}
+
+/// It has started just now, and may report its flash yet.
+fn still_reads(info: &Info) -> bool {
+    info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
+}
+
+/// Who the controller is, once it has read its flash; `None` for a device without extensions.
+///
+/// # Errors
+///
+/// Those of [`Session::info`].
+pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Info>, LinkError> {
+    loop {
+        match session.info()? {
+            Some(info) if still_reads(&info) => drop(session.next_status()?),
+            info => return Ok(info),
+        }
+    }
+}
+
+/// Who is there; impatiently, for it is asked again.
+fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
+    let mut session = Session::new(port);
+    session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
+    // A request while the ST-LINK holds the processor would be waited for in vain.
+    session.next_status()?;
+    session.info()
+}
+
+/// The program that the controller reports is the image (J-67).
+///
+/// # Errors
+///
+/// [`FirmwareError::OtherProgram`] and [`FirmwareError::NotReported`].
+pub fn compare(image: &Image, info: &Info) -> Result<Program, FirmwareError> {
+    let runs = format!("{} on {}", info.firmware_and_revision(), info.board);
+    let Some(program) = info.program else {
+        return Err(FirmwareError::NotReported { runs });
+    };
+    match image.is_what_runs(program) {
+        Ok(()) => Ok(program),
+        Err(why) => Err(FirmwareError::OtherProgram { path: image.path().to_owned(), runs, why }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_before_the_copying_is_none_since() {
+        let since = |uptime_ms, time_s| {
+            started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
+        };
+        // It ran for a moment when the copying began, and its clock is slow by a twentieth.
+        assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
+        assert!(since(1_000, 10.0) && since(0, 0.4));
+    }
+
+    #[test]
+    fn j67_a_device_that_has_just_started_may_still_read_its_flash() {
+        let program = Some(Program { bytes: 1, crc32: 1 });
+        let reads = |uptime_ms, program| still_reads(&Info { uptime_ms, program, ..Info::default() });
+        assert!(reads(0, None) && reads(2_999, None));
+        assert!(!reads(3_000, None) && !reads(0, program));
+    }
+}

@@ -123,6 +123,13 @@ fn a_session_at_the_command_line() {
     let mut live = Live::start(jtc.into(), &Path::new(&firmware).join("nucleo-h745zi-q.elf"));
     let status = live.jtc(&["status"]).ends(0);
     assert!(status.out.contains(r#""missing_parameters":["friction"#), "{}", status.out);
+    // What runs is this file, and no other.
+    let image =
+        |board: &str| Path::new(&firmware).join(format!("{board}.elf")).to_string_lossy().into_owned();
+    let verified = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q")]).ends(0);
+    assert!(verified.out.contains(r#""proved":true"#), "{}", verified.out);
+    let other = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q-ldo")]).ends(5);
+    assert!(other.out.contains(r#""code":"other-program""#), "{}", other.out);
     live.jtc(&["params", "use-defaults"]).ends(0);
     live.wait_for("state", "HoldPos");
 

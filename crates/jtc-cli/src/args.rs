@@ -3,6 +3,7 @@
 
 mod arm;
 mod bench;
+mod firmware;
 mod log;
 mod maintain;
 mod motion;
@@ -20,6 +21,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub use arm::{ArmCommand, ImportArgs};
 pub use bench::BenchCommand;
+pub use firmware::{FirmwareCommand, FlashArgs, ImageArgs};
 pub use log::LogCommand;
 pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, ContinueArgs, ExecuteArgs, ResumeArgs, RunArgs, TeachCommand, TrajCommand};
@@ -151,6 +153,9 @@ pub enum Command {
     /// Work on a bench: joints that are not there
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Firmware of the controller's boards: what is installed, putting it onto a board, proving what runs
+    #[command(subcommand)]
+    Firmware(FirmwareCommand),
     /// What the arm carries at its flange
     #[command(subcommand)]
     Payload(PayloadCommand),

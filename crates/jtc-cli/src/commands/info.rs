@@ -57,6 +57,7 @@ fn as_json(info: &Info) -> Value {
         "defaults": if info.defaults_stored { "stored" } else { "built-in" },
         "memory": info.store.name(),
         "flight_recorder": info.log.name(),
+        "program": info.program.map(|program| json!({ "bytes": program.bytes, "crc32": format!("{:08x}", program.crc32) })),
         "stored_number": (info.store == StoreState::Stored).then_some(info.sequence),
     })
 }
@@ -76,7 +77,7 @@ fn as_text(info: &Info) -> String {
          firmware:  {} on {}, extensions {}\n\
          started:   {}, the last by {}, {} ago\n\
          records:   {} lost\n\
-         recorder:  {}",
+         recorder:  {}{}",
         info.arm,
         hash(info.hash),
         list(missing),
@@ -89,6 +90,7 @@ fn as_text(info: &Info) -> String {
         span(info.uptime_ms / 1000),
         info.lost_records,
         recorder(info.log),
+        info.program.map_or(String::new(), |program| format!("\nin flash:  {program}")),
     )
 }
 

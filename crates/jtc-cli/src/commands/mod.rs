@@ -9,6 +9,7 @@ mod doctor;
 mod dynamics;
 mod example;
 mod explain;
+mod firmware;
 mod help;
 mod info;
 mod job;
@@ -54,6 +55,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::monitor(&args, out),
         Command::Arm(command) => arm::arm(&command, out),
         Command::Params(command) => params::params(&command, out),
+        Command::Firmware(command) => firmware::firmware(&command, out),
         Command::Bench(command) => bench::bench(&command, out),
         Command::Payload(command) => payload::payload(&command, out),
         Command::Plan(args) => plan::plan(&args, out),

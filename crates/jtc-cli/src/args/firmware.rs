@@ -1,0 +1,83 @@
+//! `jtc firmware`: images, drives, and what a board runs.
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, Subcommand};
+
+use super::LinkArgs;
+
+/// `jtc firmware …`
+#[derive(Debug, Subcommand)]
+pub enum FirmwareCommand {
+    /// The images that are installed, and the boards' drives that are mounted
+    #[command(
+        after_help = "Images are listed by firmware.json in the folder that OPENJTC_FIRMWARE names, else in ../share/openjtc/firmware beside\n\
+                            this program, else in /usr/share/openjtc/firmware.\n\nExamples:\n  jtc firmware list\n  \
+                            jtc --json firmware list | jq -r .drives[].path"
+    )]
+    List,
+    /// Put an image onto a Nucleo board by the drive of its ST-LINK, and prove that it runs
+    #[command(
+        after_help = "The board is reset: an arm that it holds falls. A controller that reports torque is never flashed; one that does not\n\
+                            report that it has none, by a line of the same USB device as the drive, has to be answered for: on a terminal this is asked,\n\
+                            --yes answers. What runs afterwards is asked over the serial line, and compared with the image by the CRC-32 of\n\
+                            what the program finds in its own flash. The rate of the line is that of the image. The stored arm may be lost:\n\
+                            `jtc arm pull -o FILE` before.\n\nExamples:\n  jtc firmware flash\n  jtc firmware flash --board nucleo-h745zi-q --port /dev/ttyACM0\n  \
+                            jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2\n  \
+                            jtc firmware flash --image openjtc.bin --no-read-back --yes"
+    )]
+    Flash(FlashArgs),
+    /// Whether a board runs an image; nothing is written
+    #[command(
+        after_help = "Without --image or --board the image is that of the board which the controller reports.\n\nExamples:\n  \
+                            jtc firmware verify\n  jtc firmware verify --image openjtc.bin --port /dev/ttyACM0"
+    )]
+    Verify {
+        #[command(flatten)]
+        image: ImageArgs,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+}
+
+/// Which image.
+#[derive(Args, Clone, Debug)]
+pub struct ImageArgs {
+    /// Image, a binary (.bin) or an ELF file
+    #[arg(long, env = "JTC_IMAGE", value_name = "FILE", conflicts_with = "board")]
+    pub image: Option<PathBuf>,
+    /// The installed image of this board: nucleo-h745zi-q, nucleo-h745zi-q-ldo or nucleo-h743zi2
+    #[arg(long, env = "JTC_BOARD", value_name = "NAME")]
+    pub board: Option<String>,
+}
+
+/// Options of `jtc firmware flash`.
+#[derive(Args, Debug)]
+pub struct FlashArgs {
+    #[command(flatten)]
+    pub image: ImageArgs,
+    /// Where the drive of the board is mounted; default: the only one found
+    #[arg(long, env = "JTC_DRIVE", value_name = "DIR")]
+    pub drive: Option<PathBuf>,
+    /// Do not ask: the arm is supported, and its drives are without power
+    #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+    pub yes: bool,
+    /// The drive does not name its board: it is that of the image
+    #[arg(long, env = "JTC_ASSUME_BOARD", value_parser = FalseyValueParser::new())]
+    pub assume_board: bool,
+    /// The solder bridges of the board are set to the core supply of the image
+    #[arg(long, env = "JTC_ACCEPT_SUPPLY", value_parser = FalseyValueParser::new())]
+    pub accept_supply: bool,
+    /// Flash also a board that runs this very image
+    #[arg(long, env = "JTC_AGAIN", value_parser = FalseyValueParser::new())]
+    pub again: bool,
+    /// Do not ask the controller what it runs then: nothing proves that the image arrived
+    #[arg(long, env = "JTC_NO_READ_BACK", value_parser = FalseyValueParser::new())]
+    pub no_read_back: bool,
+    /// How long the board may take to run the image, s
+    #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub wait: u64,
+    #[command(flatten)]
+    pub link: LinkArgs,
+}

@@ -17,7 +17,7 @@ pub struct Failure {
     /// The next act that helps; empty when there is none.
     pub next: String,
     /// Where it is, and by how much.
-    pub facts: Facts,
+    pub facts: Box<Facts>,
 }
 
 impl Failure {
@@ -34,7 +34,7 @@ impl Failure {
             code: diagnosis.code.to_owned(),
             message: error.to_string(),
             next: diagnosis.next,
-            facts,
+            facts: Box::new(facts),
         }
     }
 
@@ -45,7 +45,7 @@ impl Failure {
             code: "usage".into(),
             message: message.into(),
             next: String::new(),
-            facts: Facts::default(),
+            facts: Box::default(),
         }
     }
 
@@ -57,7 +57,7 @@ impl Failure {
             code: code.into(),
             message,
             next: next.into(),
-            facts: Facts::default(),
+            facts: Box::default(),
         }
     }
 

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use jtc_core::Payload;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
@@ -14,6 +13,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::arm::Arm;
+use crate::dynamics::PayloadNumbers;
 use crate::error::Failure;
 use crate::run::Samples;
 use crate::trajectory::Trajectory;
@@ -136,10 +136,9 @@ impl Planner {
         line: bool,
         jerk: bool,
         temperature: Option<f64>,
-        payload: Option<(f64, [f64; 3], [f64; 6])>,
+        payload: Option<PayloadNumbers>,
     ) -> Result<Self, Failure> {
-        let payload = payload.map(|(mass, com, inertia)| Payload { mass, com, inertia }).unwrap_or_default();
-        payload.check().map_err(|error| Failure::usage(format!("payload: {error}")))?;
+        let payload = crate::dynamics::payload(payload)?;
         for (what, value) in [("blend", blend), ("blend_m", blend_m)] {
             if !value.is_finite() || value < 0.0 {
                 return Err(Failure::usage(format!("{what}: {value} is no distance")));
@@ -234,7 +233,7 @@ impl Planner {
 #[pyfunction]
 fn example_text(name: &str) -> Result<String, Failure> {
     let all = &jtc_host::example::EXAMPLES;
-    all.iter().find(|example| example.name == name).map(|example| example.text().into()).ok_or_else(|| {
+    all.iter().find(|example| example.name == name).map(|example| example.text()).ok_or_else(|| {
         let names: Vec<_> = all.iter().map(|example| example.name).collect();
         Failure::usage(format!("there is no example {name:?}"))
             .next(format!("there are {}", names.join(", ")))

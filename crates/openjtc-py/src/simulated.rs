@@ -10,6 +10,9 @@ use crate::controller::of_arm;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 
+/// Shares by which masses and frictions are off, and factors in their place, as Python gives them.
+type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
+
 /// What `openjtc.sim` has in its arguments; `model_error`: mass, friction, factors of the masses, factors of the frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -17,7 +20,7 @@ pub struct SimulatedArm<'py> {
     arm: Option<Bound<'py, Arm>>,
     seed: u64,
     payload: Option<PayloadNumbers>,
-    model_error: Option<(f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>)>,
+    model_error: Option<ErrorNumbers>,
     start: Option<[f64; JOINTS]>,
     friction: bool,
 }

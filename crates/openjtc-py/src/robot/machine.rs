@@ -61,7 +61,7 @@ pub struct Target {
 
 /// A port of any kind; a simulator remains one, and is touched whatever the session does.
 pub enum AnyPort {
-    Simulated(SimPort, Arc<Shared>),
+    Simulated(Box<SimPort>, Arc<Shared>),
     Other(Box<dyn Port>),
 }
 
@@ -182,7 +182,7 @@ impl Machine {
             Way::Simulated(simulated) => {
                 let speed = simulated.speed;
                 let (port, stored) = simulator(*simulated, &arm, &target.arm, &tape, &pace)?;
-                (AnyPort::Simulated(port, Arc::clone(&shared)), Some(speed), stored)
+                (AnyPort::Simulated(Box::new(port), Arc::clone(&shared)), Some(speed), stored)
             }
             Way::Agent { ref url } => (AnyPort::Other(agent(url, &target)?), None, false),
             Way::Serial { ref path, baud } => (AnyPort::Other(serial(path, baud, &target)?), None, false),

@@ -11,7 +11,7 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use jtc_core::{JOINTS, Payload};
+use jtc_core::JOINTS;
 use jtc_host::Port as _;
 use jtc_host::plan::kinematics::{Orientation, Target as Place};
 use jtc_host::session::Flow;
@@ -22,6 +22,7 @@ use pyo3::types::PyDict;
 
 use crate::arm::Arm;
 use crate::array;
+use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 use crate::run::Samples;
 use crate::trajectory::Trajectory;
@@ -32,13 +33,6 @@ use worker::{Asked, Wish, Worker, lock};
 
 /// How often is looked for the next status of a motion.
 const LOOK: Duration = Duration::from_millis(2);
-
-/// A payload as Python gives it: mass (kg), centre of mass in the flange's frame (m), inertia xx yy zz xy xz yz about it (kg·m²).
-type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
-
-fn payload((mass, com, inertia): PayloadNumbers) -> Payload {
-    Payload { mass, com, inertia }
-}
 
 /// The connection; `openjtc.Robot` is what people use.
 #[pyclass(frozen, module = "openjtc._native")]
@@ -158,8 +152,7 @@ impl Link {
     ) -> PyResult<Self> {
         let faults = faults.map(FaultPlan::from_toml).transpose();
         let faults = faults.map_err(|error| Failure::usage(format!("faults: {error}")))?.unwrap_or_default();
-        let payload = payload_of_arm.map(payload).unwrap_or_default();
-        payload.check().map_err(|error| Failure::usage(format!("payload: {error}")))?;
+        let payload = payload(payload_of_arm)?;
         if let Some(speed) = speed.filter(|speed| !(0.01..=1000.0).contains(speed)) {
             let message = format!("speed: {speed} times real time is outside 0.01..1000");
             return Err(Failure::usage(message).next("None is as fast as the computer is").into());

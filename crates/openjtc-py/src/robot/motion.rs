@@ -314,7 +314,7 @@ fn no_approach(error: &ApproachError) -> Failure {
     let message =
         format!("the straight way from where the arm stands to the first point is refused: {error}");
     let next = "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own";
-    Failure { facts, ..Failure::refused("approach", message, next) }
+    Failure { facts: Box::new(facts), ..Failure::refused("approach", message, next) }
 }
 
 /// What is run, and what was changed for it.
@@ -357,5 +357,5 @@ fn closed(trajectory: &Trajectory, order: &Order, arm: &Arm, options: &CheckOpti
     );
     let facts = Facts { joint: Some(joint), value: Some(far), limit: Some(limit), ..Facts::default() };
     let next = "approach=True leads back to its first point before each run";
-    Err(Failure { facts, ..Failure::refused("open-path", message, next) })
+    Err(Failure { facts: Box::new(facts), ..Failure::refused("open-path", message, next) })
 }

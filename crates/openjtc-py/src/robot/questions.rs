@@ -14,8 +14,9 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use super::{Link, PayloadNumbers, payload};
+use super::Link;
 use crate::arm::Arm;
+use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 use crate::log::FlightLog;
 use crate::run::Samples;
@@ -91,7 +92,8 @@ impl Link {
     }
 
     fn set_payload(&self, py: Python<'_>, numbers: PayloadNumbers) -> PyResult<()> {
-        self.call(py, move |machine, _| Ok(machine.session.set_payload(&payload(numbers))?))
+        let payload = payload(Some(numbers))?;
+        self.call(py, move |machine, _| Ok(machine.session.set_payload(&payload)?))
     }
 
     /// The whole way back to HoldPos; returns its steps in words.

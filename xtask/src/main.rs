@@ -55,10 +55,11 @@ Usage: cargo xtask COMMAND
   emulate --serial PATH        an emulated board with simulated drives behind a serial port, until interrupted
   docs                         write the generated parts of docs/ again, and make the book
   book [--out DIR]             docs/ as a book of HTML, in target/book
-  dist [--out DIR] [--quick] [--twice] [--check]
+  dist [--out DIR] [--quick] [--made] [--twice] [--check]
                                the files of a release, in target/dist-files: static programs, Debian packages, the Python
                                wheel, images of the boards, licences, bill of materials, sums
                                --quick: only for computers like this one, and without cargo-deny
+                               --made: nothing is made, the files that are there are compared or checked
                                --twice: made again by a copy of the checkout in another folder, and compared
                                --check: the packages installed, used and removed in a fresh Debian (needs root)
   size                         static memory of the controller against its limit, and of the boards' programs by region

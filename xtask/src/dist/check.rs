@@ -134,7 +134,8 @@ fn used(root: &Root) -> Result<()> {
 fn units(root: &Root) -> Result<()> {
     for folder in ["etc/systemd/system", "etc/rc2.d"] {
         for file in shell::files(&root.path().join(folder), &["service"]) {
-            ensure!(!file.to_string_lossy().contains("jtc"), "{} is enabled by the package", file.display());
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            ensure!(!name.starts_with("jtc"), "{name} is enabled by the package");
         }
     }
     if root.has("usr/bin/systemd-analyze").or_else(|| root.has("bin/systemd-analyze")).is_none() {

@@ -77,7 +77,7 @@ pub fn program(elf: &Elf) -> Program {
         flash.resize(flash.len().max(at + data.len()), 0xFF);
         flash[at..at + data.len()].copy_from_slice(data);
     }
-    let bit = |register: u32, _| register >> 1 ^ 0xEDB8_8320 * (register & 1);
+    let bit = |register: u32, _| (register >> 1) ^ (0xEDB8_8320 * (register & 1));
     let byte = |register: u32, byte: &u8| (0..8).fold(register ^ u32::from(*byte), bit);
     Program { bytes: flash.len() as u32, crc32: !flash.iter().fold(u32::MAX, byte) }
 }

@@ -37,7 +37,7 @@ pub fn program_of(bytes: &[u8]) -> Program {
     for byte in bytes {
         register ^= u32::from(*byte);
         for _ in 0..8 {
-            register = register >> 1 ^ 0xEDB8_8320 * (register & 1);
+            register = (register >> 1) ^ (0xEDB8_8320 * (register & 1));
         }
     }
     Program { bytes: bytes.len() as u32, crc32: !register }
@@ -166,7 +166,8 @@ pub enum Behaviour {
 
 /// The drive of a board, and a thread that is its ST-LINK.
 pub struct StLink {
-    pub folder: tempfile::TempDir,
+    /// Removed with it.
+    _folder: tempfile::TempDir,
     pub path: PathBuf,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -195,7 +196,7 @@ impl StLink {
                 work(&at, &board, &behaviour, bytes);
             }
         });
-        Self { folder, path, stop, thread: Some(thread) }
+        Self { _folder: folder, path, stop, thread: Some(thread) }
     }
 
     /// It, as a program sees it.

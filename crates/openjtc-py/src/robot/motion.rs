@@ -290,7 +290,11 @@ impl Machine {
                     _ => found,
                 });
                 samples.iter().for_each(|sample| self.tape.keep(sample));
-                ran.failure = Some(error.into());
+                let mut failure = Failure::from(error);
+                if failure.facts.joint.is_none() {
+                    failure.facts.joint = ran.broken.as_ref().and_then(|broken| broken.joint);
+                }
+                ran.failure = Some(failure);
             }
         }
         Ok(false)

@@ -204,6 +204,17 @@ def test_a_motion_is_paused_slowed_resumed_and_stopped_from_another_thread(live)
     assert live.speed == 1.0
 
 
+def test_a_status_comes_and_a_pause_counts_while_a_motion_is_uploaded(live):
+    motion = live.start(openjtc.example("motion"), approach=False, speed=50)
+    until(lambda: motion.progress[0] == "upload")
+    assert live.status.state == "HoldPos" and motion.progress[0] == "upload"
+    live.pause()
+    until(lambda: live.status.trajectory == "Pause")
+    assert motion.progress[1] < 0.5 and not motion.is_done
+    live.stop()
+    assert motion.wait(30).outcome == "stopped"
+
+
 def test_a_stop_is_the_end_of_all_that_was_asked_for_before(live):
     first = live.start(openjtc.example("motion"), approach=True)
     second = live.start(openjtc.example("motion"), approach=True)

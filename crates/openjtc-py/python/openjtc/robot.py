@@ -29,8 +29,9 @@ Array = NDArray[np.float64]
 class Robot:
     """A connection to one controller. Made by `connect`; a context manager that stops what it moves when it ends.
 
-    Methods may be called from several threads: `pause`, `resume`, `stop` and `speed` act on a motion that another thread runs. Ctrl-C in
-    the main thread stops the arm on its path, and is raised once it stands.
+    Methods may be called from several threads: `status`, `pause`, `resume`, `stop` and `speed` act at once on a motion that another thread
+    runs, where one that is still being uploaded is paused as it begins; everything else waits until the motion is over. Ctrl-C in the main
+    thread stops the arm on its path, and is raised once it stands.
     """
 
     def __init__(self, link: _native.Link) -> None:

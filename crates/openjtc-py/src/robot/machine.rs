@@ -192,6 +192,7 @@ impl Machine {
         let named = target.arm.is_some();
         let mut machine =
             Self { session, arm, named, shared, tape, time_passes, teaching: false, in_motion: false };
+        machine.observe();
         if let Some(speed) = speed {
             machine.bring_up(stored, asked)?;
             pace.set(speed);
@@ -199,7 +200,6 @@ impl Machine {
             // Who does not answer is an error here, and not at the first motion.
             machine.session.fresh_status()?;
         }
-        machine.publish();
         Ok(machine)
     }
 
@@ -224,16 +224,15 @@ impl Machine {
     /// Takes what comes while nothing is asked for. A line that is lost is reported by the next thing that is.
     pub fn idle(&mut self) {
         match self.session.poll(IDLE) {
-            Ok(_) => self.publish(),
+            Ok(_) => {}
             Err(_) => std::thread::sleep(IDLE),
         }
     }
 
-    /// The last status is everybody's.
-    pub fn publish(&self) {
-        if let Some(status) = self.session.last() {
-            self.shared.publish(status);
-        }
+    /// Every status from now on is everybody's, whatever the session does.
+    pub fn observe(&mut self) {
+        let shared = Arc::clone(&self.shared);
+        self.session.observe(move |_, status| shared.publish(status));
     }
 
     /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.

@@ -112,19 +112,19 @@ impl Link {
         Ok(Motion { link: slf.clone().unbind(), came: Mutex::new(Some(came)) })
     }
 
-    /// Of a motion that is followed here, or else of what the controller does.
+    /// Of a run that is on its way, once its arm moves; or else of what the controller does.
     fn wish(
         &self,
         py: Python<'_>,
         flow: Flow,
         else_do: impl FnOnce(&mut Machine) -> Result<(), Failure> + Send + 'static,
     ) -> PyResult<()> {
-        if !self.worker.shared.moving.load(Ordering::SeqCst) {
+        if !self.worker.shared.running.load(Ordering::SeqCst) {
             return self.call(py, move |machine, _| else_do(machine));
         }
         let (done, came) = mpsc::channel();
         lock(&self.worker.shared.wishes).push_back(Wish { flow, done });
-        if !self.worker.shared.moving.load(Ordering::SeqCst) {
+        if !self.worker.shared.running.load(Ordering::SeqCst) {
             lock(&self.worker.shared.wishes).clear();
         }
         match self.worker.wait(py, came) {
@@ -238,11 +238,6 @@ impl Link {
         (progress.phase, progress.done, progress.total)
     }
 
-    #[getter]
-    fn is_moving(&self) -> bool {
-        self.worker.shared.moving.load(Ordering::SeqCst)
-    }
-
     fn pause(&self, py: Python<'_>) -> PyResult<()> {
         self.wish(py, Flow::Pause, |machine| Ok(machine.session.pause()?))
     }
@@ -305,8 +300,8 @@ impl Link {
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
         let before = shared.seen.load(Ordering::SeqCst);
-        // Who follows a motion sees each status, and has no time for questions.
-        while shared.moving.load(Ordering::SeqCst) {
+        // A run shows each status, and has no time for questions.
+        while shared.running.load(Ordering::SeqCst) {
             if shared.seen.load(Ordering::SeqCst) != before
                 && let Some(status) = *lock(&shared.status)
             {

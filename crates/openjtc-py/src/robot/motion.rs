@@ -97,7 +97,11 @@ impl Machine {
             return Err(error.into());
         }
         let mut recording = order.record.as_ref().map(Recording::open).transpose()?;
+        self.shared.running.store(true, Ordering::SeqCst);
         let ran = self.run_recorded(order, asked, &mut recording);
+        self.shared.running.store(false, Ordering::SeqCst);
+        // Who wished something of a run that is over learns that: the other end of the channel is gone.
+        lock(&self.shared.wishes).clear();
         self.shared.report("", 0.0, 0.0);
         let Some(Recording { path, file, live }) = recording else { return ran };
         match (&ran, live) {
@@ -239,7 +243,6 @@ impl Machine {
         // Both callbacks have it, one after the other.
         let current = Cell::new(None);
         self.in_motion = true;
-        shared.moving.store(true, Ordering::SeqCst);
         let outcome = self.session.run_unkept(
             checked,
             move |sample| {
@@ -271,9 +274,7 @@ impl Machine {
                 }
             },
         );
-        shared.moving.store(false, Ordering::SeqCst);
-        // Who wished something of a motion that is over learns that: the other end of the channel is gone.
-        lock(&shared.wishes).clear();
+        self.observe();
         self.tape.pause();
         let lost = matches!(&outcome, Err(Error::Motion(MotionError::LinkLost { .. })));
         self.in_motion = lost;

@@ -50,8 +50,9 @@ pub struct Progress {
 pub struct Shared {
     /// Counts the Stops: what was asked for before one is not done after it.
     halts: AtomicU64,
-    /// A motion is followed, and wishes are looked at.
-    pub moving: AtomicBool,
+    /// A run is on its way, from the wait for the drives to its end: the worker has no time for questions.
+    pub running: AtomicBool,
+    /// What is wished of that run; looked at while its arm moves.
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
     /// What is to happen to a simulated arm, in whatever its controller is doing.
@@ -273,10 +274,7 @@ fn serve(machine: &mut Machine, waiting: &Receiver<Job>) {
             }
         };
         match job {
-            Some(job) => {
-                job(machine);
-                machine.publish();
-            }
+            Some(job) => job(machine),
             None => machine.idle(),
         }
     }

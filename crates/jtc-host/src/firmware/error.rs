@@ -107,7 +107,7 @@ pub enum FirmwareError {
         board: String,
     },
     /// The drive does not name its board.
-    #[error("{}: the drive{} does not tell its board; the image is for {board}", drive.display(), of_label(label))]
+    #[error("{}: the drive{} does not report its board; the image is for {board}", drive.display(), of_label(label))]
     UnnamedBoard {
         /// The drive.
         drive: PathBuf,

@@ -80,7 +80,7 @@ class Simulator:
     Args:
         arm: The arm, which the controller has stored, where its file gives all of it. None: the built-in one, and a controller as new.
         seed: Of all that is drawn by chance.
-        payload: What the arm really carries. The controller does not know of it until it is told (:func:`openjtc.control.encode.payload`).
+        payload: What the arm really carries. The controller does not know of it until it is given (:func:`openjtc.control.encode.payload`).
         model_error: How far the true arm is from its file; None: not at all.
         start: Positions at the start; 0 where the joint gets there.
         friction: Joints have the friction of the arm's file.

@@ -229,7 +229,7 @@ impl Machine {
         }
     }
 
-    /// Every status from now on is everybody's, whatever the session does.
+    /// Publishes every status from now on, whatever the session does.
     pub fn observe(&mut self) {
         let shared = Arc::clone(&self.shared);
         self.session.observe(move |_, status| shared.publish(status));

@@ -21,7 +21,7 @@ use crate::error::Failure;
 
 /// How often a waiting thread looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest wait for an arm that was told to stop to stand; a second Ctrl-C ends it sooner.
+/// Longest wait until an arm that is stopped stands; a second Ctrl-C ends it sooner.
 const STANDSTILL: Duration = Duration::from_secs(15);
 
 type Job = Box<dyn FnOnce(&mut Machine) + Send>;

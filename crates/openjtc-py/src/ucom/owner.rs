@@ -17,7 +17,7 @@ use crate::json;
 /// So often signals (Ctrl-C) are looked at while Python waits.
 pub const LOOK: Duration = Duration::from_millis(50);
 
-/// What a call hears of what it asked for.
+/// What a call receives of what it asked for.
 enum Message<T> {
     Progress(Value),
     Done(Result<T, BoardFailure>),
@@ -70,14 +70,14 @@ impl Owner {
         progress: Option<&Bound<'_, PyAny>>,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
     ) -> PyResult<T> {
-        let (id, heard) = self.ask(kind, act);
+        let (id, answers) = self.ask(kind, act);
         loop {
-            let reported = match self.wait(py, &heard)? {
-                Heard::Done(result) => return Ok(result?),
-                Heard::Progress(value) => progress.map_or(Ok(()), |progress| {
+            let reported = match self.wait(py, &answers)? {
+                Received::Done(result) => return Ok(result?),
+                Received::Progress(value) => progress.map_or(Ok(()), |progress| {
                     json::to_python(py, &value).and_then(|value| progress.call1((value,))).map(drop)
                 }),
-                Heard::Nothing => Ok(()),
+                Received::Nothing => Ok(()),
             };
             // Also while one report comes after the other.
             let result = reported.and_then(|()| py.check_signals());
@@ -91,12 +91,12 @@ impl Owner {
 
     /// Ctrl-C came: what this session has started is stopped, and waited for; another Ctrl-C ends only the waiting.
     pub fn interrupted(&self, py: Python<'_>) {
-        let (_, heard) = self.ask(Kind::Stop, |hands, _| {
+        let (_, answers) = self.ask(Kind::Stop, |hands, _| {
             hands.leave();
             Ok(())
         });
         self.shared.halt(Halt::Started);
-        while let Ok(Heard::Nothing) = self.wait(py, &heard) {
+        while let Ok(Received::Nothing) = self.wait(py, &answers) {
             if py.check_signals().is_err() {
                 return;
             }
@@ -110,11 +110,11 @@ impl Owner {
         halt: Halt,
         act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
     ) -> PyResult<T> {
-        let (_, heard) = self.ask(Kind::Stop, |hands, _| act(hands));
+        let (_, answers) = self.ask(Kind::Stop, |hands, _| act(hands));
         self.shared.halt(halt);
         loop {
-            match self.wait(py, &heard)? {
-                Heard::Done(result) => return Ok(result?),
+            match self.wait(py, &answers)? {
+                Received::Done(result) => return Ok(result?),
                 // It is a stop already.
                 _ => py.check_signals()?,
             }
@@ -126,7 +126,7 @@ impl Owner {
         kind: Kind,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
     ) -> (u64, Mutex<mpsc::Receiver<Message<T>>>) {
-        let (sender, heard) = mpsc::channel();
+        let (sender, answers) = mpsc::channel();
         let id = self.shared.next_id();
         let act = move |hands: Result<&mut Hands, BoardFailure>| {
             let report = |value| drop(sender.send(Message::Progress(value)));
@@ -139,14 +139,18 @@ impl Owner {
             let _ = sender.send(Message::Done(done));
         };
         self.shared.put(Work { id, kind, act: Box::new(act) });
-        (id, Mutex::new(heard))
+        (id, Mutex::new(answers))
     }
 
-    fn wait<T: Send>(&self, py: Python<'_>, heard: &Mutex<mpsc::Receiver<Message<T>>>) -> PyResult<Heard<T>> {
-        py.detach(|| match lock(heard).recv_timeout(LOOK) {
-            Ok(Message::Progress(value)) => Ok(Heard::Progress(value)),
-            Ok(Message::Done(result)) => Ok(Heard::Done(result)),
-            Err(mpsc::RecvTimeoutError::Timeout) => Ok(Heard::Nothing),
+    fn wait<T: Send>(
+        &self,
+        py: Python<'_>,
+        answers: &Mutex<mpsc::Receiver<Message<T>>>,
+    ) -> PyResult<Received<T>> {
+        py.detach(|| match lock(answers).recv_timeout(LOOK) {
+            Ok(Message::Progress(value)) => Ok(Received::Progress(value)),
+            Ok(Message::Done(result)) => Ok(Received::Done(result)),
+            Err(mpsc::RecvTimeoutError::Timeout) => Ok(Received::Nothing),
             Err(mpsc::RecvTimeoutError::Disconnected) => Err(fault().into()),
         })
     }
@@ -180,7 +184,7 @@ impl Drop for Owner {
 }
 
 /// What came within a moment.
-enum Heard<T> {
+enum Received<T> {
     Nothing,
     Progress(Value),
     Done(Result<T, BoardFailure>),

@@ -5,7 +5,7 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use can_link::{
     AnswerError, CanBus, CanError, CanFrame, ControllerState, ErrorState, Id, OpenError, SlcanAdapter,
@@ -27,7 +27,16 @@ impl Running {
         let thread = std::thread::spawn(move || {
             let mut adapter = SlcanAdapter::new();
             adapter.set_state(ControllerState::without_counters(ErrorState::Warning));
-            while !asked.load(Ordering::Relaxed) && adapter.turn(&mut port, &mut bus).is_ok() {}
+            let mut latest = None;
+            while adapter.turn(&mut port, &mut bus).is_ok() {
+                if asked.load(Ordering::Relaxed) {
+                    // What was written before it was asked may still be on its way through the terminal.
+                    let latest = *latest.get_or_insert_with(|| Instant::now() + Duration::from_secs(2));
+                    if !adapter.is_open() || Instant::now() >= latest {
+                        break;
+                    }
+                }
+            }
             adapter
         });
         Self { stop, thread: Some(thread) }
@@ -246,9 +255,9 @@ fn states_come_by_themselves_from_newer_adapters() {
     });
     let mut bus = SlcanBus::open(&options(&device, None, None)).unwrap();
     let state = ControllerState { errors: ErrorState::Passive, tec: Some(7), rec: Some(130) };
-    let end = std::time::Instant::now() + TIMEOUT;
+    let end = Instant::now() + TIMEOUT;
     while bus.state() != state {
-        assert!(std::time::Instant::now() < end);
+        assert!(Instant::now() < end);
     }
 }
 

@@ -30,7 +30,7 @@ fn is_own(path: &Path) -> bool {
     })
 }
 
-/// Builds the wheel for this computer; the ones of a release are made by `cargo xtask dist`.
+/// Builds the wheel for this computer, of what the tests have compiled; the ones of a release are made by `cargo xtask dist`.
 pub fn build() -> Result<PathBuf> {
     let python = python::environment(REQUIREMENTS)?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -42,7 +42,16 @@ pub fn build() -> Result<PathBuf> {
     }
     let mut build = shell::command(programs.join("maturin"));
     build
-        .args(["build", "--release", "--locked", "--quiet", "--compatibility", "linux", "--interpreter"])
+        .args([
+            "build",
+            "--profile",
+            "dev",
+            "--locked",
+            "--quiet",
+            "--compatibility",
+            "linux",
+            "--interpreter",
+        ])
         .arg(&python);
     build.arg("--out").arg(&folder).arg("--manifest-path").arg("crates/openjtc-py/Cargo.toml");
     run(build.env("CARGO_TARGET_DIR", shell::target()))?;

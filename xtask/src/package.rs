@@ -101,6 +101,7 @@ fn tested(wheel: &Path) -> Result<Outcome> {
         "--no-deps",
     ]);
     run(install.arg(wheel))?;
+    python::commands()?;
     let scratch = Scratch::new("package")?;
     let mypy = |arguments: &[&str]| {
         let mut mypy = shell::command(&python);

@@ -185,13 +185,18 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
+                // A device in its place has no end: reading one takes all memory of the computer.
+                let file = at.join("openjtc.bin");
+                if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
+                    continue;
+                }
                 // As long as a file grows it is not whole.
-                let Ok(bytes) = fs::read(at.join("openjtc.bin")) else { continue };
+                let Ok(bytes) = fs::read(&file) else { continue };
                 if bytes.is_empty() || bytes.len() != length {
                     length = bytes.len();
                     continue;
                 }
-                fs::remove_file(at.join("openjtc.bin")).unwrap();
+                fs::remove_file(&file).unwrap();
                 length = 0;
                 work(&at, &board, &behaviour, bytes);
             }

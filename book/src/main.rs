@@ -1,9 +1,11 @@
 //! Makes the HTML book of docs/: `openjtc-book ROOT OUT`.
 //!
 //! mdbook does the work; what it does not know is that docs/ is a part of a repository. Links that lead out of docs/ are resolved here
-//! ([`outside`]): pictures are copied, and files that can be read become pages of the book's last part.
+//! ([`outside`]): pictures are copied, and files that can be read become pages of the book's last part. Diagrams get the script that draws
+//! them ([`diagrams`]).
 #![forbid(unsafe_code)]
 
+mod diagrams;
 mod links;
 mod made;
 mod outside;
@@ -13,6 +15,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use mdbook_driver::MDBook;
 use mdbook_driver::config::Config;
+
+/// A file that every book of mdbook has.
+const MARK: &str = "searcher.js";
 
 fn main() -> Result<()> {
     let words: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
@@ -24,7 +29,13 @@ fn main() -> Result<()> {
     let root = root.canonicalize().with_context(|| root.display().to_string())?;
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let out = out.canonicalize()?;
-    ensure!(!root.starts_with(&out), "{} holds the repository, and would be emptied", out.display());
+    // mdbook empties the folder first.
+    let is_empty = std::fs::read_dir(&out)?.next().is_none();
+    ensure!(
+        is_empty || out.join(MARK).exists(),
+        "{} holds other files than those of a book, and would be emptied; name another folder",
+        out.display()
+    );
     make(&root, &out)
 }
 
@@ -33,7 +44,12 @@ fn make(root: &Path, out: &Path) -> Result<()> {
     config.build.build_dir = out.to_owned();
     let mut book = MDBook::load_with_config(root.join("book"), config).context("docs/SUMMARY.md")?;
     let pictures = outside::resolve(root, &mut book.book)?;
+    let drawn = diagrams::with_script(&mut book.book);
+    book.with_preprocessor(mdbook_mermaid::Mermaid);
     book.build()?;
+    if drawn > 0 {
+        diagrams::copy_script(root, out)?;
+    }
     for picture in &pictures {
         let to = out.join(outside::FOLDER).join(picture);
         std::fs::create_dir_all(to.parent().context("a picture in no folder")?)?;
@@ -41,6 +57,9 @@ fn make(root: &Path, out: &Path) -> Result<()> {
     }
     let pages = book.book.chapters().count();
     let links = made::check(out)?;
-    println!("{pages} pages with {links} links: {}", out.join("index.html").display());
+    println!(
+        "{pages} pages, {drawn} of them with diagrams, and {links} links: {}",
+        out.join("index.html").display()
+    );
     Ok(())
 }

@@ -1,9 +1,10 @@
 """Robot descriptions of other people: the URDF files of the package example-robot-data, without its 400 MB of meshes.
 
-They are kept beside the packages of the virtual environment, and downloaded once.
+They are downloaded once and kept in the folder that OPENJTC_ROBOTS names, else beside the packages of the virtual environment.
 """
 
 import hashlib
+import os
 import pathlib
 import subprocess
 import sys
@@ -15,7 +16,8 @@ LIST = pathlib.Path(__file__).resolve().parent.parent / "requirements-robots.txt
 
 def folder():
     """The folder with the descriptions, one folder a robot; made when it is not there yet."""
-    kept = pathlib.Path(sys.prefix) / f"robots-{hashlib.sha256(LIST.read_bytes()).hexdigest()[:16]}"
+    parent = pathlib.Path(os.environ.get("OPENJTC_ROBOTS") or sys.prefix)
+    kept = parent / f"robots-{hashlib.sha256(LIST.read_bytes()).hexdigest()[:16]}"
     stamp = kept / "complete"
     if stamp.exists():
         return kept

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use anyhow::Result;
 
-use crate::{emulate, firmware, package, python, shell};
+use crate::{emulate, firmware, package, python, shell, web};
 
 /// What is being made.
 pub struct Ahead(Option<JoinHandle<()>>);
@@ -30,6 +30,8 @@ impl Drop for Ahead {
 
 fn make() -> Result<()> {
     python::environment("requirements.txt")?;
+    // Without it the step that needs it is skipped.
+    let _ = web::install_browser();
     python::programs()?;
     package::build()?;
     emulate::programs()?;

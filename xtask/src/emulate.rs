@@ -117,6 +117,7 @@ fn driving() -> Result<Outcome> {
     let mut script = shell::command(python::environment("requirements.txt")?);
     script.arg("references/arms/check_driving.py").arg(jtc);
     script.arg("--board").arg(emulator).arg(firmware::elf(firmware::BOARDS[0]));
+    script.env("OPENJTC_ROBOTS", python::robots());
     run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 

@@ -116,6 +116,7 @@ fn tested(wheel: &Path) -> Result<Outcome> {
         .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "3"])
         .arg(root().join("crates/openjtc-py/tests"));
     tests.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom"));
+    tests.env("OPENJTC_ROBOTS", python::robots());
     tests.env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "agg").current_dir(scratch.path());
     let ended = beside::run(&mut tests, &scratch.path().join("log"))?;
     println!("{}\n({:.1} s)", ended.output.trim_end(), ended.seconds);

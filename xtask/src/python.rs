@@ -52,6 +52,11 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
     Ok(python)
 }
 
+/// Where robot descriptions of other people are kept, for all environments.
+pub fn robots() -> PathBuf {
+    shell::target().join("robots")
+}
+
 /// What a check is called with.
 struct Check {
     /// Below references/.
@@ -158,7 +163,10 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         |one, ended| {
             tally.step(&one.title(), || match (&one, ended?) {
                 (Beside::Reference(_), None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
-                (Beside::Browser, None) => Ok(Outcome::Skipped(format!("there is no {}", web::BROWSER))),
+                (Beside::Browser, None) => Ok(Outcome::Skipped(format!(
+                    "there is no {}; install it by hand: sudo apt-get install chromium",
+                    web::BROWSER
+                ))),
                 (Beside::Browser, Some(ended)) => web::counted(&ended),
                 (Beside::Reference(_), Some(Ended { output, passed, seconds })) => {
                     println!("{}\n({seconds:.1} s, beside others)", output.trim_end());
@@ -200,7 +208,8 @@ impl Check {
         script.arg(Path::new("references").join(self.script));
         script.args(self.program.map(|name| release.join(name)));
         script.args(self.demo_files.iter().map(|name| demo.join(name)));
-        script.env("JTC_EXAMPLES", release.join("examples")).env("PYTHONDONTWRITEBYTECODE", "1");
+        script.env("JTC_EXAMPLES", release.join("examples")).env("OPENJTC_ROBOTS", robots());
+        script.env("PYTHONDONTWRITEBYTECODE", "1");
         beside::run(&mut script, log).map(Some)
     }
 }

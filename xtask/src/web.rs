@@ -90,9 +90,14 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here.
+/// Debian's browser, installed where it is not there and this user may.
+pub fn install_browser() -> Result<()> {
+    if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
+}
+
+/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here, nor can one be installed.
 pub fn browser(log: &Path) -> Result<Option<Ended>> {
-    if !Path::new(BROWSER).exists() {
+    if install_browser().is_err() {
         return Ok(None);
     }
     install()?;

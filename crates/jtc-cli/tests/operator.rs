@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
 use std::process::{Child, ChildStderr, Stdio};
+use std::time::{Duration, Instant};
 
 use common::{Sim, jtc, slow_motion};
 use rustix::fs::{Mode, OFlags};
@@ -103,6 +104,18 @@ struct Ended {
     value: serde_json::Value,
     err: String,
     sim: Sim,
+}
+
+/// Waits until the controller is in this state.
+fn reaches(sim: &Sim, state: &str) {
+    let end = Instant::now() + Duration::from_secs(60);
+    loop {
+        let status = sim.json(&["status"], 0);
+        if status["state"] == state {
+            return;
+        }
+        assert!(Instant::now() < end, "{state} is not reached: {status}");
+    }
 }
 
 fn stands(sim: &Sim) {
@@ -291,17 +304,22 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
 /// Ctrl-C in the waits of recover: it sends nothing more, but stops what moves; and what it prints in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
-    let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 0\n";
-    let sim = Sim::with_faults(&["--no-throttle"], fault);
-    let cancelled = |words: &[&str], at: &str| {
-        let (code, value) = interrupted(&sim, words, at);
+    let cancelled = |sim: &Sim, words: &[&str], at: &str| {
+        let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // Fresh: it waits for the drives.
-    cancelled(&["recover", "--defaults"], "waiting for joint 1");
-    sim.jtc(&["recover"]).ends(0);
+    // Fresh: it waits for the drives, of which one does not come.
+    let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
+    cancelled(
+        &Sim::with_faults(&["--no-throttle"], fault),
+        &["recover", "--defaults"],
+        "waiting for joint 1",
+    );
+    // Somebody presses the emergency stop while the arm is taught, after `teach on` has seen that it is.
+    let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
+    let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     // In motion, of which nobody takes care any more.
-    let file = sim.file("motion.csv", &slow_motion(200));
+    let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim
         .command(&["traj", "run", &file])
@@ -312,11 +330,12 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     until(&mut BufReader::new(run.stderr.take().unwrap()), "moving");
     run.kill().unwrap();
     run.wait().unwrap();
-    cancelled(&["recover"], "stopping the motion");
+    cancelled(&sim, &["recover"], "stopping the motion");
     stands(&sim);
     // The emergency stop is pressed, and nobody releases it.
     sim.jtc(&["teach", "on"]).ends(0);
-    cancelled(&["recover"], "release the emergency stop (waiting)");
+    reaches(&sim, "Error");
+    cancelled(&sim, &["recover"], "release the emergency stop (waiting)");
     let status = sim.json(&["status"], 0);
     assert_eq!(status["state"], "Error", "{status}");
 }

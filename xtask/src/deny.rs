@@ -18,7 +18,8 @@ const CARGO_DENY: &str = "0.20.2";
 /// Workspaces of which something is shipped.
 const SHIPPED: [&str; 2] = ["Cargo.toml", "firmware/Cargo.toml"];
 /// All lock files: sources are checked in each.
-const LOCKS: [&str; 4] = ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock"];
+const LOCKS: [&str; 5] =
+    ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
 /// An error that lists what deny.toml does not allow.
 pub fn check() -> Result<()> {
@@ -82,6 +83,8 @@ pub fn with_cargo_deny() -> Result<()> {
         run(install.arg(&folder))?;
     }
     for manifest in SHIPPED {
+        // It looks at the sources for every target, of which builds for this computer have fetched a part.
+        run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
         deny.args(["--offline", "--manifest-path", manifest, "check", "--config"])
             .arg(root().join("deny.toml"));

@@ -14,10 +14,11 @@ mod tree;
 mod twice;
 mod wheel;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
 pub use check::steps;
 
@@ -43,7 +44,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         check::install(&out)?;
     }
     println!("\nrelease files in {}:", out.display());
-    for line in std::fs::read_to_string(out.join("SHA256SUMS"))?.lines() {
+    for line in std::fs::read_to_string(out.join(tree::SUMS))?.lines() {
         println!("  {line}");
     }
     for line in left_out {
@@ -79,7 +80,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     };
     let mut made = vec![
         Made { name: format!("openjtc-{version}.cdx.json"), bytes: bill.into_bytes() },
-        Made { name: "THIRD-PARTY.txt".into(), bytes: third_party.into_bytes() },
+        Made { name: "THIRD-PARTY.txt".into(), bytes: third_party.clone().into_bytes() },
         Made { name: "firmware.json".into(), bytes: images::list(&release.images, &version)?.into_bytes() },
     ];
     for image in &release.images {
@@ -89,7 +90,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let runnable = programs::build(own, time)?;
     made.extend(release.packages(own, &runnable, &runnable)?);
     if wheel::folder().is_some() {
-        wheel::build(own, time, out)?;
+        made.push(wheel::build(own, time, &third_party)?);
     } else {
         left_out.push("the Python wheel: crates/openjtc-py is not there".into());
     }
@@ -105,12 +106,15 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
                 left_out.push(format!("the programs for {machine}, which cannot be built here: {error:#}"))
             }
         }
-        if wheel::folder().is_some()
-            && let Err(error) = wheel::build(platform, time, out)
-        {
-            left_out.push(format!("the Python wheel for {machine}, which cannot be built here: {error:#}"));
+        if wheel::folder().is_some() {
+            match wheel::build(platform, time, &third_party) {
+                Ok(wheel) => made.push(wheel),
+                Err(error) => left_out
+                    .push(format!("the Python wheel for {machine}, which cannot be built here: {error:#}")),
+            }
         }
     }
+    // Nothing is written before all of it is there: what broke off leaves an empty folder.
     for Made { name, bytes } in made {
         std::fs::write(out.join(&name), bytes).with_context(|| name.clone())?;
     }
@@ -126,23 +130,23 @@ fn version() -> Result<String> {
     Ok(version.context("the workspace has no version")?.to_owned())
 }
 
-/// A folder without files of an earlier release; one with other files is left as it is, with an error.
+/// A folder without the files of an earlier release, which its list names; one with any other file is left as it is, with an error.
 fn empty(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
-    let is_release = out.join("SHA256SUMS").exists();
-    let entries = std::fs::read_dir(out)?.collect::<std::io::Result<Vec<_>>>()?;
-    if let (false, Some(entry)) = (is_release, entries.first()) {
-        bail!(
-            "{} holds {:?} and is no folder of a release; name another with --out",
-            out.display(),
-            entry.file_name()
+    let list = std::fs::read_to_string(out.join(tree::SUMS)).unwrap_or_default();
+    let listed: BTreeSet<&str> = list.lines().filter_map(|line| Some(line.split_once("  ")?.1)).collect();
+    let mut earlier = Vec::new();
+    for entry in std::fs::read_dir(out)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        ensure!(
+            path.is_file() && (name == tree::SUMS || listed.contains(&*name)),
+            "{} holds {name:?}, which no release has left there; name another folder with --out",
+            out.display()
         );
+        earlier.push(path);
     }
-    for entry in entries {
-        ensure!(entry.path().is_file(), "{} is a folder, which no release has", entry.path().display());
-        std::fs::remove_file(entry.path())?;
-    }
-    Ok(())
+    earlier.iter().try_for_each(|path| std::fs::remove_file(path).with_context(|| path.display().to_string()))
 }
 
 /// The packages and archives with the programs that `folder` has already, made twice from one commit and the same images of the boards.

@@ -1,11 +1,12 @@
 //! `cargo xtask firmware`: the ELF of each board, its sizes by region, and that no panic can be reached from the tick.
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSegment, SectionFlags};
 
 use crate::panics::reachable_panics;
+use crate::paths;
 use crate::shell::{self, run};
 use crate::suite::count_results;
 use crate::tally::{Counts, Outcome};
@@ -44,24 +45,14 @@ pub fn add_target() -> Result<()> {
 }
 
 /// Cargo in `firmware/`, for one board.
-fn cargo_for(board: &str, subcommand: &str) -> std::process::Command {
-    let mut cargo = shell::cargo(&[subcommand, "--release", "--no-default-features", "--features", board]);
+fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
+    let mut cargo =
+        shell::cargo(&[subcommand, "--locked", "--release", "--no-default-features", "--features", board]);
     cargo.current_dir(shell::root().join("firmware"));
     cargo.env("CARGO_TARGET_DIR", directory());
     // Paths of one machine would make the sizes those of one machine.
-    for (from, to) in [(shell::root().to_owned(), "openjtc"), (cargo_home(), "cargo")] {
-        cargo
-            .arg("--config")
-            .arg(format!("target.{TARGET}.rustflags=[\"--remap-path-prefix={}={to}\"]", from.display()));
-    }
-    cargo
-}
-
-/// Where cargo keeps the sources of dependencies.
-pub fn cargo_home() -> PathBuf {
-    std::env::var_os("CARGO_HOME")
-        .map(PathBuf::from)
-        .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
+    cargo.arg("--config").arg(paths::remapped(TARGET)?);
+    Ok(cargo)
 }
 
 /// Where the boards' programs are.
@@ -77,7 +68,7 @@ pub fn elf(board: &str) -> PathBuf {
 /// Builds the ELF of a board and says where it is.
 pub fn build(board: &str) -> Result<PathBuf> {
     add_target()?;
-    run(&mut cargo_for(board, "build"))?;
+    run(&mut cargo_for(board, "build")?)?;
     let built = directory().join(TARGET).join("release/openjtc-firmware");
     let elf = elf(board);
     std::fs::copy(&built, &elf).with_context(|| format!("{} to {}", built.display(), elf.display()))?;
@@ -91,7 +82,7 @@ const FAST: &str = "15000000";
 /// of its own, so that neither build makes the other stale.
 pub fn build_fast() -> Result<PathBuf> {
     let target = directory().join("fast");
-    run(cargo_for(BOARDS[0], "build").env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
+    run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
     let built = target.join(TARGET).join("release/openjtc-firmware");
     let elf = elf(&format!("{}-{FAST}", BOARDS[0]));
     std::fs::copy(&built, &elf).with_context(|| format!("{} to {}", built.display(), elf.display()))?;
@@ -142,7 +133,7 @@ pub fn check(board: &str, elf: &Path) -> Result<()> {
 pub fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {
-        let mut clippy = cargo_for(board, "clippy");
+        let mut clippy = cargo_for(board, "clippy")?;
         clippy.args(["--", "-D", "warnings", "-D", "clippy::undocumented_unsafe_blocks"]);
         run(&mut clippy)?;
     }

@@ -15,6 +15,7 @@ mod links;
 // For the checks of the board's program.
 mod package;
 mod panics;
+mod paths;
 mod prove;
 mod python;
 mod rules;

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::shell::root;
 
 /// The libraries whose scripts are a part of the built files; the others of web/package.json build and test them.
-const NAMES: [&str; 3] = ["svelte", "three", "uplot"];
+const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
 /// One of them.
 pub struct Library {
@@ -33,7 +33,7 @@ pub fn libraries() -> Result<Vec<Library>> {
         let kept = root().join(format!("xtask/packaging/licences/{name}.txt"));
         let text = std::fs::read_to_string(&kept).with_context(|| kept.display().to_string())?;
         let installed = root().join(format!("web/node_modules/{name}"));
-        for file in ["LICENSE", "LICENSE.md"] {
+        for file in ["LICENSE", "LICENSE.md", "license"] {
             let other = std::fs::read_to_string(installed.join(file)).unwrap_or_else(|_| text.clone());
             anyhow::ensure!(
                 other == text,

@@ -1,6 +1,6 @@
 //! The licences of everything that a release contains, with their texts.
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
@@ -10,6 +10,9 @@ use crate::shell;
 
 /// Beginnings of the names of files in which crates have their licences.
 const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
+
+/// Folders of a crate of which nothing becomes a part of a program.
+const NOT_SHIPPED: [&str; 7] = ["tests", "test", "examples", "benches", "fuzz", "target", "node_modules"];
 
 /// An expression of SPDX; old manifests have `/` where it has `OR`.
 pub fn expression(licence: &str) -> String {
@@ -25,7 +28,9 @@ pub fn third_party(graph: &Graph) -> Result<String> {
         let label = format!("{} {}", found.name, found.version);
         let licence = found.licence.as_deref();
         let licence = licence.with_context(|| format!("{label} names no licence; it cannot be shipped"))?;
-        writeln!(list, "{label}: {}", expression(licence))?;
+        // Whoever wants its source finds it there, which some licences ask for.
+        let source = format!("https://crates.io/crates/{}/{}", found.name, found.version);
+        writeln!(list, "{label}: {}, {source}", expression(licence))?;
         texts.of(found, &label)?;
     }
     for library in dashboard::libraries()? {
@@ -40,16 +45,31 @@ pub fn third_party(graph: &Graph) -> Result<String> {
     Ok(list)
 }
 
-/// What the compiler and the linker put into every program: Rust's standard library, and the C library of the static ones.
+/// What the compiler and the linker put into programs beside crates.
+pub const RUNTIME: [(&str, &str); 3] = [
+    ("musl", "MIT"),
+    ("llvm-libunwind", "Apache-2.0 WITH LLVM-exception"),
+    ("llvm-compiler-rt", "Apache-2.0 WITH LLVM-exception"),
+];
+
+/// Rust's standard library, and what [`RUNTIME`] lists.
 fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = shell::read(shell::command("rustc").arg("--version"))?;
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
     let label = format!("Rust's standard library {version}");
     writeln!(list, "{label}: MIT OR Apache-2.0")?;
     // The project's own are the same texts.
-    texts.add(&label, &std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?);
-    writeln!(list, "musl (static programs): MIT")?;
-    texts.add("musl", include_str!("../../packaging/licences/musl.txt"));
+    let apache = std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?;
+    texts.add(&label, &apache);
+    for (name, licence) in RUNTIME {
+        writeln!(list, "{name}, as Rust and Zig bring it: {licence}")?;
+        if licence == "MIT" {
+            texts.add(name, include_str!("../../packaging/licences/musl.txt"));
+        } else {
+            texts.add(name, &apache);
+            texts.add(name, include_str!("../../packaging/licences/llvm-exception.txt"));
+        }
+    }
     Ok(())
 }
 
@@ -71,15 +91,7 @@ impl Texts {
 
     /// Those in the source of a crate, or else the standard one.
     fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(&found.folder).with_context(|| found.folder.display().to_string())? {
-            let path = entry?.path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-            if path.is_file() && NAMES.iter().any(|known| name.starts_with(known)) {
-                files.push(path);
-            }
-        }
-        files.sort();
+        let files = files(&found.folder)?;
         for file in &files {
             self.add(label, &read(file)?);
         }
@@ -105,6 +117,32 @@ impl Texts {
         }
         Ok(())
     }
+}
+
+/// Files with licences in the source of a crate, those of C code and other parts below it among them; tests and examples are not shipped.
+fn files(source: &Path) -> Result<Vec<PathBuf>> {
+    let (mut found, mut waiting) = (Vec::new(), vec![source.to_owned()]);
+    while let Some(folder) = waiting.pop() {
+        for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+            let path = entry?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+            if path.is_dir() {
+                if !NOT_SHIPPED.contains(&&*name) && !name.starts_with('.') {
+                    waiting.push(path);
+                }
+            } else if NAMES.iter().any(|known| name.starts_with(known)) && !is_code(&path) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Programs about licences begin with the same words.
+fn is_code(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ["rs", "py", "c", "h", "sh", "toml"].iter().any(|code| ending == *code))
 }
 
 fn read(file: &Path) -> Result<String> {

@@ -5,7 +5,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, run};
-use crate::{firmware, python};
+use crate::{paths, python};
 
 /// The programs, with the package of each.
 pub const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
@@ -72,39 +72,11 @@ pub fn tools() -> Result<PathBuf> {
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
-/// Folders of this computer whose paths the compilers write into what they make, with what stands there instead. The later ones count first.
-fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
-    let cargo = firmware::cargo_home();
-    let mut folders =
-        vec![(shell::root().to_owned(), "openjtc"), (cargo, "cargo"), (shell::target(), "target")];
-    for (path, _) in folders.clone() {
-        ensure!(
-            !path.to_string_lossy().contains([' ', '"', '=']),
-            "{}: a release cannot be made in a folder with a space, a quote or `=` in its name",
-            path.display()
-        );
-    }
-    // A checkout behind a link has two names.
-    for at in 0..folders.len() {
-        let (path, name) = folders[at].clone();
-        if let Ok(real) = path.canonicalize()
-            && real != path
-        {
-            folders.push((real, name));
-        }
-    }
-    Ok(folders)
-}
-
 /// The switches for `triple` by which no path of this computer stands in what is made, given to a cargo that `command` begins.
 pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
-    let folders = folders()?;
-    let flags: Vec<String> = folders
-        .iter()
-        .map(|(path, name)| format!("\"--remap-path-prefix={}={name}\"", path.display()))
-        .collect();
-    command.arg("--config").arg(format!("target.{triple}.rustflags=[{}]", flags.join(",")));
+    command.arg("--config").arg(paths::remapped(triple)?);
     // C and its assembler.
+    let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();
     command.env(format!("CFLAGS_{}", triple.replace('-', "_")), format!("-g0 {}", maps.join(" ")));
@@ -136,35 +108,33 @@ pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     run(&mut build)?;
     let folder = shell::target().join(platform.triple).join("dist");
     for (name, _) in PROGRAMS {
-        is_static(&folder.join(name))?;
-        has_no_paths(&folder.join(name))?;
+        let bytes = std::fs::read(folder.join(name)).with_context(|| name.to_owned())?;
+        is_static(name, &bytes)?;
+        has_no_paths(name, &bytes)?;
     }
     Ok(folder)
 }
 
 /// An error for a program that asks for a loader, and so for libraries of the system.
-fn is_static(program: &Path) -> Result<()> {
+fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     use object::read::elf::{FileHeader as _, ProgramHeader as _};
-    let bytes = std::fs::read(program).with_context(|| program.display().to_string())?;
-    let header = object::elf::FileHeader64::<object::Endianness>::parse(&*bytes)?;
+    let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
     let endian = header.endian()?;
     let loader = header
-        .program_headers(endian, &*bytes)?
+        .program_headers(endian, bytes)?
         .iter()
         .any(|part| part.p_type(endian) == object::elf::PT_INTERP);
-    ensure!(!loader, "{} is not linked statically", program.display());
+    ensure!(!loader, "{name} is not linked statically");
     Ok(())
 }
 
-/// An error for a program in which a folder of this computer stands.
-fn has_no_paths(program: &Path) -> Result<()> {
-    let bytes = std::fs::read(program)?;
-    for (path, _) in folders()? {
+/// An error for a file in which a folder of this computer stands.
+pub fn has_no_paths(name: &str, bytes: &[u8]) -> Result<()> {
+    for (path, _) in paths::folders()? {
         let path = path.to_string_lossy();
-        let found = bytes.windows(path.len()).position(|window| window == path.as_bytes());
-        if let Some(at) = found {
+        if let Some(at) = bytes.windows(path.len()).position(|window| window == path.as_bytes()) {
             let text = String::from_utf8_lossy(&bytes[at..(at + 120).min(bytes.len())]).into_owned();
-            anyhow::bail!("{} has a path of this computer in it: {text:?}", program.display());
+            anyhow::bail!("{name} has a path of this computer in it: {text:?}");
         }
     }
     Ok(())

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::dashboard;
 use super::graph::{Crate, Graph};
-use super::programs;
+use super::{licences, programs};
 use crate::shell::{self, Scratch, run};
 
 /// The bill of `graph` and of what the dashboard's pages contain, the same bytes for the same lock files.
@@ -18,7 +18,10 @@ pub fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
             "licenses": [{ "license": { "id": library.licence } }],
         })
     });
-    let components: Vec<Value> = crates.chain(scripts_listed).collect();
+    let runtime = licences::RUNTIME.iter().map(|(name, licence)| {
+        json!({ "type": "library", "bom-ref": format!("runtime:{name}"), "name": name, "licenses": [{ "expression": licence }] })
+    });
+    let components: Vec<Value> = crates.chain(scripts_listed).chain(runtime).collect();
     let mut dependencies: Vec<Value> = graph
         .crates
         .iter()
@@ -34,6 +37,8 @@ pub fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
     let ends = ["jtc-cli", "ucom-cli", "openjtc-py", "openjtc-firmware"];
     let parts: Vec<String> =
         graph.crates.values().filter(|found| ends.contains(&found.name.as_str())).map(purl).collect();
+    let runtime = licences::RUNTIME.iter().map(|(name, _)| format!("runtime:{name}"));
+    let parts: Vec<String> = parts.into_iter().chain(runtime).collect();
     let product = format!("pkg:generic/openjtc@{version}");
     dependencies.insert(0, json!({ "ref": product, "dependsOn": parts }));
     let bill = json!({
@@ -56,7 +61,7 @@ pub fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
 fn component(found: &Crate) -> Value {
     let mut component = json!({
         "type": "library", "bom-ref": purl(found), "purl": purl(found), "name": found.name, "version": found.version,
-        "licenses": [{ "expression": found.licence.as_deref().map(super::licences::expression) }],
+        "licenses": [{ "expression": found.licence.as_deref().map(licences::expression) }],
     });
     if let Some(sum) = &found.checksum {
         component["hashes"] = json!([{ "alg": "SHA-256", "content": sum }]);

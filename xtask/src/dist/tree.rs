@@ -102,20 +102,22 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The list that `sha256sum --check` reads, of all files in a folder but itself, which it is written into; its path.
+/// The list that `sha256sum --check` reads.
+pub const SUMS: &str = "SHA256SUMS";
+
+/// Writes that list, of all files in a folder but itself, which it is written into; its path.
 pub fn write_sums(folder: &Path) -> Result<()> {
-    const NAME: &str = "SHA256SUMS";
     let mut lines = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         ensure!(path.is_file(), "{} is no file; release files lie in no folders", path.display());
-        if name != NAME {
+        if name != SUMS {
             lines.insert(name, sha256(&std::fs::read(&path)?));
         }
     }
     let text: String = lines.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect();
-    std::fs::write(folder.join(NAME), text)?;
+    std::fs::write(folder.join(SUMS), text)?;
     Ok(())
 }
 

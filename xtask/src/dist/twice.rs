@@ -5,14 +5,18 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
-use crate::shell::{self, Scratch, run};
+use crate::shell::{self, run};
 
-/// Makes the release of `first` again elsewhere. An error that lists each file that differs.
+/// Makes the release of `first` again elsewhere. An error that lists each file that differs; both are kept then.
 pub fn compare(first: &Path, quick: bool) -> Result<()> {
-    let scratch = Scratch::new("made-again-in-a-folder-with-a-longer-name")?;
-    let checkout = scratch.path().join("a/checkout");
-    copy(&checkout)?;
-    let (second, target) = (scratch.path().join("release"), scratch.path().join("built"));
+    // Not with the temporary files, which some systems keep in memory: it takes gigabytes.
+    let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    }
+    let checkout = folder.join("a/checkout");
+    copy(&checkout, first)?;
+    let (second, target) = (folder.join("release"), folder.join("built"));
     let mut again = shell::command("cargo");
     again.current_dir(&checkout).args(["xtask", "dist", "--out"]).arg(&second);
     if quick {
@@ -45,18 +49,21 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     }
     if !differ.is_empty() {
         bail!(
-            "{} of {} files are other bytes when they are made again:\n{}",
+            "{} of {} files are other bytes when they are made again ({} and {}):\n{}",
             differ.len(),
             all.len(),
+            first.display(),
+            second.display(),
             differ.join("\n")
         );
     }
+    fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
     println!("{} files, the same bytes from another folder", all.len());
     Ok(())
 }
 
-/// The checkout as it is, uncommitted changes and history included, without what was built.
-fn copy(to: &Path) -> Result<()> {
+/// The checkout as it is, uncommitted changes and history included, without what was built and the release.
+fn copy(to: &Path, release: &Path) -> Result<()> {
     run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
     let listed = shell::read(shell::command("git").args([
         "-c",
@@ -68,6 +75,9 @@ fn copy(to: &Path) -> Result<()> {
     ]))?;
     for name in listed.lines() {
         let (from, to) = (shell::root().join(name), to.join(name));
+        if from.starts_with(release) {
+            continue;
+        }
         if !from.exists() {
             let _ = fs::remove_file(&to);
             continue;

@@ -1,8 +1,10 @@
 //! The Python package, which is built with Maturin.
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
+use super::packages::Made;
 use super::programs::{self, Platform};
 use crate::shell::{self, Scratch, run};
 
@@ -11,8 +13,11 @@ pub fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
-/// Builds the wheel into `out`; it runs with every glibc from 2.17 on.
-pub fn build(platform: Platform, time: u64, out: &Path) -> Result<()> {
+/// Text about what others wrote, where `license-files` of pyproject.toml finds it.
+const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
+
+/// Builds the wheel; it runs with every glibc from 2.17 on.
+pub fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
     let folder = folder().context("crates/openjtc-py is not there")?;
     programs::add_target(platform.library)?;
     let tools = programs::tools()?;
@@ -33,15 +38,39 @@ pub fn build(platform: Platform, time: u64, out: &Path) -> Result<()> {
     programs::without_paths(&mut build, platform.library)?;
     programs::with_tools(&mut build, &tools, time)?;
     build.env("CARGO_PROFILE_DIST_DEBUG", "false").env("CARGO_TARGET_DIR", shell::target());
-    run(&mut build)?;
-    let mut wheels = 0;
-    for entry in std::fs::read_dir(scratch.path())? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|ending| ending == "whl") {
-            std::fs::copy(&path, out.join(path.file_name().unwrap_or_default()))?;
-            wheels += 1;
+    let texts = folder.join(THIRD_PARTY);
+    std::fs::write(&texts, third_party)?;
+    let built = run(&mut build);
+    std::fs::remove_file(&texts)?;
+    built?;
+    let mut wheels = std::fs::read_dir(scratch.path())?.collect::<std::io::Result<Vec<_>>>()?;
+    wheels.retain(|entry| entry.path().extension().is_some_and(|ending| ending == "whl"));
+    let [wheel] = &*wheels else { bail!("Maturin left {} wheels, not one", wheels.len()) };
+    look_into(&tools, &wheel.path(), &scratch.path().join("unpacked"))?;
+    Ok(Made { name: wheel.file_name().to_string_lossy().into_owned(), bytes: std::fs::read(wheel.path())? })
+}
+
+/// In no file of a wheel stands a path of this computer, and the licences are among them.
+fn look_into(tools: &Path, wheel: &Path, unpacked: &Path) -> Result<()> {
+    let mut unpack = shell::command(tools.join("python"));
+    run(unpack.args(["-m", "zipfile", "-e"]).arg(wheel).arg(unpacked))?;
+    let (mut waiting, mut licences) = (vec![unpacked.to_owned()], BTreeSet::new());
+    while let Some(folder) = waiting.pop() {
+        for entry in std::fs::read_dir(&folder)? {
+            let path = entry?.path();
+            let name = path.strip_prefix(unpacked)?.display().to_string();
+            if path.is_dir() {
+                waiting.push(path);
+                continue;
+            }
+            programs::has_no_paths(&name, &std::fs::read(&path)?)?;
+            if name.contains(".dist-info/licenses/") {
+                licences.extend(path.file_name().map(|name| name.to_string_lossy().into_owned()));
+            }
         }
     }
-    ensure!(wheels == 1, "Maturin left {wheels} wheels, not one");
+    for name in ["LICENSE-APACHE", "LICENSE-MIT", THIRD_PARTY] {
+        ensure!(licences.contains(name), "the wheel has no {name} among its licences, only {licences:?}");
+    }
     Ok(())
 }

@@ -1,0 +1,47 @@
+//! Folders of this computer whose paths compilers write into what they make, and what stands there instead.
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+
+use crate::shell;
+
+/// Where cargo keeps the sources of dependencies.
+fn cargo_home() -> PathBuf {
+    std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
+}
+
+/// The folders with what stands for each. The later ones count first.
+pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
+    let mut folders = vec![
+        (shell::root().to_owned(), "openjtc"),
+        (cargo_home(), "cargo"),
+        (shell::target(), "openjtc/target"),
+    ];
+    for (path, _) in folders.clone() {
+        ensure!(
+            !path.to_string_lossy().contains([' ', '"', '=']),
+            "{}: what is made would name this folder; it cannot be made in one with a space, a quote or `=` in its name",
+            path.display()
+        );
+    }
+    // A checkout behind a link has two names.
+    for at in 0..folders.len() {
+        let (path, name) = folders[at].clone();
+        if let Ok(real) = path.canonicalize()
+            && real != path
+        {
+            folders.push((real, name));
+        }
+    }
+    Ok(folders)
+}
+
+/// For cargo's `--config`: the switches by which the compiler for `triple` writes none of these paths.
+pub fn remapped(triple: &str) -> Result<String> {
+    let flags = folders()?.into_iter();
+    let flags: Vec<String> =
+        flags.map(|(path, name)| format!("\"--remap-path-prefix={}={name}\"", path.display())).collect();
+    Ok(format!("target.{triple}.rustflags=[{}]", flags.join(",")))
+}

@@ -84,7 +84,6 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
         Made { name: "firmware.json".into(), bytes: images::list(&release.images, &version)?.into_bytes() },
     ];
     for image in &release.images {
-        made.push(Made { name: format!("{}.elf", image.board), bytes: image.elf.clone() });
         made.push(Made { name: images::name(image), bytes: image.bin.clone() });
     }
     let runnable = programs::build(own, time)?;

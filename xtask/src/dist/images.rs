@@ -18,19 +18,18 @@ const ERASED: u8 = 0xff;
 pub struct Image {
     /// The board's name.
     pub board: &'static str,
-    /// For debuggers.
-    pub elf: Vec<u8>,
     /// What stands in flash from 0x0800_0000 on.
     pub bin: Vec<u8>,
 }
 
-/// Builds the programs of all boards.
+/// Builds the programs of all boards. What lies in flash is the same wherever it is built; the names in the ELF files, which debuggers read, are
+/// not, and so these are no part of a release.
 pub fn build() -> Result<Vec<Image>> {
     let image = |board| {
         let path = firmware::build(board)?;
         let elf = std::fs::read(&path).with_context(|| path.display().to_string())?;
         let bin = flash(&elf).with_context(|| path.display().to_string())?;
-        Ok(Image { board, elf, bin })
+        Ok(Image { board, bin })
     };
     firmware::BOARDS.into_iter().map(image).collect()
 }

@@ -55,6 +55,9 @@ fn build() -> Result<Vec<Program>> {
     Ok(programs)
 }
 
+/// What `env` of the GNU tools is given to begin a program that heeds these signals.
+const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
+
 /// Runs all of them, and prints of each what it printed once it has ended. Names those that failed.
 fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
     let mut failures = Vec::new();
@@ -73,9 +76,17 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
         // Whoever reads this through a pipe sees how far it is.
         std::io::stdout().flush().ok();
     };
+    // A run behind `nohup` or in the background of a script ignores signals that tests send to what they start, and it inherits that.
+    let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     // In the directory of its package, as cargo does.
     let run = |program: &Program, log: &Path| {
-        let mut command = shell::command(&program.executable);
+        let mut command = if heeds_signals {
+            let mut env = shell::command("env");
+            env.arg(HEEDING).arg(&program.executable);
+            env
+        } else {
+            shell::command(&program.executable)
+        };
         command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
         beside::run(&mut command, log)
     };

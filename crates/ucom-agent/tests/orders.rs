@@ -352,3 +352,39 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     is_no_master_soon(&served);
 }
+
+/// A board whose loop another PC has started does not count as this agent's when that loop is stopped from here.
+#[test]
+fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
+    let (served, key) = Served::numbered(1);
+    let mut peer = served.chain.peer();
+    for (id, awaited) in [(0x301, 0x501), (0x541, 0x601)] {
+        let id = can_link::Id::standard(id).expect("11 bits");
+        peer.send(&can_link::CanFrame::classic(id, &[]).expect("no data")).expect("the bus is there");
+        frame_from(&mut *peer, awaited);
+    }
+    let (status, error) = served.api("POST /api/boards/1/stop?level=loop", Some(&key), None);
+    assert_eq!(status, 200, "{error}");
+    assert_eq!(served.board(1)["state"], "started");
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    is_no_master_soon(&served);
+    // One that was started from here counts on.
+    let key = served.lease("anna", 60.0, "continue");
+    served.run(&key, &[1]);
+    assert_eq!(served.api("POST /api/boards/1/stop?level=loop", Some(&key), None).0, 200);
+    assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(served.api("GET /api/status", None, None).1["is_master"], true);
+}
+
+/// Waits for a frame with this identifier, whatever its data.
+fn frame_from(peer: &mut dyn can_link::CanBus, id: u32) {
+    let begun = Instant::now();
+    while begun.elapsed() < common::WAIT {
+        let received = peer.receive(Duration::from_millis(100)).expect("the bus is there");
+        if received.is_some_and(|frame| frame.id().value() == id) {
+            return;
+        }
+    }
+    panic!("{id:03X} never came");
+}

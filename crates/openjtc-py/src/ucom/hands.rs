@@ -219,10 +219,14 @@ impl Hands {
         self.follow();
     }
 
-    /// The control loop of this board has ended, its application goes on.
+    /// The control loop of this board has ended, its application goes on. One that this session has not started does not count by that:
+    /// its heartbeats are nobody's business here.
     pub fn only_started(&mut self, board: u8) {
+        let counted = self.local.borrow().started.contains(&board);
         self.runs_no_more(Some(board));
-        self.local.borrow_mut().started.insert(board);
+        if counted {
+            self.local.borrow_mut().started.insert(board);
+        }
     }
 
     fn follow(&mut self) {

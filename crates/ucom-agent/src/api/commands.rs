@@ -320,9 +320,9 @@ pub(super) async fn stop_board(
         if let Some((_, error)) = stopped.failed.into_iter().next() {
             return Err(error);
         }
-        hands.runs_no_more(Some(board));
-        if level == Level::Loop {
-            hands.has_started(board);
+        match level {
+            Level::Loop => hands.only_started(board),
+            Level::Application => hands.runs_no_more(Some(board)),
         }
         let profile = hands.driver.master.profile();
         stopped.boards.first().map(|one| AnswerObject::of(one, &profile)).ok_or(SessionError::NoBoards)

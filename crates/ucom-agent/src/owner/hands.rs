@@ -212,6 +212,16 @@ impl Hands {
         self.shared.set_runs(!local.started.is_empty());
     }
 
+    /// The control loop of this board has ended, its application goes on. One that this agent has not started does not count by that:
+    /// its heartbeats are nobody's business here.
+    pub fn only_started(&mut self, board: u8) {
+        let counted = self.local.borrow().started.contains(&board);
+        self.runs_no_more(Some(board));
+        if counted {
+            self.has_started(board);
+        }
+    }
+
     /// The application of this board was started.
     pub fn has_started(&mut self, board: u8) {
         self.local.borrow_mut().started.insert(board);

@@ -95,21 +95,35 @@ fn begin(
     }
 }
 
-/// Enables outputs of boards that run, or makes them safe.
+/// Enables outputs of boards that run, or makes them safe. What makes them safe goes to each board, whatever another one does.
 pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), BoardFailure> {
     let numbers = match boards {
         Boards::All => hands.local.borrow().running.iter().copied().collect(),
         boards => hands.driver.numbers(boards)?,
     };
+    if !active {
+        let Stopped { failed, .. } = hands.driver.outputs_safe(&numbers, false);
+        return all_certain("outputs not safe for certain", failed);
+    }
+    let mut done = Vec::new();
     for board in numbers {
-        let change = AdminChange { active: Some(active), ..AdminChange::default() };
+        let change = AdminChange { active: Some(true), ..AdminChange::default() };
         let request = Request::Admin { board, change, force: false };
-        match active {
-            true => hands.starting(&[board], |hands| hands.driver.run(request).map(drop))?,
-            false => hands.driver.run(request).map(drop)?,
-        }
+        let enabled = hands.starting(&[board], |hands| hands.driver.run(request));
+        enabled.map_err(|failure| failure.after(done.iter().copied()))?;
+        done.push(board);
     }
     Ok(())
+}
+
+/// A failure that names all boards of which something is not certain.
+fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), BoardFailure> {
+    let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
+    let Some((board, error)) = failed.into_iter().next() else { return Ok(()) };
+    let mut own = BoardFailure::from(error);
+    own.board = Some(board).filter(|_| numbers.len() == 1);
+    own.failure.message = format!("{what}: board {}: {}", numbers.join(", "), own.failure.message);
+    Err(own)
 }
 
 /// Sees to each board after a stop: those that are meant, or all that answer and all that this session has started.
@@ -141,13 +155,6 @@ pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Valu
         // A stop makes nobody the master.
         hands.driver.master.end_session();
     }
-    let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
-    if let Some((board, error)) = failed.into_iter().next() {
-        let mut own = BoardFailure::from(error);
-        own.board = Some(board).filter(|_| numbers.len() == 1);
-        own.failure.message =
-            format!("not stopped for certain: board {}: {}", numbers.join(", "), own.failure.message);
-        return Err(own);
-    }
+    all_certain("not stopped for certain", failed)?;
     Ok(numbered(hands, &all))
 }

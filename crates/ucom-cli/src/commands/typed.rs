@@ -63,9 +63,18 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
                 Some("off") => false,
                 _ => return Err(form()),
             };
-            for board in prepared.known.keys() {
-                let change = AdminChange { active: Some(on), ..Default::default() };
-                driver.run(Request::Admin { board: *board, change, force: true })?;
+            let boards: Vec<u8> = prepared.known.keys().copied().collect();
+            if !on {
+                // What fails has been noted with its board.
+                let failed = driver.outputs_safe(&boards, true).failed;
+                return failed.into_iter().next().map_or(Ok(()), |(_, failure)| Err(failure.into()));
+            }
+            let mut done = Vec::new();
+            for board in boards {
+                let change = AdminChange { active: Some(true), ..Default::default() };
+                let enabled = driver.run(Request::Admin { board, change, force: true });
+                enabled.map_err(|failure| failure.after(done.iter().copied()))?;
+                done.push(board);
             }
             Ok(())
         }

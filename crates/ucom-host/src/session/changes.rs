@@ -7,12 +7,12 @@ use ucom::BoardInfo;
 use super::driver::Driver;
 use super::error::SessionError;
 use super::selection::Boards;
-use crate::master::{Outcome, RawStatus, Request, StopLevel};
+use crate::master::{Error, MasterError, Outcome, RawStatus, Request, StopLevel};
 
 /// A board by its number, with its answer to PC_INFO.
 pub type Numbered = (u8, BoardInfo);
 
-/// What became of a stop of several boards.
+/// What became of a stop of several boards, or of their outputs.
 #[derive(Debug)]
 pub struct Stopped {
     /// Boards that confirmed it.
@@ -30,10 +30,13 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
     }
 }
 
-/// What has been done already when one of several boards fails.
-fn after(failure: SessionError, done: impl Iterator<Item = u8>) -> SessionError {
-    let done: Vec<u8> = done.collect();
-    if done.is_empty() { failure } else { SessionError::Partly { failure: Box::new(failure), done } }
+impl SessionError {
+    /// The same with what has been done already, where one of several boards fails.
+    #[must_use]
+    pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
+        let done: Vec<u8> = done.into_iter().collect();
+        if done.is_empty() { self } else { Self::Partly { failure: Box::new(self), done } }
+    }
 }
 
 impl Driver {
@@ -59,7 +62,7 @@ impl Driver {
         for board in boards {
             match self.run(request(*board)).and_then(numbered) {
                 Ok(changed) => all.push(changed),
-                Err(e) => return Err(after(e, all.iter().map(|(n, _)| *n))),
+                Err(e) => return Err(e.after(all.iter().map(|(n, _)| *n))),
             }
         }
         Ok(all)
@@ -86,7 +89,7 @@ impl Driver {
             match self.run(Request::RawStatus { board, seen, mask, value, force }) {
                 Ok(Outcome::RawStatus(boards)) => all.extend(boards),
                 Ok(other) => return Err(other.into()),
-                Err(e) => return Err(after(e, all.iter().map(|b| b.board))),
+                Err(e) => return Err(e.after(all.iter().map(|b| b.board))),
             }
         }
         Ok(all)
@@ -123,6 +126,27 @@ impl Driver {
             }
         }
         Ok(stopped)
+    }
+
+    /// Makes the outputs of boards safe; their control loops go on. Each is commanded to, also where another one or it itself does not
+    /// answer. What fails is noted.
+    pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
+        let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
+        for board in boards {
+            // Where an end was asked for, nobody knows of those that were not commanded.
+            let done = match self.stop_asked() {
+                true => Err(Error::Master(MasterError::Cancelled).into()),
+                false => self.run(Request::Stop { board: *board, level: StopLevel::Outputs, force }),
+            };
+            match done.and_then(numbered) {
+                Ok(one) => stopped.boards.push(one),
+                Err(failure) => {
+                    self.note(format!("board {board}: {failure}"));
+                    stopped.failed.push((*board, failure));
+                }
+            }
+        }
+        stopped
     }
 
     /// Ends a run: all control loops at once, then applications in reverse order, then the session. Returns the boards whose end is not

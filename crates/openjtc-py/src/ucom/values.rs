@@ -86,10 +86,21 @@ pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure>
     Ok(all.into())
 }
 
-/// The same of boards that run.
+/// The same of boards that run; outputs that are old are an error.
 pub fn running(hands: &mut Hands) -> Result<Value, BoardFailure> {
     let numbers: Vec<u8> = hands.local.borrow().running.iter().copied().collect();
-    values(hands, &Boards::Some(numbers))
+    let all = values(hands, &Boards::Some(numbers))?;
+    for one in all.as_array().into_iter().flatten().filter(|one| one["stale"] == json!(true)) {
+        let board = one["board"].as_u64().and_then(|board| u8::try_from(board).ok()).unwrap_or_default();
+        let known = hands.local.borrow().known.get(&board).cloned();
+        if known.is_some_and(|known| known.names.dimensions().so == 0) {
+            continue;
+        }
+        // The reason, where it is known.
+        hands.shared.check()?;
+        return Err(no_value(board, "outputs", one["age_s"].as_f64()));
+    }
+    Ok(all)
 }
 
 fn of_board(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
@@ -141,10 +152,11 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, BoardFai
     Ok(list[usize::from(index)][1].clone())
 }
 
-fn no_value(board: u8, name: &str, age_s: Option<f64>) -> BoardFailure {
+/// Nothing new of this board; `what` is one output, or all of them.
+fn no_value(board: u8, what: &str, age_s: Option<f64>) -> BoardFailure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
-        Some(age_s) => ("stale", format!("board {board}: the last `{name}` is {age_s:.1} s old")),
+        Some(age_s) => ("stale", format!("board {board}: the last {what} came {age_s:.1} s ago")),
     };
     let failure = Failure {
         kind: ErrorKind::NoLink,

@@ -119,10 +119,11 @@ class ValuesByName(Session):
         return _value(self._native.value(board, signal))
 
     def values(self) -> dict[str, Value]:
-        """The last outputs of all boards that this chain runs, by ``NUMBER.NAME``; see `board_values` for their age.
+        """The present outputs of all boards that this chain runs, by ``NUMBER.NAME``; `board_values` has old ones, too, and their age.
 
         Raises:
             FaultError: A board was lost, or has left its control loop by itself.
+            NoLinkError: One of them sends no outputs (``no-outputs``), or none for half a second (``stale``), with ``.board``.
         """
         self.check()
         boards = [BoardValues._of(value) for value in self._native.running()]

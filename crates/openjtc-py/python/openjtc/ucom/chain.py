@@ -71,6 +71,8 @@ class Chain(ValuesByName):
             DeviceError: Boards are missing, in another order, or not reached (``init``).
             NoLinkError: No board reported (``init``).
         """
+        # However it ends: names must not stand for the boards that had these numbers before.
+        self._forget_boards()
         value = self._native.init(renew, force, check)
         return ScanReport(self._keep(value["boards"]), tuple(value["reports"]), tuple(value["findings"]))
 

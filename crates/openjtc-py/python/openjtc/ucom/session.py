@@ -142,6 +142,8 @@ class Session:
 
     def _list(self, boards: Boards) -> str:
         if isinstance(boards, str):
+            if boards.strip().lower() in ("all", "none"):
+                return boards.strip().lower()
             number = self._named(boards)
             return boards if number is None else str(number)
         if isinstance(boards, Iterable):

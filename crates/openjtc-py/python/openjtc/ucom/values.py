@@ -43,6 +43,8 @@ class ValuesByName(Session):
     def __init__(self, native: _native.Chain, names: Mapping[str, int], simulated: SimulatedChain | None) -> None:
         super().__init__(native, names, simulated)
         self._boards: dict[int, Board] = {}
+        #: Names of the inventory have been looked for.
+        self._looked = False
 
     def scan(self) -> ScanReport:
         """Asks who is there; changes nothing.
@@ -159,6 +161,18 @@ class ValuesByName(Session):
         self._boards = {board.number: board for board in all_boards}
         self._inventory_names = {board.name.lower(): board.number for board in all_boards if board.name}
         return all_boards
+
+    def _forget_boards(self) -> None:
+        """Numbers and names are of other boards from now on, or of none."""
+        self._boards, self._inventory_names, self._looked = {}, {}, False
+
+    def _named(self, name: str) -> int | None:
+        number = super()._named(name)
+        # Names of the inventory are known when it is known who is there; lists and ranges are no names.
+        if number is None and not self._looked and any(letter.isalpha() for letter in name):
+            self.scan()
+            number = super()._named(name)
+        return number
 
     def _seen(self, boards: list[dict[str, Any]], whole: bool = False) -> dict[int, Board]:
         for one in boards:

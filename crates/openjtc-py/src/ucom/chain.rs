@@ -323,8 +323,9 @@ impl Chain {
         image: Option<PathBuf>,
         force: bool,
     ) -> Object<'py> {
-        let act = move |hands: &mut _| procedures::probe(hands, (init, alive, force), image.as_deref());
-        plain(py, self.owner.call(py, act)?)
+        let image = py.detach(|| image.as_deref().map(procedures::probed_image).transpose())?;
+        let options = ProbeOptions { init, alive, image, force };
+        plain(py, self.owner.call(py, move |hands| procedures::probe(hands, options))?)
     }
 
     fn conformance<'py>(

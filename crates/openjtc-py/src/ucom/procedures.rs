@@ -1,6 +1,7 @@
 //! What is done with a chain: the procedures of `ucom-host`, in the order in which `ucom` calls them.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use host_kit::ErrorKind;
@@ -236,15 +237,23 @@ pub fn doctor(hands: &mut Hands) -> Result<Value, BoardFailure> {
     }))
 }
 
+/// An image that is on a board, as sent.
+pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, BoardFailure> {
+    let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
+    Ok(image.into_bytes().into())
+}
+
 /// Measures how boards read the protocol.
-pub fn probe(
-    hands: &mut Hands,
-    (init, alive, force): (bool, bool, bool),
-    image: Option<&Path>,
-) -> Result<Value, BoardFailure> {
-    let image = image.map(|path| Image::read(path, &ImageOptions::default())).transpose();
-    let image = image.map_err(|e| Failure::usage(e.to_string()))?.map(|image| image.into_bytes().into());
-    match hands.driver.run(Request::Probe(ProbeOptions { init, alive, image, force }))? {
+pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, BoardFailure> {
+    let init = options.init;
+    let outcome = hands.driver.run(Request::Probe(options));
+    if init {
+        hands.renumbered(match &outcome {
+            Ok(Outcome::Probe(report)) => report.init.as_ref(),
+            _ => None,
+        });
+    }
+    match outcome? {
         Outcome::Probe(report) if report.boards.is_empty() && report.reports == 0 => {
             Err(SessionError::NoBoards.into())
         }

@@ -1,12 +1,13 @@
 //! Probe and doctor.
 
 use ucom::profile::{AliveMode, Endian, ReportMode};
-use ucom::{Checksum, Profile};
+use ucom::{Checksum, Profile, Status};
 use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::update::UpdateFailure;
 use ucom_host::master::{
-    Diagnose, Error, Event, IdentityError, InitFinding, InitOptions, Outcome, Request, ScanFinding,
+    Diagnose, Error, Event, IdentityError, InitFinding, InitOptions, MasterError, Outcome, Request, RunBoard,
+    RunOptions, RunningError, ScanFinding,
 };
 
 use crate::bench::{Bench, image};
@@ -125,6 +126,63 @@ fn probe_of_checksum_and_heartbeats() {
     assert_eq!(report.profile.alive_mode, AliveMode::Broadcast);
     assert!(report.rows.iter().any(|r| r.key == "alive.mode" && r.measured));
     assert!(!bench.board(0).application.running);
+}
+
+/// However a probe ends, the session reads the protocol as before, and no board runs that did not.
+#[test]
+fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
+    let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
+    let numbered = || {
+        let mut bench = Bench::chain_with(&[0x21, 0x42], theirs);
+        bench.go(Request::Init(InitOptions::default()), 20).unwrap();
+        bench.go(Request::Update(options(&[1], 1000)), 60).unwrap();
+        bench.master = ucom_host::master::Master::new(Profile::default());
+        bench
+    };
+    let alive = ProbeOptions { image: Some(image(1000).into()), alive: true, ..Default::default() };
+    let mut bench = numbered();
+    let Ok(Outcome::Probe(report)) = bench.go(Request::Probe(alive.clone()), 120) else { panic!() };
+    assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
+    assert_eq!(bench.master.profile(), Profile::default());
+    assert!(!bench.board(0).application.running && !bench.board(0).status().has(Status::MSTART));
+    // One that was started is left so.
+    bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
+    bench.go(Request::Probe(alive.clone()), 120).unwrap();
+    assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
+    // Cancelled while everything is read raw, and while a control loop runs under other heartbeats.
+    for until in ["<201#", "<541#"] {
+        let mut bench = numbered();
+        let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();
+        let before = bench.log.len();
+        bench.until(|bench| bench.log[before..].iter().any(|(_, from, frame)| sent(*from, frame) == until));
+        bench.master.cancel(id);
+        assert_eq!(bench.wait(id, 60), Err(Error::Master(MasterError::Cancelled)));
+        assert_eq!(bench.master.profile(), Profile::default(), "{until}");
+        assert!(!bench.board(0).application.running && !bench.board(0).status().has(Status::MSTART));
+    }
+}
+
+fn sent(from: crate::bench::From, frame: &ucom::Frame) -> String {
+    format!("{}{frame}", if from == crate::bench::From::Master { '<' } else { '>' })
+}
+
+/// A control loop is not ended by a measurement that nobody expects to end it.
+#[test]
+fn a_probe_that_would_end_control_loops_is_refused() {
+    for asked in [
+        ProbeOptions { alive: true, ..Default::default() },
+        ProbeOptions { init: true, ..Default::default() },
+    ] {
+        let mut bench = initialised(&[0x21, 0x42]);
+        let boards = vec![RunBoard { board: 2, ..Default::default() }];
+        bench.go(Request::Run(RunOptions { boards, ..Default::default() }), 20).unwrap();
+        let refused = bench.go(Request::Probe(asked.clone()), 60);
+        assert_eq!(refused, Err(Error::Running(RunningError::LoopRuns { boards: vec![2] })), "{asked:?}");
+        bench.run(2_000);
+        assert!(bench.board(1).application.running);
+        let forced = ProbeOptions { force: true, ..asked };
+        assert!(matches!(bench.go(Request::Probe(forced), 60), Ok(Outcome::Probe(_))));
+    }
 }
 
 fn text(o: &Observation) -> String {

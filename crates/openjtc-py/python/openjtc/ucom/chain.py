@@ -182,12 +182,20 @@ class Chain(ValuesByName):
     ) -> ProbeReport:
         """Measures how the boards read what the published protocol leaves open, by harmless questions.
 
+        The chain goes on with the profile that it has: what was measured counts for those that are connected with it.
+
         Args:
             init: Also what shows only while numbers are given: resets and numbers the chain.
-            alive: Start a control loop, outputs safe, to see which heartbeats count.
+            alive: Start a control loop, outputs safe, to see which heartbeats count; it is stopped again.
             image: An image that is on a board, to find the checksum of Program IDs.
-            force: Also when another PC is on the bus.
+            force: Also when another PC is on the bus, or, with ``init`` or ``alive``, control loops run, which end by that.
+
+        Raises:
+            RefusedError: With ``init`` or ``alive``: control loops run (``running``), which would end by that.
         """
+        if init:
+            # However it ends: names must not stand for the boards that had these numbers before.
+            self._forget_boards()
         value = self._native.probe(init, alive, None if image is None else os.fspath(image), force)
         rows = tuple(ProbeRow(**row) for row in value["rows"])
         return ProbeReport(tuple(value["boards"]), rows, value["profile"])

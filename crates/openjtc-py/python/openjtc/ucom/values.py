@@ -160,6 +160,7 @@ class ValuesByName(Session):
         all_boards = tuple(Board._of(one, self) for one in boards)
         self._boards = {board.number: board for board in all_boards}
         self._inventory_names = {board.name.lower(): board.number for board in all_boards if board.name}
+        self._looked = True
         return all_boards
 
     def _forget_boards(self) -> None:

@@ -19,6 +19,7 @@ pub(crate) fn work(link: Link, request: Request) -> Work {
         Request::Update(options) => return Box::pin(update(link, options)),
         Request::Run(options) => return Box::pin(run::run(link, options)),
         Request::Conformance(options) => return Box::pin(conformance(link, options)),
+        Request::Probe(options) => return Box::pin(probe(link, options)),
         Request::Scan => Box::pin(scan::scan(link)),
         Request::Init(options) => Box::pin(init::init(link, options)),
         Request::Repair { board, flash_number, force } => {
@@ -37,7 +38,6 @@ pub(crate) fn work(link: Link, request: Request) -> Work {
         }
         Request::Describe { board, fresh } => Box::pin(describe::describe_procedure(link, board, fresh)),
         Request::InitialInputs { board } => Box::pin(describe::initial_inputs_procedure(link, board)),
-        Request::Probe(options) => Box::pin(probe(link, options)),
         Request::RawStatus { board, seen, mask, value, force } => {
             Box::pin(raw_status::raw_status(link, board, seen, (mask, value), force))
         }

@@ -4,6 +4,8 @@ use std::sync::Arc;
 use serde::Serialize;
 use ucom::Profile;
 
+use crate::master::reports::init::InitReport;
+
 /// What a probe may do.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
@@ -13,7 +15,7 @@ pub struct ProbeOptions {
     pub alive: bool,
     /// An image that some board has, as sent: shows how the Program ID is computed.
     pub image: Option<Arc<[u8]>>,
-    /// Also when another PC is on the bus.
+    /// Also when another PC is on the bus; `init` and `alive` also when control loops run, which end by that.
     pub force: bool,
 }
 
@@ -37,7 +39,7 @@ pub struct ProbeRow {
 /// What a probe found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeReport {
-    /// The profile with what was measured; the master uses it from now on.
+    /// The profile with what was measured; the master goes on with the one that it had.
     pub profile: Profile,
     /// Statement, observation and decision.
     pub rows: Vec<ProbeRow>,
@@ -45,6 +47,8 @@ pub struct ProbeReport {
     pub boards: Vec<u8>,
     /// Different UCoM ids in reports: boards with and without a number.
     pub reports: usize,
+    /// The new numbers, where it was to give some.
+    pub init: Option<InitReport>,
 }
 
 impl ProbeReport {

@@ -95,7 +95,7 @@ pub(super) fn judge(seen: &Seen) -> ProbeReport {
     programs(&mut rows, seen);
     let reports = seen.reports.iter().map(|report| report.ucom_id).collect::<BTreeSet<_>>().len();
     let boards = seen.infos.keys().copied().collect();
-    ProbeReport { profile: rows.profile, rows: rows.rows, boards, reports }
+    ProbeReport { profile: rows.profile, rows: rows.rows, boards, reports, init: None }
 }
 
 fn reports(rows: &mut Rows, seen: &Seen) {

@@ -1,14 +1,15 @@
 //! The questions of a probe. Answers are kept as raw payloads: how to read them is what is being asked.
 
-use crate::master::engine::{Link, MS, Times};
-use crate::master::error::Error;
+use crate::master::engine::{Core, Link, MS, Times};
+use crate::master::error::{Error, MasterError, RunningError};
 use crate::master::procedures::ask_reports::{REPORTS, collect_reports};
 use crate::master::procedures::control::start_application;
-use crate::master::procedures::exchange::{admin, mca_start, numbers};
+use crate::master::procedures::exchange::{admin, info, mca_start, numbers};
 use crate::master::procedures::init::init;
 use crate::master::procedures::probe::judge::Seen;
 use crate::master::procedures::probe::judge::{alive, judge, status_of};
-use crate::master::reports::{InitOptions, Outcome, ProbeOptions, Reports};
+use crate::master::procedures::stop::stop_board;
+use crate::master::reports::{InitOptions, Outcome, ProbeOptions, ProbeReport, Reports, StopLevel};
 use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
@@ -16,23 +17,63 @@ use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status
 /// How often each board is asked: one lost frame must not decide.
 const ROUNDS: usize = 3;
 
+/// What a probe found, or why it ended. The session goes on with the profile that it had, and no board is left started or running that
+/// was not: whatever ended the probe.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
+    let (before, mut begun) = (link.profile(), None);
+    let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
+    if let Some((board, back)) = begun
+        && !matches!(result, Err(Error::Master(MasterError::Bus { .. })))
+    {
+        link.bear_shared_numbers(true);
+        let stopped = async { stop_board(&link, board, back).await.map(drop) };
+        if let Err(error) = link.or_cancel(stopped).await {
+            link.note(format!("board {board} may still be started: {error}"));
+        }
+    }
+    use_profile(&link, before);
+    result.map(Outcome::Probe)
+}
+
+/// What ends control loops, or keeps heartbeats from them, is not begun while some run.
+fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
+    let running = |core: &mut Core| {
+        let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
+        running.map(|(number, _)| number).collect::<Vec<u8>>()
+    };
+    let boards = link.with(running);
+    match boards.is_empty() || options.force {
+        true => Ok(()),
+        false => Err(RunningError::LoopRuns { boards }.into()),
+    }
+}
+
+/// A board that this starts, and how far it is stopped at the end, go to `begun`.
+async fn measure(
+    link: &Link,
+    options: &ProbeOptions,
+    begun: &mut Option<(u8, StopLevel)>,
+) -> Result<ProbeReport, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
     // Everything is to be received raw, so nothing may be refused for its length.
-    use_profile(&link, Profile { dlc_strict: false, ..seen.before });
-    seen.reports = all_reports(&link).await;
+    use_profile(link, Profile { dlc_strict: false, ..seen.before });
+    seen.reports = all_reports(link).await;
+    let mut numbered = None;
     if options.init {
+        no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
-        seen.raised = pin_raised(&link).await?;
+        seen.raised = pin_raised(link).await?;
         // The chain as a whole; what the base profile reads wrong is judged below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
-        init(link.clone(), whole).await?;
+        if let Outcome::Init(report) = init(link.clone(), whole).await? {
+            numbered = Some(report);
+        }
         link.bear_shared_numbers(false);
     }
     seen.broadcast = [Sequence::ZERO, Sequence::MAX].map(|_| 0);
     for (place, to) in [Sequence::ZERO, Sequence::MAX].into_iter().enumerate() {
-        let answers = raw_infos(&link, &[to], 0).await;
+        let answers = raw_infos(link, &[to], 0).await;
         if let Some(count) = seen.broadcast.get_mut(place) {
             *count = answers.keys().filter(|from| **from != to.number()).count();
         }
@@ -40,28 +81,34 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     }
     let all: Vec<Sequence> = Sequence::all().filter(|n| n.number() > 0).collect();
     for _ in 0..ROUNDS {
-        for (from, answer) in raw_infos(&link, &all, 0).await {
+        for (from, answer) in raw_infos(link, &all, 0).await {
             seen.infos.entry(from).or_default().push(answer);
         }
     }
     if let Some(board) = seen.first_board() {
-        let padded = raw_infos(&link, &[board], 8).await;
+        let padded = raw_infos(link, &[board], 8).await;
         seen.padded = Some(padded.contains_key(&board.number()));
     }
     for board in seen.started_boards() {
-        seen.offsets.push(initial_offsets(&link, board).await);
+        seen.offsets.push(initial_offsets(link, board).await);
     }
-    let mut report = judge(&seen);
-    use_profile(&link, report.profile);
+    let mut report = ProbeReport { init: numbered, ..judge(&seen) };
+    use_profile(link, report.profile);
     if options.alive
         && let Some(board) = seen.first_board()
     {
+        no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
-        let by = alive_form(&link, board.number()).await?;
+        let found = info(link, board.number()).await?.info.status;
+        if found.has(Status::MCARUN) && !options.force {
+            return Err(RunningError::LoopRuns { boards: vec![board.number()] }.into());
+        }
+        let back = if found.has(Status::MSTART) { StopLevel::Loop } else { StopLevel::Application };
+        *begun = Some((board.number(), back));
+        let by = alive_form(link, board.number()).await?;
         alive(&mut report, by);
-        use_profile(&link, report.profile);
     }
-    Ok(Outcome::Probe(report))
+    Ok(report)
 }
 
 fn use_profile(link: &Link, profile: Profile) {

@@ -1,6 +1,6 @@
 //! A chain of boards as Python has it: thin calls into the thread that owns its session.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use host_kit::user_folder;
@@ -9,7 +9,8 @@ use serde_json::Value;
 use ucom_host::files::{Inventory, SignalTable};
 use ucom_host::master::StopLevel;
 use ucom_host::master::io::Kind as Buffer;
-use ucom_host::session::{Assignment, Boards, Cache, Link, SessionError};
+use ucom_host::master::probe::ProbeOptions;
+use ucom_host::session::{Assignment, Boards, Cache, Link, ParameterFile, SessionError};
 
 use super::failure::BoardFailure;
 use super::hands::Config;
@@ -18,7 +19,7 @@ use super::recording::{ChainRecording, Sink, Tap};
 use super::samples::ChainSamples;
 use super::shared::{Halt, Kind, Listener};
 use super::simulated::{Simulated, SimulatedChain};
-use super::update::{Source, Update};
+use super::update::{Read, Source, Update};
 use super::{procedures, running, update, values};
 use crate::error::Failure;
 use crate::json;
@@ -36,6 +37,7 @@ pub struct Chain {
     pub owner: Owner,
     url: String,
     profile: ucom::Profile,
+    inventory_file: Option<PathBuf>,
     sink: Sink,
 }
 
@@ -49,6 +51,14 @@ fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, BoardFailure> {
         Ok(Assignment { board, name, value })
     };
     values.into_iter().map(one).collect()
+}
+
+impl Chain {
+    /// Reads a parameter file here, as the thread of the session waits for no disk.
+    fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, BoardFailure> {
+        let inventory = self.inventory_file.clone().unwrap_or_default();
+        Ok(py.detach(|| ParameterFile::read(path, &inventory, |_| true)).map_err(SessionError::from)?)
+    }
 }
 
 fn plain(py: Python<'_>, value: Value) -> Object<'_> {
@@ -84,7 +94,7 @@ impl Chain {
             signals: signals.unwrap_or_default(),
             cache: Cache::new(cache, false),
             inventory: listed.map_err(|e| Failure::usage(e.to_string()))?,
-            inventory_file: inventory,
+            inventory_file: inventory.clone(),
             simulated,
         };
         let sink = Sink::default();
@@ -93,7 +103,7 @@ impl Chain {
             let bus = can_link::open(&opened).map_err(|e| SessionError::Open(Box::new(e)))?;
             Ok::<_, SessionError>(Link::on(Box::new(Tap::new(bus, own)), &opened))
         })?;
-        Ok(Self { owner: Owner::new(config, link), url, profile, sink })
+        Ok(Self { owner: Owner::new(config, link), url, profile, inventory_file: inventory, sink })
     }
 
     #[getter]
@@ -123,7 +133,16 @@ impl Chain {
     }
 
     fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
-        plain(py, self.owner.call(py, move |hands| procedures::init(hands, renew, force, check))?)
+        let file = self.inventory_file.as_deref();
+        // Here, as the thread of the session waits for no disk.
+        let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
+        let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
+        let init = move |hands: &mut _| procedures::init(hands, listed, (renew, force, check));
+        let (value, made) = self.owner.call(py, init)?;
+        if let (Some(file), Some(made)) = (file, made) {
+            py.detach(|| made.write(file)).map_err(|e| Failure::usage(e.to_string()))?;
+        }
+        plain(py, value)
     }
 
     fn info<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
@@ -190,8 +209,9 @@ impl Chain {
     ) -> Object<'py> {
         let boards = self::boards(boards)?;
         let (inputs, parameters) = (assignments(inputs)?, assignments(parameters)?);
+        let file = file.map(|file| self.parameter_file(py, &file)).transpose()?;
         let run = running::Run { boards, active, inputs, parameters, file, texts, force };
-        plain(py, self.owner.call(py, move |hands| running::run(hands, &run))?)
+        plain(py, self.owner.call(py, move |hands| running::run(hands, run))?)
     }
 
     fn outputs(&self, py: Python<'_>, boards: &str, active: bool) -> PyResult<()> {
@@ -249,7 +269,8 @@ impl Chain {
     }
 
     fn apply_parameters(&self, py: Python<'_>, path: PathBuf, dry_run: bool, force: bool) -> PyResult<usize> {
-        self.owner.call(py, move |hands| values::apply_parameters(hands, &path, dry_run, force))
+        let file = self.parameter_file(py, &path)?;
+        self.owner.call(py, move |hands| values::apply_parameters(hands, &file, dry_run, force))
     }
 
     /// Samples of boards from now on.
@@ -289,15 +310,17 @@ impl Chain {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
         let [raw, name_target, group, start, dry_run, unverified, force, check] = flags;
+        let first = source(image).ok_or_else(|| BoardFailure::usage("there is no image"))?;
+        let (second, profile) = (source(second), &self.profile);
+        let read = Read { raw, addresses, name_target, date: date.0, today: date.1 };
+        // Here, as the thread of the session waits for no disk.
+        let (image, second, date) = py.detach(|| read.read(&first, second.as_ref(), profile))?;
         let update = Update {
             boards: self::boards(boards)?,
-            image: source(image).ok_or_else(|| BoardFailure::usage("there is no image"))?,
-            second: source(second),
+            image,
+            second,
+            date,
             flash_number,
-            raw,
-            addresses,
-            date: date.0,
-            today: date.1,
             expect_program_id,
             name_target,
             group,
@@ -307,7 +330,7 @@ impl Chain {
             force,
             check,
         };
-        let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, &update, report);
+        let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, update, report);
         plain(py, self.owner.call_with(py, Kind::Update, progress.as_ref(), act)?)
     }
 

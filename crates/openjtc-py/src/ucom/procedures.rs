@@ -73,12 +73,15 @@ pub fn scan(hands: &mut Hands) -> Result<Value, BoardFailure> {
     }))
 }
 
-/// Resets and numbers the whole chain.
-pub fn init(hands: &mut Hands, renew: bool, force: bool, check: bool) -> Result<Value, BoardFailure> {
+/// Resets and numbers the whole chain. `listed` is what the inventory file has now. With what is found comes the inventory that is to be
+/// written: a disk may keep the heartbeats waiting.
+pub fn init(
+    hands: &mut Hands,
+    listed: Option<Inventory>,
+    (renew, force, check): (bool, bool, bool),
+) -> Result<(Value, Option<Inventory>), BoardFailure> {
     // What another program has written there since is compared with, as well.
-    if let Some(file) = hands.inventory_file.as_deref().filter(|file| file.exists()) {
-        hands.inventory = Some(Inventory::read(file).map_err(|e| Failure::usage(e.to_string()))?);
-    }
+    hands.inventory = listed.or(hands.inventory.take());
     let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
     let options = InitOptions { expected: expected.unwrap_or_default(), force };
@@ -93,22 +96,19 @@ pub fn init(hands: &mut Hands, renew: bool, force: bool, check: bool) -> Result<
     };
     if report.is_ok() {
         let made = Inventory::of_init(&report, hands.inventory.as_ref());
-        let inventory = made.map_err(|e| Failure::usage(e.to_string()))?;
-        if let Some(file) = &hands.inventory_file {
-            inventory.write(file).map_err(|e| Failure::usage(e.to_string()))?;
-        }
-        hands.inventory = Some(inventory);
+        hands.inventory = Some(made.map_err(|e| Failure::usage(e.to_string()))?);
     }
     let texts = objects::texts(&report.findings);
     if let Some(kind) = report.failure().filter(|_| check) {
         return Err(findings(kind, "init", &texts, "doctor() looks for the reason"));
     }
     let profile = hands.driver.master.profile();
-    Ok(json!({
+    let value = json!({
         "boards": objects::boards(&report.boards, &profile, hands.inventory.as_ref()),
         "reports": report.reports.ids,
         "findings": texts,
-    }))
+    });
+    Ok((value, hands.inventory.clone().filter(|_| report.is_ok())))
 }
 
 /// What boards report about themselves.

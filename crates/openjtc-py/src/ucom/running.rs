@@ -1,7 +1,5 @@
 //! Applications and control loops: started with their values, and stopped.
 
-use std::path::PathBuf;
-
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
 use ucom_host::session::{
@@ -29,27 +27,26 @@ pub struct Run {
     pub active: bool,
     pub inputs: Vec<Assignment>,
     pub parameters: Vec<Assignment>,
-    pub file: Option<PathBuf>,
+    pub file: Option<ParameterFile>,
     pub texts: bool,
     pub force: bool,
 }
 
 /// Starts applications and control loops, with their values.
-pub fn run(hands: &mut Hands, run: &Run) -> Result<Value, BoardFailure> {
+pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, BoardFailure> {
     let numbers = hands.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
-    let inventory = hands.inventory_file.clone().unwrap_or_default();
+    // Of all boards none may be missing that the file has something for.
     let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
-    let read = |path: &PathBuf| ParameterFile::read(path, &inventory, meant);
-    let file = run.file.as_ref().map(read).transpose().map_err(SessionError::from)?;
+    let file = run.file.take().map(|file| file.of_boards(meant));
     // Who is there comes first: it needs no started application.
     if let Some(file) = &file {
         file.identities(&mut hands.driver)?;
     }
     let begin = |hands: &mut Hands, cache: &Cache| {
         let mut prepared = Prepared::default();
-        let started = begin(hands, cache, &numbers, run, file.as_ref(), &mut prepared);
+        let started = begin(hands, cache, &numbers, &run, file.as_ref(), &mut prepared);
         // What the procedure began it has taken back itself.
         let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
         Ok((report, prepared))

@@ -26,17 +26,24 @@ pub enum Source {
     Bytes(Vec<u8>),
 }
 
-/// What is to be updated with what.
-pub struct Update {
-    pub boards: Boards,
-    pub image: Source,
-    pub second: Option<Source>,
-    pub flash_number: Option<u16>,
+/// How images are read.
+pub struct Read {
     pub raw: bool,
     pub addresses: Option<String>,
+    pub name_target: bool,
     /// Year, month and day that were asked for; `None`: today.
     pub date: Option<(u16, u8, u8)>,
     pub today: (u16, u8, u8),
+}
+
+/// What is to be updated with what.
+pub struct Update {
+    pub boards: Boards,
+    pub image: UpdateImage,
+    pub second: Option<UpdateImage>,
+    /// The flash date in the profile's form.
+    pub date: u16,
+    pub flash_number: Option<u16>,
     pub expect_program_id: Option<u16>,
     pub name_target: bool,
     pub group: bool,
@@ -45,6 +52,47 @@ pub struct Update {
     pub unverified: bool,
     pub force: bool,
     pub check: bool,
+}
+
+impl Read {
+    /// The images of both cycles, where there are two, and the flash date in the profile's form.
+    pub fn read(
+        &self,
+        first: &Source,
+        second: Option<&Source>,
+        profile: &Profile,
+    ) -> Result<(UpdateImage, Option<UpdateImage>, u16), BoardFailure> {
+        let address_unit = match self.addresses.as_deref() {
+            None => None,
+            Some("byte") => Some(AddressUnit::Byte),
+            Some("word") => Some(AddressUnit::Word),
+            Some(other) => {
+                return Err(BoardFailure::usage(format!("addresses: {other:?} is neither byte nor word")));
+            }
+        };
+        let options =
+            ImageOptions { format: self.raw.then_some(Format::Bin), address_unit, ..Default::default() };
+        if self.name_target && !has_header(profile) {
+            let text = "name_target: the name goes into the header, and the profile sends none";
+            return Err(BoardFailure::usage(text));
+        }
+        let second = second.map(|source| image(source, &options)).transpose()?;
+        Ok((image(first, &options)?, second, self.day(profile)?))
+    }
+
+    /// The flash date in the profile's form; 0 where no header carries it.
+    fn day(&self, profile: &Profile) -> Result<u16, BoardFailure> {
+        if !has_header(profile) {
+            let text = "date: it goes into the header, and the profile sends none";
+            return self.date.map_or(Ok(0), |_| Err(BoardFailure::usage(text)));
+        }
+        let (year, month, day) = self.date.unwrap_or(self.today);
+        let form = profile.prog_date;
+        form.encode(year, month, day).ok_or_else(|| {
+            let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
+            BoardFailure::usage(text)
+        })
+    }
 }
 
 fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFailure> {
@@ -69,20 +117,6 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFa
         )
     })?;
     Ok(image.into())
-}
-
-/// The flash date in the profile's form; 0 where no header carries it.
-fn day(update: &Update, profile: &Profile) -> Result<u16, BoardFailure> {
-    if !has_header(profile) {
-        let text = "date: it goes into the header, and the profile sends none";
-        return update.date.map_or(Ok(0), |_| Err(BoardFailure::usage(text)));
-    }
-    let (year, month, day) = update.date.unwrap_or(update.today);
-    let form = profile.prog_date;
-    form.encode(year, month, day).ok_or_else(|| {
-        let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
-        BoardFailure::usage(text)
-    })
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
@@ -134,27 +168,10 @@ fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, BoardFailure> 
 }
 
 /// Programs the boards that are meant; `report` gets the progress.
-pub fn update(hands: &mut Hands, update: &Update, report: &dyn Fn(Value)) -> Result<Value, BoardFailure> {
+pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Result<Value, BoardFailure> {
     let profile = hands.driver.master.profile();
-    let address_unit = match update.addresses.as_deref() {
-        None => None,
-        Some("byte") => Some(AddressUnit::Byte),
-        Some("word") => Some(AddressUnit::Word),
-        Some(other) => {
-            return Err(BoardFailure::usage(format!("addresses: {other:?} is neither byte nor word")));
-        }
-    };
-    let options =
-        ImageOptions { format: update.raw.then_some(Format::Bin), address_unit, ..Default::default() };
-    if update.name_target && !has_header(&profile) {
-        let text = "name_target: the name goes into the header, and the profile sends none";
-        return Err(BoardFailure::usage(text));
-    }
-    let first = image(&update.image, &options)?;
-    let second = update.second.as_ref().map(|source| image(source, &options)).transpose()?;
-    let date = day(update, &profile)?;
     let numbers = numbers(hands, &update.boards)?;
-    let targets = targets(hands, update, &numbers)?;
+    let targets = targets(hands, &update, &numbers)?;
     let several = targets.len() > 1;
     let options = UpdateOptions {
         dry_run: update.dry_run,
@@ -162,12 +179,12 @@ pub fn update(hands: &mut Hands, update: &Update, report: &dyn Fn(Value)) -> Res
         start: update.start,
         accept_unverified: update.unverified,
         mode: if update.group { UpdateMode::Group } else { UpdateMode::OneByOne },
-        second,
+        second: update.second,
         expect_program_id: update.expect_program_id,
         name_target: update.name_target,
         // The other boards of an update session are none the worse for one that fails.
         keep_going: several,
-        ..UpdateOptions::new(targets, first, date)
+        ..UpdateOptions::new(targets, update.image, update.date)
     };
     let outcome = hands.driver.run_with(Request::Update(options), &mut |event| {
         if let Event::Progress { progress, .. } = event {

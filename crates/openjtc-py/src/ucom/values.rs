@@ -1,7 +1,5 @@
 //! Inputs, outputs and parameters of boards by name.
 
-use std::path::Path;
-
 use host_kit::ErrorKind;
 use serde_json::{Value, json};
 use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
@@ -201,12 +199,10 @@ pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Boa
 /// Checks a whole parameter file against the boards, then writes its parameters. How many.
 pub fn apply_parameters(
     hands: &mut Hands,
-    path: &Path,
+    file: &ParameterFile,
     dry_run: bool,
     force: bool,
 ) -> Result<usize, BoardFailure> {
-    let inventory = hands.inventory_file.clone().unwrap_or_default();
-    let file = ParameterFile::read(path, &inventory, |_| true).map_err(SessionError::from)?;
     file.identities(&mut hands.driver)?;
     // What is written to must run. To check, what is known will do.
     let known = hands.cache.all(&mut hands.driver, &hands.signals, &file.numbers(), |_| !dry_run)?;

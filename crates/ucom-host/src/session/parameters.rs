@@ -116,6 +116,13 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
+    /// Only the boards that are meant, where they were not known when it was read.
+    #[must_use]
+    pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
+        self.boards.retain(|board| meant(board.number));
+        self
+    }
+
     /// The boards of the file.
     pub fn numbers(&self) -> Vec<u8> {
         self.boards.iter().map(|b| b.number).collect()

@@ -70,6 +70,7 @@ impl Owner {
         progress: Option<&Bound<'_, PyAny>>,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
     ) -> PyResult<T> {
+        let before = self.shared.last_event();
         let (id, answers) = self.ask(kind, act);
         loop {
             let reported = match self.wait(py, &answers)? {
@@ -84,8 +85,17 @@ impl Owner {
             if let Err(error) = result {
                 self.shared.cancel(id);
                 self.interrupted(py);
+                self.add_outcomes(py, before, &error);
                 return Err(error);
             }
+        }
+    }
+
+    /// What an update has made of each board goes with the exception that has ended it: nobody else is told.
+    fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
+        for text in self.shared.outcomes(after) {
+            // Exceptions have notes since Python 3.11; the events have the same.
+            let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 

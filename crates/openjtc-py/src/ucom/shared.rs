@@ -19,6 +19,9 @@ const EVENTS_MAX: usize = 4096;
 /// Samples that wait for their reader.
 const SAMPLES_MAX: usize = 65_536;
 
+/// The kind of events with what an update has made of a board.
+pub const UPDATED: &str = "updated";
+
 /// What kind of thing is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -193,10 +196,22 @@ impl Shared {
         }
     }
 
+    /// The number of the last event.
+    pub fn last_event(&self) -> u64 {
+        lock(&self.events).0
+    }
+
     /// Events with higher numbers, oldest first.
     pub fn events(&self, after: u64) -> Value {
         let events = lock(&self.events);
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
+    }
+
+    /// What updates have made of boards since this event.
+    pub fn outcomes(&self, after: u64) -> Vec<String> {
+        let events = self.events(after);
+        let of_updates = events.as_array().into_iter().flatten().filter(|event| event["kind"] == UPDATED);
+        of_updates.filter_map(|event| Some(event["text"].as_str()?.to_owned())).collect()
     }
 
     /// The bus as it was last seen.

@@ -18,6 +18,7 @@ use ucom_host::session::{Boards, SessionError};
 
 use super::failure::BoardFailure;
 use super::hands::Hands;
+use super::shared::UPDATED;
 use crate::error::Failure;
 
 /// Where an image comes from.
@@ -196,9 +197,20 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
         other => return Err(SessionError::from(other).into()),
     };
     hands.updated(&done, update.start);
+    note_outcomes(hands, &done);
     match done.failure().filter(|_| update.check) {
         Some(kind) => Err(failed(&done, kind)),
         None => Ok(object(&done, &profile)),
+    }
+}
+
+/// What became of each board, also where nobody takes the report any more.
+fn note_outcomes(hands: &Hands, report: &UpdateReport) {
+    let time_s = hands.driver.now_us() as f64 * 1e-6;
+    for one in report.boards.iter().filter(|_| !report.dry_run) {
+        let (board, outcome) = (one.board, one.outcome.name());
+        let why = one.failure.as_ref().map_or_else(String::new, |failure| format!(": {failure}"));
+        hands.shared.event(time_s, UPDATED, Some(board), format!("board {board}: {outcome}{why}"));
     }
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import os
 import sys
@@ -244,8 +245,9 @@ class Chain(ValuesByName):
     ) -> UpdateReport:
         """Updates the firmware of boards: the image is checked, transferred twice, and read back by its Program ID and date.
 
-        Boards that have the image are skipped: after a failure the same call goes on where it ended. Ctrl-C cancels it, and what
-        is left of each board is in the message.
+        Boards that have the image are skipped: after a failure the same call goes on where it ended. Ctrl-C and an exception of
+        ``progress`` cancel it; what became of each board is in the notes of the exception (Python 3.11), and in `events`
+        (``updated``).
 
         Args:
             image: Intel HEX, S-record or raw bytes of a ``.bin``, as a file; or the content of such a file.
@@ -287,7 +289,7 @@ class Chain(ValuesByName):
 
 
 def _reporter(progress: Callable[[Progress], None] | bool) -> Callable[[dict[str, Any]], None] | None:
-    if progress is True and not sys.stderr.isatty():
+    if progress is True and (sys.stderr is None or not sys.stderr.isatty()):
         return None
     if isinstance(progress, bool):
         return _print_progress if progress else None
@@ -300,4 +302,6 @@ def _print_progress(value: dict[str, Any]) -> None:
     boards, what = ", ".join(map(str, step.boards)), "checking" if step.cycle == 1 else "writing"
     share, end = step.bytes / max(step.total_bytes, 1), "\n" if step.bytes >= step.total_bytes else ""
     text = f"\rboard {boards}: {what} {share:4.0%}, {step.rate / 1000:.1f} kB/s, {step.remaining_s:.0f} s left "
-    print(text, end=end, file=sys.stderr, flush=True)
+    # A terminal that has gone, or a stderr that was closed, is no reason to cancel the update.
+    with contextlib.suppress(OSError, ValueError):
+        print(text, end=end, file=sys.stderr, flush=True)

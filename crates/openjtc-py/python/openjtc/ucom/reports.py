@@ -97,7 +97,7 @@ class Event:
         time_s: When, s since the chain was opened.
         kind: ``late``, ``lost``, ``back``, ``rebooted`` of heartbeats; ``left-loop``, ``stopped-by-policy``, ``in-loop`` of
             control loops; ``error`` and ``text`` of a board; ``competing-master``, ``foreign``, ``number-shared`` of the bus;
-            ``note``.
+            ``updated``, what an update has made of a board; ``note``.
         board: The board's number; None where it is about none.
         text: In words.
     """

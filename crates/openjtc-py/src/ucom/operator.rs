@@ -78,7 +78,12 @@ impl Operator for Hand {
             }
             Event::CompetingMaster { .. } => ("competing-master", None),
             Event::Foreign(_) => ("foreign", None),
-            Event::NumberShared { board, .. } => ("number-shared", Some(*board)),
+            Event::NumberShared { board, found } => {
+                if local.running.contains(board) {
+                    self.shared.number_shared(*board, found);
+                }
+                ("number-shared", Some(*board))
+            }
             _ => ("note", None),
         };
         if let Some(text) = text {

@@ -8,6 +8,7 @@ use std::time::Duration;
 use host_kit::ErrorKind;
 use serde_json::{Value, json};
 use ucom_host::master::io::Snapshot;
+use ucom_host::master::{Error, IdentityError};
 use ucom_host::session::{Change, Known, SessionError};
 
 use super::failure::BoardFailure;
@@ -60,12 +61,13 @@ struct Queue {
     closed: Option<BoardFailure>,
 }
 
-/// Boards that were lost or have left their loops, and were not reported as an error yet.
+/// Boards that were lost, have left their loops, or share their number, and were not reported as an error yet.
 #[derive(Default)]
 struct Alarms {
     lost: Vec<u8>,
     rebooted: Vec<u8>,
     left: Vec<u8>,
+    shared: VecDeque<BoardFailure>,
 }
 
 /// All outputs of a board at one time.
@@ -235,12 +237,27 @@ impl Shared {
         }
     }
 
-    /// Reports, once, that boards were lost or have left their loops.
+    /// Another board has the number of one that runs: what is commanded to one moves both.
+    pub fn number_shared(&self, board: u8, found: &[u16]) {
+        let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
+        let mut own = BoardFailure::from(SessionError::from(Error::from(error)));
+        // What was found while it runs is no refusal.
+        own.failure.kind = ErrorKind::Fault;
+        lock(&self.alarms).shared.push_back(own);
+    }
+
+    /// Reports, once, that boards were lost, have left their loops, or share a number.
     pub fn check(&self) -> Result<(), BoardFailure> {
-        let Alarms { lost, rebooted, left } = std::mem::take(&mut *lock(&self.alarms));
+        let Alarms { lost, rebooted, left, .. } = {
+            let mut alarms = lock(&self.alarms);
+            let shared = std::mem::take(&mut alarms.shared);
+            let others = std::mem::take(&mut *alarms);
+            alarms.shared = shared;
+            others
+        };
         let all = [lost.as_slice(), &rebooted].concat();
         let error = match (all.is_empty(), left.is_empty()) {
-            (true, true) => return Ok(()),
+            (true, true) => return lock(&self.alarms).shared.pop_front().map_or(Ok(()), Err),
             (true, false) => return Err(SessionError::LeftLoop { boards: left }.into()),
             (false, _) => SessionError::Lost { lost: lost.len(), rebooted: rebooted.len() },
         };

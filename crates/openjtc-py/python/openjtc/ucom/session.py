@@ -94,12 +94,12 @@ class Session:
     # What has happened.
 
     def check(self) -> None:
-        """Raises an error if a board was lost or has left its control loop by itself; once for each.
+        """Raises an error if a board was lost, has left its control loop by itself, or shares its number with another; once for each.
 
         Iterating a `monitor`, `values`, reading an output that is old, and the end of the context do the same.
 
         Raises:
-            FaultError: ``lost`` or ``left-loop``, with ``.board``.
+            FaultError: ``lost``, ``left-loop`` or ``number-shared``, with ``.board``.
         """
         self._native.check()
 

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use anyhow::Result;
 
-use crate::{emulate, firmware, package, python, shell, web};
+use crate::{book, emulate, firmware, package, python, shell, web};
 
 /// What is being made.
 pub struct Ahead(Option<JoinHandle<()>>);
@@ -39,5 +39,5 @@ fn make() -> Result<()> {
     for board in firmware::BOARDS {
         firmware::build(board)?;
     }
-    Ok(())
+    book::build()
 }

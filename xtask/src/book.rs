@@ -1,11 +1,11 @@
 //! `cargo xtask book`: docs/ as a book of HTML; and what of it every test run checks without making it.
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::shell::{self, cargo, files, root, run};
+use crate::shell::{self, Scratch, cargo, files, root, run};
 
 /// `arguments`: `--out DIR`.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
@@ -17,13 +17,30 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Cargo for the program that makes the book: a workspace of its own, as whoever builds the project does not build mdbook.
+fn tool(words: &[&str]) -> Command {
+    let mut cargo = cargo(words);
+    cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
+    cargo.env("CARGO_TARGET_DIR", shell::target().join("book-tool"));
+    cargo
+}
+
+/// Builds that program and its tests.
+pub fn build() -> Result<()> {
+    run(&mut tool(&["build"]))?;
+    run(&mut tool(&["test", "--no-run"]))
+}
+
 /// Makes the book in a folder.
 pub fn make(out: &Path) -> Result<()> {
-    // A workspace of its own: whoever builds the project does not build mdbook.
-    let manifest = root().join("book/Cargo.toml");
-    let mut book = cargo(&["run", "--quiet", "--locked", "--manifest-path"]);
-    book.arg(manifest).env("CARGO_TARGET_DIR", shell::target().join("book-tool"));
-    run(book.arg("--").arg(root()).arg(out))
+    run(tool(&["run"]).arg("--").arg(root()).arg(out))
+}
+
+/// The program's own tests, and the book with all its links.
+pub fn made() -> Result<()> {
+    run(&mut tool(&["test"]))?;
+    let scratch = Scratch::new("book")?;
+    make(&scratch.path().join("book"))
 }
 
 /// Every page of docs/ is in the book, every link to a place in a page leads to a heading of it, and every block of commands is one that

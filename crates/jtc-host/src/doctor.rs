@@ -13,6 +13,9 @@ use crate::{Error, Session, words};
 /// Rates that are tried when bytes come and no frame is in them.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
+/// How often is looked whether an examination is to end.
+const LOOK: Duration = Duration::from_millis(50);
+
 /// What was received on the link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
@@ -43,15 +46,24 @@ impl<P: Port> Session<P> {
     ///
     /// The port is gone. That nothing is received is an observation, no error.
     pub fn examine(&mut self, time: Duration) -> Result<Observation, Error> {
+        self.examine_until(time, || false)
+    }
+
+    /// The same, for less time once `ended` returns true.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::examine`].
+    pub fn examine_until(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<Observation, Error> {
         let (start, before) = (self.now(), self.statistics());
         let end = start + time;
         let mut status = None;
         loop {
             let now = self.now();
-            if now >= end {
+            if now >= end || ended() {
                 break;
             }
-            status = self.poll(end - now)?.or(status);
+            status = self.poll((end - now).min(LOOK))?.or(status);
         }
         let after = self.statistics();
         Ok(Observation {

@@ -113,17 +113,32 @@ impl<P: Port> Session<P> {
         Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
     }
 
-    /// Teaching on, and no more waiting for it once `ended` returns true.
+    /// Teaching on, and no more waiting for it once `ended` returns true. Teaching that does not begin is switched off again: the controller
+    /// would begin it as soon as the arm rests, when nobody reckons with an arm that gives way.
     ///
     /// # Errors
     ///
     /// Those of [`Session::teach`]; [`Error::Cancelled`].
     pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
-        self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
+        let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
+            // It does not teach, or for somebody else.
+            Err(error) if !error.is_loss() => return Err(error.into()),
+            Err(error) => Err(error.into()),
+            Ok(()) => self.wait_for_teaching(&ended),
+        };
+        if begun.is_err() {
+            // The first error is the one to report; what is accepted in every state needs no answer here.
+            let _ = self.teach(false);
+        }
+        begun
+    }
+
+    fn wait_for_teaching(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         let status = self.wait_for("teaching", TEACHING, |s| {
             s.state.is_in(&[ControllerState::Teaching, ControllerState::Error]) || ended()
         })?;
-        if without_error(status)?.state == ControllerState::Teaching { Ok(()) } else { Err(Error::Cancelled) }
+        let taught = without_error(status)?.state == ControllerState::Teaching;
+        if taught && !ended() { Ok(()) } else { Err(Error::Cancelled) }
     }
 
     /// Pump on or off.
@@ -273,11 +288,21 @@ impl<P: Port> Session<P> {
     /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it does not hold the arm in this time (it
     /// may still lack parameters); those of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
+        self.wait_ready_until(timeout, || false)
+    }
+
+    /// The same, and no more waiting once `ended` returns true.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::wait_ready`]; [`Error::Cancelled`].
+    pub fn wait_ready_until(&mut self, timeout: Duration, ended: impl Fn() -> bool) -> Result<Status, Error> {
         let ready = |s: &Status| s.state == ControllerState::HoldPos && words::is_held(s);
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
-            s.state == ControllerState::Error || ready(s)
+            s.state == ControllerState::Error || ready(s) || ended()
         })?;
-        without_error(status)
+        let status = without_error(status)?;
+        if ready(&status) { Ok(status) } else { Err(Error::Cancelled) }
     }
 }
 

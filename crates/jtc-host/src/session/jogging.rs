@@ -22,8 +22,20 @@ impl<P: Port> Session<P> {
     ///
     /// Those of [`Session::jog`].
     pub fn settle_for_jog(&mut self) -> Result<(), Error> {
+        self.settle_for_jog_until(|| false)
+    }
+
+    /// The same, and no more waiting once `ended` returns true.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::jog`]; [`Error::Cancelled`].
+    pub fn settle_for_jog_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.now() + REST;
         loop {
+            if ended() {
+                return Err(Error::Cancelled);
+            }
             match self.jog(&[0.0; JOINTS]) {
                 Err(Error::Link(LinkError::Refused {
                     code: DataStatus::NotAllowed,

@@ -66,11 +66,27 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// Those of [`Session::log_status`] and [`Session::arm_image`].
-    pub fn fetch_log(&mut self, mut done: impl FnMut(usize, usize)) -> Result<FlightLog, Error> {
+    pub fn fetch_log(&mut self, done: impl FnMut(usize, usize)) -> Result<FlightLog, Error> {
+        self.fetch_log_until(|| false, done)
+    }
+
+    /// The same, until `ended` returns true.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::fetch_log`]; [`Error::Cancelled`].
+    pub fn fetch_log_until(
+        &mut self,
+        ended: impl Fn() -> bool,
+        mut done: impl FnMut(usize, usize),
+    ) -> Result<FlightLog, Error> {
         let mut log = FlightLog::default();
         let mut bytes = Vec::new();
         let mut first = None;
         let points = loop {
+            if ended() {
+                return Err(Error::Cancelled);
+            }
             // The first answer says where the log begins.
             let (block, offset) =
                 (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);

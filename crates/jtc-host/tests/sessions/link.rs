@@ -255,6 +255,17 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     assert_eq!(s.fresh_status().unwrap().state, ControllerState::HoldPos, "it is held");
 }
 
+/// An arm that gives way when nobody waits for it any more is nobody's wish.
+#[test]
+fn j25_teaching_that_is_not_waited_for_is_switched_off() {
+    let mut s = ready(None);
+    let given_up = s.teach_until(|| true);
+    assert!(matches!(given_up, Err(Error::Cancelled)), "{given_up:?}");
+    s.pass(Duration::from_secs(2)).unwrap();
+    assert_eq!(s.fresh_status().unwrap().state, ControllerState::HoldPos);
+    s.wait_ready(Duration::from_secs(15)).unwrap();
+}
+
 /// The controller answers "incorrect value" only: joint, value and bounds are found on this side.
 #[test]
 fn j06_a_refused_parameter_is_named() {

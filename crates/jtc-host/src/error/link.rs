@@ -120,7 +120,13 @@ impl Diagnose for LinkError {
 impl LinkError {
     /// The line or the port failed: whether the controller received the request is not known.
     pub(crate) fn is_loss(&self) -> bool {
-        !matches!(self, Self::Refused { .. } | Self::Denied { .. } | Self::NoExtension { .. })
+        !matches!(
+            self,
+            Self::Refused { .. }
+                | Self::Denied { .. }
+                | Self::NoExtension { .. }
+                | Self::Port(PortError::Halted)
+        )
     }
 }
 

@@ -87,6 +87,9 @@ pub enum PortError {
         /// Name given.
         path: String,
     },
+    /// The port withholds a frame that would move the arm: somebody stopped the arm since it was asked for.
+    #[error("not sent: the arm was stopped since this was asked for")]
+    Halted,
     /// Anything else that the operating system reports.
     #[error("{path}: {source}")]
     Io {
@@ -125,10 +128,12 @@ impl Diagnose for PortError {
                     .into()
             }
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
+            PortError::Halted => "`jtc status` shows where the arm is".into(),
             PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
         };
         let (kind, code) = match self {
             PortError::NotLetIn { .. } => (ErrorKind::Refused, "not-let-in"),
+            PortError::Halted => (ErrorKind::Fault, "cancelled"),
             PortError::NoAgent { .. } | PortError::AgentGone { .. } => (ErrorKind::NoLink, "no-agent"),
             _ => (ErrorKind::NoLink, "port"),
         };

@@ -6,7 +6,7 @@ use jtc_wire::{ControllerState, ExecCommand, Status, TrajectoryState, fixed};
 
 use super::Session;
 use crate::error::{Error, LinkError, MotionError};
-use crate::port::Port;
+use crate::port::{Port, PortError};
 
 /// What a callback wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,7 +116,10 @@ impl<P: Port> Session<P> {
             match (flow, did) {
                 (_, Ok(())) => {}
                 // The motion goes on as it was, or stays paused, and is followed.
-                (Flow::Resume, Err(Error::Link(LinkError::Denied { .. }))) => {}
+                (
+                    Flow::Resume,
+                    Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted))),
+                ) => {}
                 (
                     Flow::Resume,
                     Err(Error::Motion(MotionError::NotPaused { .. } | MotionError::RestRefused { .. })),

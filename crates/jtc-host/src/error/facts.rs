@@ -178,6 +178,9 @@ impl Error {
                 MotionError::RunFault { point, status }
                 | MotionError::PausedByController { point, status, .. },
             ) => Facts { point: Some(*point), ..Facts::of_status(status) },
+            Self::Motion(MotionError::LinkLost { last: Some(last), .. }) if last.is_executing() => {
+                Facts { point: Some(last.point), ..Facts::default() }
+            }
             Self::Motion(MotionError::RestRefused { point, why }) => {
                 Facts { point: Some(*point), ..Facts::of_plan(why) }
             }

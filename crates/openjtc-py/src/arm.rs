@@ -77,7 +77,8 @@ impl Arm {
         Ok(PyArray1::from_slice(py, &position))
     }
 
-    /// The limits that count, an array each.
+    /// The limits that count, by their names, each (6,): `position_min` and `position_max` (rad), `velocity_max` (rad/s), `acceleration_max` (rad/s²),
+    /// `torque_max` (N·m).
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let config = self.inner.config();
@@ -96,29 +97,33 @@ impl Arm {
         Ok(limits)
     }
 
-    /// Gains, friction polynomial and rotor inertia; `None` where the file does not give them.
+    /// Gains (6, 3): Kp (N·m/rad), Ki (N·m/(rad·s)), Kd (N·m·s/rad); `None` where the file does not give them.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let gains = self.inner.pid?;
         Some(array::wide(py, &gains.map(|g| [g.kp, g.ki, g.kd])))
     }
 
+    /// Friction polynomials (6, 6), one row a joint: c0 (N·m), c1 (N·m·s/rad), c2 (N·m·s²/rad²), c3 (N·m·s³/rad³), c4 (1/K), c5 (°C); `None` where the
+    /// file does not give them.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.inner.polynomial.as_ref().map(|all| array::wide(py, all))
     }
 
+    /// Inertia of each drive's rotor at the joint (6,), kg·m².
     #[getter]
     fn rotor_inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.config().joints.each_ref().map(|j| j.rotor_inertia))
     }
 
+    /// Masses of the links, base first (7,), kg.
     #[getter]
     fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.model.links.each_ref().map(|link| link.mass))
     }
 
-    /// Acceleration of gravity in the base frame, m/s².
+    /// Acceleration of gravity in the base frame (3,), m/s².
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.config().gravity)

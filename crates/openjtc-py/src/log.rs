@@ -48,7 +48,7 @@ impl FlightLog {
 
     /// A recording as MCAP, with the log in it: `jtc log replay` reads it.
     #[pyo3(signature = (path, overwrite=false))]
-    fn save(&self, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
+    fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         let mut options = std::fs::OpenOptions::new();
         options.write(true);
         if overwrite {
@@ -60,7 +60,7 @@ impl FlightLog {
             Failure::usage(format!("{}: {error}", path.display()))
                 .next("name another file, or pass overwrite=True")
         })?;
-        self.account.write(file, &path).map_err(|error| Failure::of(&error))
+        py.detach(|| self.account.write(file, &path)).map_err(|error| Failure::of(&error))
     }
 }
 

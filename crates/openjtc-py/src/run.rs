@@ -117,7 +117,7 @@ impl Samples {
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("time", PyArray1::from_iter(py, self.samples.iter().map(|s| s.time_s)))?;
-        all.set_item("point", PyArray1::from_iter(py, self.samples.iter().map(|s| s.point)))?;
+        all.set_item("point", PyArray1::from_iter(py, self.samples.iter().map(|s| f64::from(s.point))))?;
         for (name, of) in COLUMNS {
             let rows: Vec<_> = self.samples.iter().map(|s| s.joints.each_ref().map(of)).collect();
             all.set_item(name, array::matrix(py, &rows))?;
@@ -133,7 +133,7 @@ impl Samples {
 
     /// Figures: recorded_s, executed_s, samples, and those of each joint.
     fn summary<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
-        let summary = Digest::of(&self.samples).summary(&self.info);
+        let summary = py.detach(|| Digest::of(&self.samples).summary(&self.info));
         json::plain(py, &summary)
     }
 

@@ -13,7 +13,8 @@ use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
 
-/// Points at a fixed step. It does not change.
+/// Points at a fixed step, `step_ms` (ms): `time` (N,) in s; `position`, `velocity` and `acceleration` (N, 6) in rad, rad/s and rad/s², one column a
+/// joint, base to wrist; `duration` in s. It does not change.
 #[pyclass(frozen, module = "openjtc")]
 pub struct Trajectory {
     pub inner: Arc<HostTrajectory>,
@@ -44,7 +45,7 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// From points: positions, and their velocities and accelerations.
+    /// From points (N, 6): positions (rad), and their velocities (rad/s) and accelerations (rad/s²), `step_ms` (ms) apart.
     #[new]
     fn new(
         step_ms: u16,
@@ -74,54 +75,61 @@ impl Trajectory {
     /// From a file of any form that `jtc traj run` reads.
     #[staticmethod]
     #[pyo3(signature = (path, arm=None, degrees=false))]
-    fn load(path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
-        Self::loaded(Loaded::load(&path, arm.map(|arm| &arm.inner.joint_names))?, degrees)
+    fn load(py: Python<'_>, path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
+        py.detach(|| Self::loaded(Loaded::load(&path, arm.map(|arm| &arm.inner.joint_names))?, degrees))
     }
 
     /// From the text of such a file.
     #[staticmethod]
     #[pyo3(signature = (text, arm=None, degrees=false))]
-    fn parse(text: &str, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
-        Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees)
+    fn parse(py: Python<'_>, text: &str, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
+        py.detach(|| Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees))
     }
 
     /// As a recording measured it.
     #[staticmethod]
-    fn load_measured(path: PathBuf) -> Result<Self, Failure> {
-        Self::loaded(Loaded::load_measured(&path)?, false)
+    fn load_measured(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
+        py.detach(|| Self::loaded(Loaded::load_measured(&path)?, false))
     }
 
+    /// From a point to the next one, ms.
     #[getter]
     fn step_ms(&self) -> u16 {
         self.inner.step_ms
     }
 
+    /// From the first point to the last one, s.
     #[getter]
     fn duration(&self) -> f64 {
         self.inner.duration_s()
     }
 
+    /// What was derived, resampled or left out when it was read.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
 
+    /// When each point is passed, s: (N,).
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let step = f64::from(self.inner.step_ms) * 1e-3;
         PyArray1::from_iter(py, (0..self.inner.points.len()).map(|k| k as f64 * step))
     }
 
+    /// Joint positions (N, 6), rad.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         self.channel(py, |point| point.position)
     }
 
+    /// Joint velocities (N, 6), rad/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         self.channel(py, |point| point.velocity)
     }
 
+    /// Joint accelerations (N, 6), rad/s².
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         self.channel(py, |point| point.acceleration)

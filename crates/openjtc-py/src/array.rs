@@ -1,6 +1,8 @@
 //! Arrays of numpy as arrays of joints, and back: one row a state, one column a joint, base to wrist.
 
 use jtc_core::JOINTS;
+use jtc_host::error::Facts;
+use jtc_wire::Joint;
 use numpy::{
     PyArray1, PyArray2, PyArrayDyn, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _,
 };
@@ -53,7 +55,10 @@ fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
     for (number, row) in rows.iter().enumerate() {
         if let Some(joint) = row.iter().position(|value| !value.is_finite()) {
             let place = if rows.len() > 1 { format!("row {number}, ") } else { String::new() };
-            return Err(Failure::usage(format!("{what}: {place}joint {} is {}", joint + 1, row[joint])));
+            let failure = Failure::usage(format!("{what}: {place}joint {} is {}", joint + 1, row[joint]));
+            let facts =
+                Facts { joint: Joint::from_index(joint), value: Some(row[joint]), ..Facts::default() };
+            return Err(Failure { facts: Box::new(facts), ..failure });
         }
     }
     Ok(())

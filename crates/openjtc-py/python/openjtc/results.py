@@ -245,7 +245,9 @@ class Check:
     def raise_if_refused(self) -> None:
         """Raises `RefusedError` where something forbids to run it."""
         if not self.ok:
-            raise RefusedError(str(self), "check", next=self.next)
+            worst = next((problem for problem in self.problems if not problem["warning"]), {})
+            joint, point, value, limit = (worst.get(key) for key in ("joint", "point", "value", "limit"))
+            raise RefusedError(str(self), "check", joint, point, value, limit, next=self.next)
 
     def __repr__(self) -> str:
         return f"Check(ok={self.ok}, {len(self.refusals)} refusals, {len(self.warnings)} warnings)"

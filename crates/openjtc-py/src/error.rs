@@ -72,6 +72,44 @@ impl Failure {
     }
 }
 
+/// Commands of `jtc`, and what does the same here: while a program has the port no command gets at it.
+const COMMANDS: &[(&str, &str)] = &[
+    ("jtc traj run FILE --approach", "robot.run(…, approach=True)"),
+    ("jtc traj run FILE", "robot.run(…)"),
+    ("jtc traj pause", "robot.pause()"),
+    ("jtc traj resume", "robot.resume()"),
+    ("jtc traj stop", "robot.stop()"),
+    ("jtc traj check", "robot.check(…)"),
+    ("jtc status", "robot.status"),
+    ("jtc doctor --baud RATE", "openjtc.connect(…, baud=…)"),
+    ("jtc doctor", "robot.doctor()"),
+    ("jtc recover --arm FILE", "robot.recover(arm=…)"),
+    ("jtc recover --defaults", "robot.recover(defaults=True)"),
+    ("jtc recover", "robot.recover()"),
+    ("jtc arm push --store", "robot.push_arm(arm, store=True)"),
+    ("jtc arm push FILE", "robot.push_arm(arm)"),
+    ("jtc arm check FILE", "openjtc.Arm.load(…).findings()"),
+    ("jtc payload show", "robot.payload"),
+    ("jtc payload set", "robot.payload = …"),
+    ("jtc payload clear", "robot.payload = None"),
+    ("jtc teach off", "the end of the block `with robot.teach():`"),
+    ("jtc params use-defaults", "robot.use_defaults()"),
+    ("jtc disable", "robot.disable()"),
+    ("jtc info", "robot.info"),
+    ("jtc jog", "robot.jog(…)"),
+    ("jtc log fetch", "robot.flight_log()"),
+    ("--accept-device-limits", "accept_device_limits=True"),
+    ("--baud", "baud="),
+];
+
+/// What helps, in terms of Python.
+pub fn in_python(next: &str) -> String {
+    COMMANDS.iter().fold(next.to_owned(), |text, (command, here)| {
+        let here = if here.contains('`') { (*here).to_owned() } else { format!("`{here}`") };
+        text.replace(&format!("`{command}`"), &here)
+    })
+}
+
 impl From<jtc_host::Error> for Failure {
     fn from(error: jtc_host::Error) -> Self {
         Self::with(&error, error.facts())
@@ -116,6 +154,7 @@ impl From<Failure> for PyErr {
 fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
     let Failure { kind, code, message, next, facts } = failure;
     let kind = match kind {
+        ErrorKind::Fault if code == "stopped" => "StoppedError",
         ErrorKind::Usage => "UsageError",
         ErrorKind::NoLink => "NoLinkError",
         ErrorKind::Refused => "RefusedError",
@@ -124,6 +163,7 @@ fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
     };
     let class = py.import("openjtc.errors")?.getattr(kind)?;
     let joint = facts.joint.map(|joint| joint.number());
+    let next = in_python(next);
     let arguments = (message, code, joint, facts.point, facts.value, facts.limit, facts.cause, next);
     let instance = class.call1(arguments)?;
     if !instance.is_instance_of::<pyo3::exceptions::PyException>() {

@@ -7,6 +7,7 @@ mod dynamics;
 mod error;
 mod json;
 mod log;
+mod number;
 mod planner;
 mod plant;
 mod robot;

@@ -231,7 +231,7 @@ def test_asyncio_awaits_a_run_and_a_cancelled_task_stops_the_arm(live):
     async def main() -> None:
         assert (await live.run_async(live.plan([live.position, HOME]))).outcome == "finished"
         task = asyncio.create_task(live.run_async(openjtc.example("motion"), approach=True))
-        while live._link.progress()[0] != "motion":
+        while live.status.state != "Operate":
             await asyncio.sleep(0.01)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -244,7 +244,7 @@ def test_asyncio_awaits_a_run_and_a_cancelled_task_stops_the_arm(live):
 
 def test_ctrl_c_stops_the_arm_before_it_is_raised(live):
     def press() -> None:
-        until(lambda: live._link.progress()[0] == "motion" and live._link.progress()[1] > 0.3)
+        until(lambda: live.status.state == "Operate" and live.status.point > 300)
         os.kill(os.getpid(), signal.SIGINT)
 
     thread = threading.Thread(target=press)

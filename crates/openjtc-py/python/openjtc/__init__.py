@@ -19,9 +19,8 @@ Joints are counted from 1, base to wrist; arrays have one column a joint. Angles
 
 from openjtc._native import Arm, Trajectory, __version__
 from openjtc._native import example_text as example_text
-from openjtc.payload import Payload
 from openjtc.connection import connect
-from openjtc.errors import DeviceError, Error, FaultError, NoLinkError, RefusedError, UsageError
+from openjtc.errors import DeviceError, Error, FaultError, NoLinkError, RefusedError, StoppedError, UsageError
 from openjtc.motion import Motion, Teaching
 from openjtc.payload import Payload
 from openjtc.planning import Planner
@@ -48,6 +47,7 @@ __all__ = [
     "Run",
     "Samples",
     "Status",
+    "StoppedError",
     "Teaching",
     "Trajectory",
     "UsageError",

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import getpass
 import os
+import signal
+import threading
+import warnings
 import weakref
 from pathlib import Path
+from types import FrameType
 
 from openjtc import _native
 from openjtc._native import Arm
@@ -23,10 +26,30 @@ _open: weakref.WeakSet[Robot] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """A program that ends stops what it moves."""
-    for robot in list(_open):
-        with contextlib.suppress(Error):
+    """A program that ends stops what it moves: all arms at once, then one after the other is waited for."""
+    # In a child of the process that connected they are closed already: they are the parent's.
+    robots = [robot for robot in list(_open) if not robot.is_closed]
+    for robot in robots:
+        robot._link.halt()
+    for robot in robots:
+        try:
             robot.close()
+        except Error as error:
+            warnings.warn(f"at the end of the program: {error}", RuntimeWarning, stacklevel=1)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
+
+
+def _catch_signals() -> None:
+    """A program that is told to end stops what it moves, too. Where somebody handles these signals already, that is left as it is."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _end)
 
 
 def connect(
@@ -43,6 +66,10 @@ def connect(
     certificates: FilePath | None = None,
 ) -> Robot:
     """Connects to a controller.
+
+    The end of the program stops what it moves, also at SIGTERM and SIGHUP: where nobody else handles them, the first connection in the main
+    thread lets them raise `SystemExit` there. What nobody can handle, SIGKILL or a loss of power, stops nothing on a serial line; an agent
+    stops the motion of a program that has gone.
 
     Args:
         target: ``sim:`` a simulated controller, drives and arm in this process, which hold the arm at once; ``/dev/ttyUSB0`` a serial
@@ -61,6 +88,7 @@ def connect(
     Raises:
         NoLinkError: There is no such port or agent, or no controller answers.
     """
+    _catch_signals()
     if arm is not None and not isinstance(arm, Arm):
         arm = Arm.load(Path(arm))
     if target.startswith("sim:"):

@@ -80,3 +80,10 @@ class NoLinkError(Error, ConnectionError):
 
 class FaultError(Error):
     """It went wrong on the way, or was cancelled there. The message says whether the arm may be moving."""
+
+
+class StoppedError(FaultError):
+    """Somebody stopped the arm while this waited for it: another thread, another program, whoever looks after the arm. Its code is ``stopped``.
+
+    ``run`` is what was seen of a motion until then. Who goes on all the same sets off an arm that somebody wanted to stand.
+    """

@@ -128,6 +128,11 @@ def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
         if degrees:
             raise UsageError("a named pose has its unit: leave `degrees` out", "usage")
         return arm.pose(place)
+    return radians_of(place, degrees)
+
+
+def radians_of(place: ArrayLike, degrees: bool) -> ArrayLike:
+    """Joint positions in rad, of numbers."""
     return np.radians(np.asarray(place, dtype=float)) if degrees else place
 
 

@@ -1,108 +1,41 @@
-"""One controller, real or simulated: motions, jogging, teaching, arms, payloads, what is wrong."""
+"""One controller, real or simulated: motions, jogging, teaching."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+import functools
+from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from openjtc import _native
-from openjtc._native import Arm, Trajectory
-from openjtc.errors import Error, UsageError
+from openjtc._native import Trajectory
+from openjtc.connected import Connected
+from openjtc.errors import UsageError
 from openjtc.motion import FilePath, Motion, Teaching, followed, options_of
 from openjtc.payload import Payload
-from openjtc.planning import Planner, Waypoints, flange_of, joints_of
-from openjtc.results import Check, FlightLog, Plan, Run
-from openjtc.status import Finding, Status
+from openjtc.planning import Planner, Waypoints, flange_of, joints_of, radians_of
+from openjtc.results import Check, Plan, Run
 
 __all__ = ["Robot"]
 
 Array = NDArray[np.float64]
 
 
-class Robot:
+class Robot(Connected):
     """A connection to one controller. Made by `connect`; a context manager that stops what it moves when it ends.
 
     Methods may be called from several threads: `status`, `pause`, `resume`, `stop` and `speed` act at once on a motion that another thread
-    runs, where one that is still being uploaded is paused as it begins; everything else waits until the motion is over. Ctrl-C in the main
-    thread stops the arm on its path, and is raised once it stands.
+    runs, where one that is still being uploaded is paused as it begins; everything else waits until the motion is over. What was asked for
+    before a `stop` and waits for its turn is not done any more: it raises `FaultError` with the code ``cancelled``.
+
+    Ctrl-C in the main thread stops the arm on its path, and is raised once it stands, wherever a method of this package waits. Where Python
+    itself waits (``time.sleep``, ``thread.join``, the prompt of an interpreter) after `start`, Ctrl-C raises `KeyboardInterrupt` alone: the
+    arm is stopped then by the end of the ``with`` block or of the program, and at a prompt by ``robot.stop()``.
     """
-
-    def __init__(self, link: _native.Link) -> None:
-        self._link = link
-
-    # The connection
-
-    def __enter__(self) -> Robot:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if kind is None:
-            self.close()
-            return
-        # What ended the block is what is to be seen.
-        with contextlib.suppress(Error):
-            self.close()
-
-    def close(self) -> None:
-        """Stops what moves here, switches off the teaching that was switched on here, and ends the connection. The controller holds the arm."""
-        self._link.close()
-
-    @property
-    def is_closed(self) -> bool:
-        """Nothing can be asked any more."""
-        return self._link.is_closed
-
-    def __repr__(self) -> str:
-        return "Robot(closed)" if self.is_closed else f"Robot({self._link.port!r})"
-
-    # What is
-
-    @property
-    def status(self) -> Status:
-        """A fresh status of the controller."""
-        return Status(**self._link.status())
-
-    @property
-    def position(self) -> Array:
-        """Measured joint positions (6,), rad."""
-        return self.status.position
-
-    @property
-    def arm(self) -> Arm:
-        """The arm in the controller where it can be asked; else the one given to `connect`, or the built-in one."""
-        return self._link.arm()
-
-    @property
-    def info(self) -> dict[str, Any] | None:
-        """Who the controller is: board, firmware, arm, hash of its arm, boots, uptime (s); None for one without extensions."""
-        return self._link.info()
-
-    def doctor(self) -> list[Finding]:
-        """Looks at link, bus and set-up for 1.5 s; what it found, the worst first."""
-        return [Finding(**found) for found in self._link.doctor()]
-
-    def wait_ready(self, timeout: float = 15.0) -> None:
-        """Waits until the controller holds the arm with all drives enabled.
-
-        Raises:
-            DeviceError: It reports an error.
-            Error: It does not hold the arm in this time (s); it may lack parameters (`use_defaults`, `push_arm`).
-        """
-        self._link.wait_ready(timeout)
-
-    # Motions
 
     def plan(
         self,
@@ -132,7 +65,7 @@ class Robot:
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
-            start: Where the arm is to stand (6,), rad; None: where it stands now.
+            start: Where the arm is to stand (6,), rad; None: where it stands now, which every joint has to report.
             degrees: Whether the numbers of a file are degrees.
             accept_device_limits: The controller's limits differ from the arm's, and are safe for it.
         """
@@ -161,10 +94,39 @@ class Robot:
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Motion:
-        """Begins what `run` does, and returns at once. **The arm moves.**"""
+        """Begins what `run` does, and returns at once. **The arm moves.**
+
+        A file is read before that, with the names of the controller's arm, for which a motion on its way is waited for.
+        """
+        return self._start(
+            self._link.asked(),
+            trajectory,
+            approach=approach,
+            speed=speed,
+            repeat=repeat,
+            record=record,
+            overwrite=overwrite,
+            degrees=degrees,
+            accept_device_limits=accept_device_limits,
+        )
+
+    def _start(
+        self,
+        asked: int,
+        trajectory: Trajectory | Plan | FilePath,
+        *,
+        approach: bool = False,
+        speed: float = 100.0,
+        repeat: int = 1,
+        record: FilePath | None = None,
+        overwrite: bool = False,
+        degrees: bool = False,
+        accept_device_limits: bool = False,
+    ) -> Motion:
+        # Asked for so many Stops ago: what is found out before it begins may take its time.
         trajectory, name = self._trajectory(trajectory, degrees)
-        options = options_of(name, approach, speed, repeat, record, overwrite, accept_device_limits)
-        return Motion(self._link.run(trajectory, options), self._link)
+        options = options_of(asked, name, approach, speed, repeat, record, overwrite, accept_device_limits)
+        return Motion(self._link.run(trajectory, options), self, asked)
 
     def run(
         self,
@@ -185,35 +147,54 @@ class Robot:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
             approach: Whether an arm that stands elsewhere is moved to the first point, at half speed at most.
             speed: Percent of the trajectory's own speed, 1 to 100.
-            repeat: How often it is run.
+            repeat: How often it is run, 1 or more.
             record: A recording that is written while the arm moves, MCAP or CSV by the ending.
-            overwrite: Whether a recording that is there is written over.
+            overwrite: Whether a recording that is there is replaced, once the new one is whole.
             degrees: Whether the numbers of a file are degrees.
             accept_device_limits: The controller's limits differ from the arm's, and are safe for it.
             progress: Whether a bar is drawn on standard error; None: at a terminal.
 
         Returns:
-            What was seen: outcome, figures, samples. A motion that was stopped on its way is no error.
+            What was seen: outcome, figures, samples.
 
         Raises:
             RefusedError: The check refuses it: joint, point, value and limit are in the error; nothing was sent.
+            StoppedError: Somebody stopped it on its way; ``run`` of the error is what was seen until then.
             FaultError, DeviceError, NoLinkError: It ended in an error; the message says whether the arm may be moving, and ``run`` of the
                 error is what was seen until then.
         """
-        trajectory, name = self._trajectory(trajectory, degrees)
-        options = options_of(name, approach, speed, repeat, record, overwrite, accept_device_limits)
-        return followed(Motion(self._link.run(trajectory, options), self._link), progress)
+        begin = functools.partial(
+            self.start,
+            trajectory,
+            approach=approach,
+            speed=speed,
+            repeat=repeat,
+            record=record,
+            overwrite=overwrite,
+            degrees=degrees,
+            accept_device_limits=accept_device_limits,
+        )
+        return followed(self, begin, progress)
 
     async def run_async(self, trajectory: Trajectory | Plan | FilePath, **options: Any) -> Run:
-        """As `run`, for asyncio; a task that is cancelled stops the arm. Options are those of `start`."""
-        motion = self.start(trajectory, **options)
+        """As `run`, for asyncio; whatever ends the task before, stops the arm, and is raised once it stands. Options are those of `start`."""
+        asked = self._link.asked()
+        loop = asyncio.get_running_loop()
+        motion: Motion | None = None
         try:
+            # A file is read, and the controller asked, where nothing else waits for it.
+            motion = await loop.run_in_executor(None, functools.partial(self._start, asked, trajectory, **options))
             while not motion.is_done:
                 await asyncio.sleep(0.02)
-        except asyncio.CancelledError:
-            self.stop()
+        except BaseException as error:
+            if motion is not None or not isinstance(error, Exception):
+                # At once: what is about to begin in the executor was asked for before.
+                self._link.halt()
+                # A coroutine that is thrown away may not wait any more.
+                if not isinstance(error, GeneratorExit):
+                    await asyncio.shield(loop.run_in_executor(None, self._link.rest))
             raise
-        return motion.wait()
+        return motion._ended(False)
 
     def move(
         self,
@@ -240,33 +221,55 @@ class Robot:
 
         Raises:
             RefusedError: The place is outside the limits, cannot be reached, or no torque holds it; nothing was sent.
+            StoppedError: Somebody stopped it on its way; ``run`` of the error is what was seen until then.
         """
         if (to is None) == (flange is None):
             raise UsageError("give either a place or `flange`; nothing was sent", "target")
+        # Before anything that takes time: a Stop meanwhile counts.
+        asked = self._link.asked()
         name = f"move to {to if isinstance(to, str) else 'a place'}"
-        options = options_of(name, False, speed, 1, record, overwrite, accept_device_limits)
-        if to is not None:
-            place = joints_of(self.arm, to, degrees) if isinstance(to, str) or degrees else to
-            motion = self._link.move_to_joints(place, line, options)
-        else:
-            motion = self._link.move_to_flange(flange_of(flange, degrees), line, options)
-        return followed(Motion(motion, self._link), progress)
+        options = options_of(asked, name, False, speed, 1, record, overwrite, accept_device_limits)
+
+        def begin() -> Motion:
+            if isinstance(to, str):
+                native = self._link.move_to_joints(joints_of(self.arm, to, degrees), line, options)
+            elif to is not None:
+                native = self._link.move_to_joints(radians_of(to, degrees), line, options)
+            else:
+                native = self._link.move_to_flange(flange_of(flange, degrees), line, options)
+            return Motion(native, self, asked)
+
+        return followed(self, begin, progress)
 
     def pause(self) -> None:
-        """Pauses on the path."""
+        """Pauses on the path. Where several motions wait for their turn, and the first one ends by then, the next one is paused as it begins."""
         self._link.pause()
 
     def resume(self) -> None:
-        """Goes on after a pause. **The arm moves.**"""
+        """Goes on after a pause, also one that another program or the controller has made. **The arm moves.** A motion that nobody waits for here
+        any more is stopped by the end of the connection."""
         self._link.resume()
 
     def stop(self) -> None:
-        """Stops the arm on its path, whoever moves it; what was asked for before, in whatever thread, is not done any more."""
-        self._link.stop()
+        """Stops the arm on its path, whoever moves it, and waits until it stands; what was asked for before, in whatever thread, is not done any
+        more. Teaching that was switched on here ends.
+
+        The Stop is sent before anything else, whatever the connection is busy with. That nothing moves is no error.
+
+        Raises:
+            NoLinkError: Nothing confirms it; the message says whether the arm may be moving.
+        """
+        try:
+            self._link.stop()
+        finally:
+            self._note_stop()
 
     @property
     def speed(self) -> float:
-        """Speed on the path, 0.01 to 1 of the motion's own; may be set while the arm moves."""
+        """Speed on the path, 0.05 to 1 of the motion's own; may be set while the arm moves.
+
+        The controller keeps it, also for later motions and connections; `Run.notes` says where a motion ran at another one than 1.
+        """
         return self._link.speed()
 
     @speed.setter
@@ -278,12 +281,15 @@ class Robot:
 
         Args:
             velocity: rad/s of all joints (6,), or of `joint` alone.
-            seconds: For how long.
+            seconds: For how long, up to 600.
             joint: The joint, counted from 1.
             degrees: Whether velocities are degrees/s.
 
         Returns:
             Where the arm rests (6,), rad.
+
+        Raises:
+            StoppedError: Somebody stopped the arm meanwhile; it rests.
         """
         rate = np.asarray(velocity, dtype=float)
         if joint is not None:
@@ -296,9 +302,9 @@ class Robot:
 
     @contextlib.contextmanager
     def teach(self) -> Iterator[Teaching]:
-        """The arm can be led by hand while the context lasts, and is held again at its end."""
-        self._link.teach(True)
+        """The arm can be led by hand while the context lasts, and is held again at its end, or as soon as somebody stops it here."""
         try:
+            self._link.teach(True)
             yield Teaching(self._link)
         finally:
             if not self.is_closed:
@@ -307,88 +313,3 @@ class Robot:
     def gripper(self, on: bool) -> None:
         """Pump on or off."""
         self._link.gripper(on)
-
-    # What the controller has
-
-    def push_arm(self, arm: Arm, *, store: bool = False) -> None:
-        """Gives the controller an arm: friction, gains, model; with extensions also its limits and settings, which need Init or Error.
-
-        Args:
-            arm: The arm.
-            store: Whether the controller keeps it over a loss of power.
-        """
-        self._link.push_arm(arm, store)
-
-    def use_defaults(self) -> None:
-        """The controller uses the friction, gains and arm model that are built into it, or that it has stored."""
-        self._link.use_defaults()
-
-    @property
-    def payload(self) -> Payload:
-        """What the controller reckons that the flange carries. Setting it takes half a second to come into the torques; None: nothing."""
-        mass, com, inertia = self._link.payload()
-        return Payload(mass, tuple(com), tuple(inertia))
-
-    @payload.setter
-    def payload(self, payload: Payload | None) -> None:
-        self._link.set_payload((payload or Payload(0.0))._numbers())
-
-    @property
-    def settings(self) -> dict[str, float | list[float]]:
-        """All settings of a controller with extensions, by their names; those of joints are lists of six."""
-        return self._link.settings()
-
-    def set_settings(self, values: Mapping[str, float | Sequence[float]]) -> None:
-        """Changes settings by their names, all or none.
-
-        Raises:
-            UsageError, RefusedError: There is no such setting, or a value is out of its range.
-        """
-        flat: list[tuple[str, int, float]] = []
-        for name, value in values.items():
-            if isinstance(value, Sequence):
-                flat += [(name, joint, float(v)) for joint, v in enumerate(value, 1)]
-            else:
-                flat.append((name, 0, float(value)))
-        self._link.set_settings(flat)
-
-    # What is wrong
-
-    def recover(self, *, arm: Arm | None = None, defaults: bool = False) -> list[str]:
-        """The whole way back to an arm that is held; the steps that were gone, in words.
-
-        Args:
-            arm: Whose parameters a controller is given that has lost them.
-            defaults: Whether it is given those that are built into it.
-        """
-        return self._link.recover(arm, defaults)
-
-    def clear(self) -> None:
-        """Clears the errors of the controller and of all drives."""
-        self._link.clear()
-
-    def disable(self) -> None:
-        """Takes the torque off at rest. **An arm without brakes falls.**"""
-        self._link.disable()
-
-    def flight_log(self) -> FlightLog:
-        """Reads the flight recorder: every tick of the last seconds before the first error."""
-        return FlightLog(self._link.fetch_log())
-
-    def clear_flight_log(self) -> None:
-        """Forgets the log; the recorder begins anew."""
-        self._link.clear_log()
-
-    # What is done to a simulated arm
-
-    def push(self, joint: int, torque: float, seconds: float) -> None:
-        """Somebody pushes a joint (from 1) of the simulated arm: N·m, for so many s."""
-        self._link.simulate(f"push {joint} {torque} {seconds}")
-
-    def lead(self, path: Trajectory | Plan) -> None:
-        """A hand leads the simulated arm along these positions while it is taught."""
-        self._link.lead(path.trajectory if isinstance(path, Plan) else path)
-
-    def inject(self, faults: str) -> None:
-        """Faults of a fault file (TOML, ``jtc help faults``) happen to the simulated arm; times are those since its start, `info["uptime"]`."""
-        self._link.inject(faults)

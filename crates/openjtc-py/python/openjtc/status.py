@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Status:
-    """What the controller reports of itself and the arm.
+    """What the controller reports of itself and the arm. A joint that is silent, or not ready yet, has NaN for what it does not measure.
 
     Attributes:
         state: State of the controller: ``Init``, ``HoldPos``, ``Operate``, ``Teaching``, ``Error`` …

@@ -1,6 +1,6 @@
 //! What the worker has: the port, the session over it, and the arm that motions are checked against.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -11,12 +11,13 @@ use jtc_client::{AgentPort, Options};
 use jtc_core::Payload;
 use jtc_host::port::SerialPort;
 use jtc_host::port::sim::SimPort;
-use jtc_host::recording::SampleSink;
 use jtc_host::session::BRING_UP;
-use jtc_host::{Arm, Port, PortError, Sample, Session};
+use jtc_host::{Arm, Port, Sample, Session};
 use jtc_sim::{FaultPlan, SimConfig, World};
 
-use super::worker::{Asked, Shared, lock};
+use super::port::{AnyPort, Line};
+use super::shared::{Asked, Shared};
+use super::tape::Tape;
 use crate::error::Failure;
 
 /// How long a status is waited for while nothing else is to do.
@@ -59,103 +60,6 @@ pub struct Target {
     pub certificates: Option<PathBuf>,
 }
 
-/// A port of any kind; a simulator remains one, and is touched whatever the session does.
-pub enum AnyPort {
-    Simulated(Box<SimPort>, Arc<Shared>),
-    Other(Box<dyn Port>),
-}
-
-macro_rules! each_port {
-    ($port:ident, $own:ident => $do:expr) => {
-        match $own {
-            AnyPort::Simulated($port, _) => $do,
-            AnyPort::Other($port) => $do,
-        }
-    };
-}
-
-impl Port for AnyPort {
-    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
-        if let AnyPort::Simulated(port, shared) = self {
-            for touch in std::mem::take(&mut *lock(&shared.touches)) {
-                touch(port.world_mut());
-            }
-        }
-        each_port!(port, self => port.read(buffer, timeout))
-    }
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        each_port!(port, self => port.write_all(bytes))
-    }
-    fn now(&self) -> Duration {
-        each_port!(port, self => port.now())
-    }
-    fn baud(&self) -> Option<u32> {
-        each_port!(port, self => port.baud())
-    }
-    fn name(&self) -> String {
-        each_port!(port, self => port.name())
-    }
-    fn take_denial(&mut self) -> Option<String> {
-        each_port!(port, self => port.take_denial())
-    }
-    fn ask_to_move(&mut self) -> Result<(), PortError> {
-        each_port!(port, self => port.ask_to_move())
-    }
-}
-
-/// What is recorded of a motion.
-#[derive(Default)]
-pub struct Tape {
-    on: Cell<bool>,
-    zero: Cell<Option<f64>>,
-    samples: RefCell<Vec<Sample>>,
-    sink: RefCell<Option<SampleSink>>,
-}
-
-impl Tape {
-    /// From now on samples are kept, and written where there is a file; those before stay.
-    pub fn record(&self, sink: Option<SampleSink>) {
-        self.on.set(true);
-        self.zero.set(None);
-        *self.sink.borrow_mut() = sink;
-    }
-
-    /// Takes a sample on a clock of its own; the recording's begins at 0, and a further motion behind the last one.
-    pub fn push(&self, sample: &Sample) {
-        if !self.on.get() {
-            return;
-        }
-        let zero = self.zero.get().unwrap_or_else(|| {
-            let last = self.samples.borrow().last().map_or(0.0, |last| last.time_s + 1e-3);
-            let zero = sample.time_s - last;
-            self.zero.set(Some(zero));
-            zero
-        });
-        let sample = Sample { time_s: sample.time_s - zero, ..*sample };
-        if let Some(sink) = &*self.sink.borrow() {
-            sink.write(&sample);
-        }
-        self.samples.borrow_mut().push(sample);
-    }
-
-    /// A sample that was kept before stays.
-    pub fn keep(&self, sample: &Sample) {
-        self.samples.borrow_mut().push(*sample);
-    }
-
-    /// Nothing more is kept.
-    pub fn pause(&self) {
-        self.on.set(false);
-        self.sink.borrow_mut().take();
-    }
-
-    /// What was kept.
-    pub fn take(&self) -> Vec<Sample> {
-        self.pause();
-        self.samples.take()
-    }
-}
-
 /// What the worker has.
 pub struct Machine {
     pub session: Session<AnyPort>,
@@ -167,10 +71,8 @@ pub struct Machine {
     pub tape: Rc<Tape>,
     /// Real time goes on without us.
     time_passes: bool,
-    /// Teaching was switched on here.
+    /// Teaching was switched on here, or may have been.
     pub teaching: bool,
-    /// A motion was started here and did not end yet.
-    pub in_motion: bool,
 }
 
 impl Machine {
@@ -182,16 +84,15 @@ impl Machine {
             Way::Simulated(simulated) => {
                 let speed = simulated.speed;
                 let (port, stored) = simulator(*simulated, &arm, &target.arm, &tape, &pace)?;
-                (AnyPort::Simulated(Box::new(port), Arc::clone(&shared)), Some(speed), stored)
+                (Line::Simulated(Box::new(port)), Some(speed), stored)
             }
-            Way::Agent { ref url } => (AnyPort::Other(agent(url, &target)?), None, false),
-            Way::Serial { ref path, baud } => (AnyPort::Other(serial(path, baud, &target)?), None, false),
+            Way::Agent { ref url } => (Line::Other(agent(url, &target)?), None, false),
+            Way::Serial { ref path, baud } => (Line::Other(serial(path, baud, &target)?), None, false),
         };
         let time_passes = speed.is_none_or(|speed| speed.is_some());
-        let session = Session::new(port);
+        let session = Session::new(AnyPort::new(port, Arc::clone(&shared)));
         let named = target.arm.is_some();
-        let mut machine =
-            Self { session, arm, named, shared, tape, time_passes, teaching: false, in_motion: false };
+        let mut machine = Self { session, arm, named, shared, tape, time_passes, teaching: false };
         machine.observe();
         if let Some(speed) = speed {
             machine.bring_up(stored, asked)?;
@@ -212,7 +113,22 @@ impl Machine {
             let set = self.arm.parameter_set();
             self.session.push_until(&set, || asked.is_halted(), |_| {})?;
         }
-        self.session.wait_ready(2 * BRING_UP)?;
+        self.session.wait_ready_until(2 * BRING_UP, || asked.is_halted())?;
+        Ok(())
+    }
+
+    /// Where the port leads.
+    pub fn port_name(&self) -> String {
+        self.session.port().name()
+    }
+
+    /// Something that was asked for begins: frames that move the arm pass as long as nobody stops it. What comes back of a Stop before it is no
+    /// answer to it.
+    pub fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
+        self.session.port_mut().begin(asked.at());
+        if let Some(time) = self.session.port().unsettled() {
+            self.session.pass(time)?;
+        }
         Ok(())
     }
 
@@ -242,23 +158,30 @@ impl Machine {
             Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
             Some(_) => self.session.device_arm()?,
         };
-        if self.named {
-            let differences = self.arm.differences(&arm);
-            if let Some(first) = differences.first() {
-                return Err(Failure::refused(
-                    "other-arm",
-                    format!(
-                        "the controller has another arm than {}: {} differences, the first is {first}; nothing was sent",
-                        self.arm.name,
-                        differences.len()
-                    ),
-                    "`robot.push_arm(arm)` gives it this one, in Init or Error; without `arm=` the controller's own counts",
-                ));
-            }
-        }
         // No controller has poses.
         arm.poses = self.arm.poses.clone();
         Ok(arm)
+    }
+
+    /// The same for what moves the arm: an error where another one was named than the controller has.
+    pub fn arm_to_move(&mut self) -> Result<Arm, Failure> {
+        let arm = self.device_arm()?;
+        let differences = if self.named { self.arm.differences(&arm) } else { Vec::new() };
+        let Some(first) = differences.first() else { return Ok(arm) };
+        Err(Failure::refused(
+            "other-arm",
+            format!(
+                "the controller has another arm than {}: {} differences, the first is {first}; nothing was sent",
+                self.arm.name,
+                differences.len()
+            ),
+            "`robot.push_arm(arm)` gives it this one, in Init or Error; without `arm=` the controller's own counts",
+        ))
+    }
+
+    /// An error where another arm was named than the controller has.
+    pub fn same_arm(&mut self) -> Result<(), Failure> {
+        if self.named { self.arm_to_move().map(drop) } else { Ok(()) }
     }
 }
 

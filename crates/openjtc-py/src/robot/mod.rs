@@ -1,73 +1,50 @@
 //! A connection to a controller: one thread has the conversation, Python's threads ask it.
 
+mod acts;
+mod followed;
 pub mod machine;
 pub mod motion;
+mod port;
 mod questions;
+mod recording;
+mod shared;
+mod tape;
 mod worker;
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
 use jtc_core::JOINTS;
-use jtc_host::Port as _;
 use jtc_host::plan::kinematics::{Orientation, Target as Place};
 use jtc_host::session::Flow;
 use jtc_sim::FaultPlan;
-use jtc_wire::{ControllerState, TrajectoryState};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arm::Arm;
-use crate::array;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
-use crate::run::Samples;
 use crate::trajectory::Trajectory;
+use crate::{array, number};
+use followed::Motion;
 use machine::{Machine, Simulated, Target, Way};
-use motion::{Course, Order, Ran};
+use motion::{Course, Order};
 pub use questions::samples as samples_of;
-use worker::{Asked, Wish, Worker, lock};
+use shared::{Asked, Wish};
+use worker::{Waited, Worker, lock};
 
 /// How often is looked for the next status of a motion.
 const LOOK: Duration = Duration::from_millis(2);
+/// Longest jog, s.
+const JOG_MAX: f64 = 600.0;
+/// Longest recording of teaching, s.
+const TEACH_MAX: f64 = 3600.0;
 
 /// The connection; `openjtc.Robot` is what people use.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Link {
     worker: Worker,
-}
-
-/// A motion that was begun.
-#[pyclass(frozen, module = "openjtc._native")]
-pub struct Motion {
-    link: Py<Link>,
-    came: Mutex<Option<Receiver<Result<Ran, Failure>>>>,
-}
-
-#[pymethods]
-impl Motion {
-    /// What came of it: the samples, and the error that ended it; `None` when it is not over within this time (s).
-    #[pyo3(signature = (timeout=None))]
-    fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<(Samples, Option<Py<PyAny>>)>> {
-        let Some(came) = lock(&self.came).take() else {
-            return Err(Failure::usage("what came of this motion was taken already").into());
-        };
-        let longest = timeout.map(|s| Duration::from_secs_f64(s.clamp(0.0, 1e6)));
-        match self.link.get().worker.wait_for(py, came, longest)? {
-            Err(came) => {
-                *lock(&self.came) = Some(came);
-                Ok(None)
-            }
-            Ok(ran) => {
-                let mut ran = ran?;
-                let error = ran.failure.take().map(|failure| PyErr::from(failure).into_value(py).into_any());
-                Ok(Some((Samples::of_run(ran), error)))
-            }
-        }
-    }
 }
 
 /// What a motion is run with.
@@ -81,13 +58,18 @@ struct Options {
     accept_device_limits: bool,
     record: Option<PathBuf>,
     overwrite: bool,
+    asked: u64,
 }
 
 impl Options {
-    fn order(self, course: Course) -> Order {
-        let Self { name, approach, speed, repeat, accept_device_limits, record, overwrite } = self;
+    fn begin(self, link: &Bound<'_, Link>, course: Course) -> Result<Motion, Failure> {
+        let Self { name, approach, speed, repeat, accept_device_limits, record, overwrite, asked } = self;
+        number::within(speed, 1.0..=100.0, "speed", "%")?;
+        number::within(repeat.into(), 1.0..=f64::from(u32::MAX), "repeat", "")?;
         let record = record.map(|path| (path, overwrite));
-        Order { course, name, approach, speed, repeat, accept_device_limits, record }
+        let progress = Arc::<Mutex<_>>::default();
+        let order = Order { course, name, approach, speed, repeat, accept_device_limits, record, progress };
+        Motion::begin(link, order, asked)
     }
 }
 
@@ -100,39 +82,32 @@ impl Link {
         self.worker.call(py, job)
     }
 
-    fn begin(slf: &Bound<'_, Self>, order: Order) -> Result<Motion, Failure> {
-        let worker = &slf.get().worker;
-        worker.shared.report("waiting", 0.0, 0.0);
-        let came = worker.ask(move |machine, asked| {
-            if asked.is_halted() {
-                return Err(jtc_host::Error::Cancelled.into());
-            }
-            machine.run(&order, asked)
-        })?;
-        Ok(Motion { link: slf.clone().unbind(), came: Mutex::new(Some(came)) })
+    /// A run was asked for and is not over: the connection's thread has no time for questions.
+    fn is_running(&self) -> bool {
+        self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Of a run that is on its way, once its arm moves; or else of what the controller does.
+    /// Of the run that is on its way or waits for its turn, once its arm moves; or else of what the controller does.
     fn wish(
         &self,
         py: Python<'_>,
         flow: Flow,
         else_do: impl FnOnce(&mut Machine) -> Result<(), Failure> + Send + 'static,
     ) -> PyResult<()> {
-        if !self.worker.shared.running.load(Ordering::SeqCst) {
+        if !self.is_running() {
             return self.call(py, move |machine, _| else_do(machine));
         }
         let (done, came) = mpsc::channel();
-        lock(&self.worker.shared.wishes).push_back(Wish { flow, done });
-        if !self.worker.shared.running.load(Ordering::SeqCst) {
-            lock(&self.worker.shared.wishes).clear();
-        }
-        match self.worker.wait(py, came) {
-            Ok(result) => Ok(result?),
-            Err(_) if !self.worker.is_closed() && py.check_signals().is_ok() => {
+        self.worker.shared.wish(Wish { flow, done });
+        match self.worker.wait_for(py, &Mutex::new(came), None)? {
+            Waited::Came(result) => {
+                self.worker.look_for_signals(py)?;
+                Ok(result?)
+            }
+            Waited::NotYet | Waited::Gone if self.worker.is_closed() => Err(worker::closed().into()),
+            Waited::NotYet | Waited::Gone => {
                 Err(Failure::refused("not-moving", "the motion was over before", "").into())
             }
-            Err(error) => Err(error),
         }
     }
 }
@@ -189,24 +164,33 @@ impl Link {
         self.worker.is_closed()
     }
 
+    /// How many Stops there were: what was asked for before the next one is not done after it.
+    fn asked(&self) -> u64 {
+        self.worker.shared.halts()
+    }
+
+    /// What was asked for so far is over, and what moves here is stopped; nothing is waited for.
+    fn halt(&self) {
+        self.worker.shared.halt();
+    }
+
+    /// The same, and what moves here stands by then.
+    fn rest(&self, py: Python<'_>) {
+        self.worker.rest(py);
+    }
+
     /// Stops what moves here, switches off the teaching that was switched on here, and ends the connection.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         if self.worker.is_closed() {
             return Ok(());
         }
         self.worker.shared.halt();
-        let ended = self.call(py, |machine, _| {
-            let stopped = if machine.in_motion { machine.stop() } else { Ok(()) };
-            let held =
-                if machine.teaching { machine.session.teach(false).map_err(Into::into) } else { Ok(()) };
-            stopped.and(held)
-        });
-        self.worker.end(py);
-        ended
+        let rested = self.worker.call_always(py, Machine::rest);
+        self.worker.end(py).and(rested)
     }
 
     fn run(slf: &Bound<'_, Self>, trajectory: &Trajectory, options: Options) -> Result<Motion, Failure> {
-        Self::begin(slf, options.order(Course::Along(Arc::clone(&trajectory.inner))))
+        options.begin(slf, Course::Along(Arc::clone(&trajectory.inner)))
     }
 
     fn move_to_joints(
@@ -216,7 +200,7 @@ impl Link {
         options: Options,
     ) -> Result<Motion, Failure> {
         let target = Place::Joints(array::joints(position, "position")?);
-        Self::begin(slf, options.order(Course::To { target, line }))
+        options.begin(slf, Course::To { target, line })
     }
 
     /// `flange`: x y z (m), roll pitch yaw (rad) in the base frame.
@@ -229,13 +213,7 @@ impl Link {
         let [x, y, z, angles @ ..] = array::joints(flange, "flange")?;
         let pose = Orientation::Rpy(angles).at([x, y, z]);
         let pose = pose.map_err(|error| Failure::usage(error.to_string()))?;
-        Self::begin(slf, options.order(Course::To { target: Place::Flange(pose), line }))
-    }
-
-    /// Phase, how far, of how much.
-    fn progress(&self) -> (&'static str, f64, f64) {
-        let progress = *lock(&self.worker.shared.progress);
-        (progress.phase, progress.done, progress.total)
+        options.begin(slf, Course::To { target: Place::Flange(pose), line })
     }
 
     fn pause(&self, py: Python<'_>) -> PyResult<()> {
@@ -243,143 +221,100 @@ impl Link {
     }
 
     fn resume(&self, py: Python<'_>) -> PyResult<()> {
-        self.wish(py, Flow::Resume, |machine| Ok(machine.session.resume()?))
+        self.wish(py, Flow::Resume, |machine| {
+            machine.same_arm()?;
+            Ok(machine.session.resume()?)
+        })
     }
 
-    /// Stops the arm on its path, whoever moves it; whatever was asked for before is not done any more.
+    /// Stops the arm on its path, whoever moves it, and waits until it stands; whatever was asked for before is not done any more.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.worker.shared.halt();
-        self.call(py, |machine, _| machine.stop())
+        self.worker.shared.stop();
+        self.worker.call_always(py, Machine::stop)
     }
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
-        self.call(py, |machine, _| Ok(machine.session.speed()?))
+        let shared = &self.worker.shared;
+        // A run has no time for questions, and knows it.
+        while self.is_running() {
+            if let Some(speed) = *lock(&shared.speed) {
+                return Ok(speed);
+            }
+            self.worker.pass(py, LOOK)?;
+        }
+        self.call(py, |machine, _| {
+            let speed = machine.session.speed()?;
+            *lock(&machine.shared.speed) = Some(speed);
+            Ok(speed)
+        })
     }
 
     fn set_speed(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
-        if !(0.01..=1.0).contains(&speed) {
-            return Err(Failure::usage(format!("speed: {speed} is outside 0.01..1")).into());
-        }
+        number::within(speed, 0.05..=1.0, "speed", "")?;
         self.wish(py, Flow::Speed((speed * 100.0).round() as u8), move |machine| {
-            Ok(machine.session.set_speed(speed)?)
+            machine.session.set_speed(speed)?;
+            *lock(&machine.shared.speed) = Some(speed);
+            Ok(())
         })
     }
 
     /// Jogs at these velocities (rad/s) for this time; returns where the arm rests (rad).
     fn jog(&self, py: Python<'_>, velocity: &Bound<'_, PyAny>, seconds: f64) -> PyResult<[f64; JOINTS]> {
         let velocity = array::joints(velocity, "velocity")?;
-        let seconds = Duration::from_secs_f64(seconds.clamp(0.0, 600.0));
-        self.call(py, move |machine, asked| machine.jog(&velocity, seconds, asked))
+        let time = number::seconds(seconds, JOG_MAX, "seconds")?;
+        self.call(py, move |machine, asked| machine.jog(&velocity, time, asked))
     }
 
     fn teach(&self, py: Python<'_>, on: bool) -> PyResult<()> {
-        self.call(py, move |machine, asked| {
-            if on {
-                machine.session.teach_until(|| asked.is_halted())?;
-            } else {
-                machine.session.teach(false)?;
-            }
-            machine.teaching = on;
-            Ok(())
-        })
+        if on {
+            return self.call(py, |machine, asked| machine.teach(asked));
+        }
+        self.worker.call_always(py, Machine::hold)
     }
 
-    /// Positions (rad) at their times (s) while the arm is led by hand, for this time.
-    fn record_teaching<'py>(
-        &self,
-        py: Python<'py>,
-        seconds: f64,
-    ) -> PyResult<(Vec<f64>, Bound<'py, numpy::PyArray2<f64>>)> {
-        let seconds = seconds.clamp(0.0, 3600.0);
-        let taught = self.call(py, move |machine, asked| machine.record_teaching(seconds, asked))?;
+    /// Records where the arm is led by hand, for this time (s); `take_taught` has it, also of one that was broken off.
+    fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
+        self.call(py, move |machine, asked| machine.record_teaching(time, asked))
+    }
+
+    /// Times (s) and positions (rad) of what was recorded since the last call.
+    fn take_taught<'py>(&self, py: Python<'py>) -> (Vec<f64>, Bound<'py, numpy::PyArray2<f64>>) {
+        let taught = std::mem::take(&mut *lock(&self.worker.shared.taught));
         let (times, rows): (Vec<f64>, Vec<[f64; JOINTS]>) = taught.into_iter().unzip();
-        Ok((times, array::matrix(py, &rows)))
+        (times, array::matrix(py, &rows))
     }
 
     /// A status that came after this call.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
-        let before = shared.seen.load(Ordering::SeqCst);
+        let before = shared.seen();
         // A run shows each status, and has no time for questions.
-        while shared.running.load(Ordering::SeqCst) {
-            if shared.seen.load(Ordering::SeqCst) != before
+        while self.is_running() {
+            if shared.seen() != before
                 && let Some(status) = *lock(&shared.status)
             {
+                self.worker.look_for_signals(py)?;
                 return questions::status(py, &status);
             }
-            py.detach(|| std::thread::sleep(LOOK));
-            py.check_signals()?;
+            self.worker.pass(py, LOOK)?;
         }
-        let status = self.call(py, |machine, _| Ok(machine.session.fresh_status()?))?;
+        let status = self.worker.call_always(py, |machine| Ok(machine.session.fresh_status()?))?;
         questions::status(py, &status)
     }
 
     /// Waits until the arm is held with all drives enabled, s at most.
     fn wait_ready(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let longest = Duration::from_secs_f64(seconds.clamp(0.0, 600.0));
-        self.call(py, move |machine, _| Ok(machine.session.wait_ready(longest).map(drop)?))
+        let longest = number::timeout(seconds, "timeout")?;
+        self.call(py, move |machine, asked| {
+            Ok(machine.session.wait_ready_until(longest, || asked.is_halted()).map(drop)?)
+        })
     }
 
     /// Where the port leads.
     #[getter]
-    fn port(&self, py: Python<'_>) -> PyResult<String> {
-        self.call(py, |machine, _| Ok(machine.session.port().name()))
-    }
-}
-
-impl Machine {
-    /// Stops whatever moves; that nothing does is no error.
-    fn stop(&mut self) -> Result<(), Failure> {
-        let status = self.session.fresh_status()?;
-        let moves = status.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
-        if status.state == ControllerState::Operate || moves {
-            match self.session.stop() {
-                // It came to its end meanwhile.
-                Err(jtc_host::Error::Link(jtc_host::LinkError::Refused { .. })) => {}
-                done => done?,
-            }
-        }
-        self.in_motion = false;
-        Ok(())
-    }
-
-    fn jog(
-        &mut self,
-        velocity: &[f64; JOINTS],
-        time: Duration,
-        asked: &Asked,
-    ) -> Result<[f64; JOINTS], Failure> {
-        if asked.is_halted() {
-            return Err(jtc_host::Error::Cancelled.into());
-        }
-        self.session.ask_to_move()?;
-        self.session.settle_for_jog()?;
-        let end = self.session.now() + time;
-        let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
-        let rested = self.session.jog_to_rest();
-        jogged?;
-        let still = || Failure::fault("still-moving", "the arm still moves", "press the emergency stop");
-        Ok(rested?.ok_or_else(still)?.positions())
-    }
-
-    fn record_teaching(&mut self, seconds: f64, asked: &Asked) -> Result<Vec<(f64, [f64; JOINTS])>, Failure> {
-        let start = self.session.now();
-        let mut taught = Vec::new();
-        loop {
-            let time = (self.session.now() - start).as_secs_f64();
-            if asked.is_halted() || time >= seconds {
-                return Ok(taught);
-            }
-            let status = self.session.next_status()?;
-            if status.state == ControllerState::Error || status.errors != 0 {
-                let words = jtc_host::words::errors_line(&status);
-                return Err(Failure::fault("run-fault", words, jtc_host::words::next_step(&status)));
-            }
-            if status.state == ControllerState::Teaching {
-                taught.push(((self.session.now() - start).as_secs_f64(), status.positions()));
-            }
-        }
+    fn port(&self) -> &str {
+        &self.worker.port
     }
 }
 

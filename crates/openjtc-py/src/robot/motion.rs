@@ -1,25 +1,28 @@
 //! A motion from the wish to the figures: ready, checked, uploaded, executed, followed.
 
 use std::cell::Cell;
-use std::fs::OpenOptions;
 use std::path::PathBuf;
 use std::rc::Rc;
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
 use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
 use jtc_host::plan::{self, ApproachError, Planner};
-use jtc_host::recording::{Ending, Format, LiveRecorder, RecordingInfo};
+use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, MotionError, Port as _, Sample};
-use jtc_wire::Status;
+use jtc_host::{
+    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError,
+    Sample,
+};
+use jtc_wire::{Status, TrajectoryState};
 
-use super::machine::{AnyPort, Machine};
-use super::worker::{Asked, lock};
+use super::machine::Machine;
+use super::recording::Recording;
+use super::shared::{Asked, Progress};
+use super::worker::lock;
 use crate::error::Failure;
 
 /// Where a motion leads.
@@ -45,10 +48,22 @@ pub struct Order {
     pub accept_device_limits: bool,
     /// A recording, and whether one that is there is written over.
     pub record: Option<(PathBuf, bool)>,
+    /// How far it is, for whoever looks.
+    pub progress: Arc<Mutex<Progress>>,
+}
+
+/// What is run on which arm.
+struct Way<'a> {
+    order: &'a Order,
+    trajectory: &'a Arc<Trajectory>,
+    arm: &'a Arm,
+    options: &'a CheckOptions,
 }
 
 /// What came of it.
 pub struct Ran {
+    /// The controller was sent Execute.
+    moved: bool,
     /// "finished" or "stopped"; "fault" where there is a failure.
     pub outcome: &'static str,
     pub failure: Option<Failure>,
@@ -62,82 +77,49 @@ pub struct Ran {
     pub notes: Vec<String>,
 }
 
-/// A file that is written while the arm moves.
-struct Recording {
-    path: PathBuf,
-    file: Option<std::fs::File>,
-    live: Option<LiveRecorder>,
-}
-
-impl Recording {
-    /// Opened before anything moves.
-    fn open((path, force): &(PathBuf, bool)) -> Result<Self, Failure> {
-        Format::of(path).map_err(|error| Failure::of(&error))?;
-        let mut options = OpenOptions::new();
-        options.write(true);
-        if *force {
-            options.create(true).truncate(true)
-        } else {
-            options.create_new(true)
-        };
-        let file = options.open(path).map_err(|error| {
-            let exists = error.kind() == std::io::ErrorKind::AlreadyExists;
-            let failure = Failure::usage(format!("{}: {error}; nothing was sent", path.display()));
-            if exists { failure.next("name another file, or pass overwrite=True") } else { failure }
-        })?;
-        Ok(Self { path: path.clone(), file: Some(file), live: None })
+impl Order {
+    fn report(&self, phase: &'static str, done: f64, total: f64) {
+        *lock(&self.progress) = Progress { phase, done, total };
     }
 }
 
 impl Machine {
-    /// Runs what was ordered. An error before the arm moves is the caller's own; one in motion is part of what came of it.
+    /// Runs what was ordered. An error before the arm moves is the caller's own; one in motion, or behind it, is part of what came of it.
     pub fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
-        if !(1.0..=100.0).contains(&order.speed) {
-            let error = plan::PlanError::Speed { percent: order.speed, most: 100.0 };
-            return Err(error.into());
+        let recording = order.record.as_ref();
+        let mut recording =
+            recording.map(|(path, overwrite)| Recording::open(path, *overwrite)).transpose()?;
+        let ran = self.run_recorded(order, asked, recording.as_mut());
+        match recording {
+            Some(recording) => recording.end(ran),
+            None => ran,
         }
-        let mut recording = order.record.as_ref().map(Recording::open).transpose()?;
-        self.shared.running.store(true, Ordering::SeqCst);
-        let ran = self.run_recorded(order, asked, &mut recording);
-        self.shared.running.store(false, Ordering::SeqCst);
-        // Who wished something of a run that is over learns that: the other end of the channel is gone.
-        lock(&self.shared.wishes).clear();
-        self.shared.report("", 0.0, 0.0);
-        let Some(Recording { path, file, live }) = recording else { return ran };
-        match (&ran, live) {
-            (Ok(ran), Some(live)) => {
-                let reason = ran.failure.as_ref().map(|failure| failure.message.clone()).unwrap_or_default();
-                let ending = Ending { outcome: ran.outcome.into(), reason, ..Ending::default() };
-                live.finish(&ending).map_err(|error| Failure::of(&error))?;
-            }
-            (_, live) => {
-                // Nothing moved: an empty file is no recording.
-                live.into_iter().for_each(LiveRecorder::abandon);
-                drop(file);
-                let _ = std::fs::remove_file(path);
-            }
-        }
-        ran
     }
 
     fn run_recorded(
         &mut self,
         order: &Order,
         asked: &Asked,
-        recording: &mut Option<Recording>,
+        recording: Option<&mut Recording>,
     ) -> Result<Ran, Failure> {
         self.session.ask_to_move()?;
-        let shared = Arc::clone(&self.shared);
-        let waits = |_| shared.report("waiting", 0.0, 0.0);
-        let mut status = self.session.ready_to_move(waits, || asked.is_halted())?;
-        let arm = self.device_arm()?;
+        let waits = |_| order.report("waiting", 0.0, 0.0);
+        let status = self.session.ready_to_move(waits, || asked.is_halted())?;
+        let arm = self.arm_to_move()?;
         let options = CheckOptions {
             accept_device_limits: order.accept_device_limits,
             device: self.session.device_config()?,
             ..CheckOptions::default()
         };
-        let (trajectory, notes) = trajectory(order, &arm, &options, &status)?;
+        let (trajectory, mut notes) = trajectory(order, &arm, &options, &status)?;
         closed(&trajectory, order, &arm, &options)?;
+        let speed = options.device.speed;
+        *lock(&self.shared.speed) = Some(speed);
+        if speed != 1.0 {
+            notes.push(format!(
+                "the controller ran it at {speed} of its speed, which was set before: `robot.speed = 1` ends that"
+            ));
+        }
         let mut info = RecordingInfo {
             source: self.session.port().name(),
             trajectory: order.name.clone(),
@@ -146,11 +128,12 @@ impl Machine {
             runs: Some(order.repeat),
             ..RecordingInfo::of(&arm)
         };
-        if let AnyPort::Simulated(..) = self.session.port() {
+        if self.session.port().is_simulated() {
             info.start_unix_ns = 0;
         }
         drop(self.tape.take());
         let mut ran = Ran {
+            moved: false,
             outcome: "finished",
             failure: None,
             broken: None,
@@ -161,40 +144,15 @@ impl Machine {
             baud: self.session.port().baud(),
             notes,
         };
-        for number in 0..order.repeat.max(1) {
-            let check =
-                |status: &Status| CheckedTrajectory::check(&trajectory, &arm, &status.positions(), &options);
-            let mut checked = check(&status);
-            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let way = plan::approach(&trajectory, &arm, &status.positions(), order.speed, &options);
-                let way = way.map_err(|error| no_approach(&error))?;
-                if !self.leg(&way, "approach", asked, &mut ran, None)? {
-                    break;
-                }
-                status = self.session.fresh_status()?;
-                checked = check(&status);
-            }
-            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
-            let checked = match checked {
-                Ok(checked) => checked,
-                Err(error) => {
-                    let failure = Failure::from(error);
-                    let failure = if elsewhere {
-                        failure.next("pass approach=True: the arm is moved to the first point")
-                    } else {
-                        failure
-                    };
-                    if number == 0 {
-                        return Err(failure);
-                    }
-                    (ran.outcome, ran.failure) = ("fault", Some(failure));
-                    break;
-                }
-            };
-            if !self.leg(&checked, "motion", asked, &mut ran, recording.as_mut())? {
-                break;
-            }
-            status = self.session.fresh_status()?;
+        let way = Way { order, trajectory: &trajectory, arm: &arm, options: &options };
+        let legs = self.legs(&way, asked, &mut ran, recording, status);
+        self.tape.pause();
+        match legs {
+            Err(failure) if !ran.moved => return Err(failure),
+            // Between two motions: that somebody stopped the arm is no failure of the run.
+            Err(_) if asked.is_halted() && ran.outcome == "finished" => ran.outcome = "stopped",
+            Err(failure) => (ran.outcome, ran.failure) = ("fault", Some(failure)),
+            Ok(()) => {}
         }
         ran.link = self.session.statistics();
         ran.samples = self.tape.take();
@@ -206,43 +164,71 @@ impl Machine {
         Ok(ran)
     }
 
+    /// Each motion with the approach to it, from the status that was seen last.
+    fn legs(
+        &mut self,
+        way: &Way<'_>,
+        asked: &Asked,
+        ran: &mut Ran,
+        mut recording: Option<&mut Recording>,
+        mut status: Status,
+    ) -> Result<(), Failure> {
+        let Way { order, trajectory, arm, options } = way;
+        for _ in 0..order.repeat {
+            let check =
+                |status: &Status| CheckedTrajectory::check(trajectory, arm, &status.positions(), options);
+            let mut checked = check(&status);
+            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
+                let approach = plan::approach(trajectory, arm, &status.positions(), order.speed, options);
+                let approach = approach.map_err(|error| no_approach(&error))?;
+                if !self.leg(&approach, (order, "approach"), asked, ran, None)? {
+                    return Ok(());
+                }
+                status = self.session.fresh_status()?;
+                checked = check(&status);
+            }
+            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
+            let checked = checked.map_err(|error| {
+                let failure = Failure::from(error);
+                if elsewhere {
+                    failure.next("pass approach=True: the arm is moved to the first point")
+                } else {
+                    failure
+                }
+            })?;
+            if !self.leg(&checked, (order, "motion"), asked, ran, recording.as_deref_mut())? {
+                return Ok(());
+            }
+            status = self.session.fresh_status()?;
+        }
+        Ok(())
+    }
+
     /// Uploads and executes one motion; false where it did not come to its end.
     fn leg(
         &mut self,
         checked: &CheckedTrajectory,
-        phase: &'static str,
+        (order, phase): (&Order, &'static str),
         asked: &Asked,
         ran: &mut Ran,
         recording: Option<&mut Recording>,
     ) -> Result<bool, Failure> {
         let shared = Arc::clone(&self.shared);
         let upload = self.session.upload(checked, |progress| {
-            shared.report("upload", progress.segments_done as f64, progress.segments as f64);
+            order.report("upload", progress.segments_done as f64, progress.segments as f64);
             if asked.is_halted() { Flow::Cancel } else { Flow::Continue }
-        })?;
-        if asked.is_halted() {
-            return Err(Error::Cancelled.into());
+        });
+        // Why it broke off is known where somebody has stopped the arm.
+        asked.check()?;
+        ran.upload = Some(upload?);
+        if phase == "motion" {
+            let sink = recording.map(|recording| recording.sink(&ran.info)).transpose()?;
+            self.tape.record(sink.flatten());
         }
-        ran.upload = Some(upload);
-        let motion = phase == "motion";
-        if motion {
-            let sink = match recording {
-                None => None,
-                Some(recording) => {
-                    if let Some(file) = recording.file.take() {
-                        let live = LiveRecorder::begin(file, &recording.path, &ran.info, |_| {});
-                        recording.live = Some(live.map_err(|error| Failure::of(&error))?);
-                    }
-                    recording.live.as_ref().map(LiveRecorder::sink)
-                }
-            };
-            self.tape.record(sink);
-        }
-        let simulated = matches!(self.session.port(), AnyPort::Simulated(..));
+        let simulated = self.session.port().is_simulated();
         let (tape, total) = (Rc::clone(&self.tape), checked.trajectory().duration_s());
         // Both callbacks have it, one after the other.
         let current = Cell::new(None);
-        self.in_motion = true;
         let outcome = self.session.run_unkept(
             checked,
             move |sample| {
@@ -253,7 +239,7 @@ impl Machine {
             },
             |status| {
                 shared.publish(status);
-                shared.report(phase, f64::from(status.point) * 1e-3, total);
+                order.report(phase, f64::from(status.point) * 1e-3, total);
                 if asked.is_halted() {
                     return Flow::Stop;
                 }
@@ -263,7 +249,10 @@ impl Machine {
                     wish.flow
                 })
             },
-            |_, did| {
+            |flow, did| {
+                if let (Flow::Speed(percent), Ok(())) = (flow, did) {
+                    *lock(&shared.speed) = Some(f64::from(percent) / 100.0);
+                }
                 if let Some(done) = current.take() {
                     let came = match did {
                         Ok(()) => Ok(()),
@@ -276,11 +265,22 @@ impl Machine {
         );
         self.observe();
         self.tape.pause();
-        let lost = matches!(&outcome, Err(Error::Motion(MotionError::LinkLost { .. })));
-        self.in_motion = lost;
+        if let Err(Error::Link(LinkError::Port(PortError::Halted))) = outcome {
+            // Stopped before it began.
+            self.shared.set_moves(false);
+            return Err(Error::Cancelled.into());
+        }
+        ran.moved = true;
+        self.shared.set_moves(outcome.as_ref().is_err_and(|error| self.may_move(error)));
         match outcome {
             Ok(Outcome::Finished(_)) => return Ok(true),
-            Ok(Outcome::Stopped(_)) => ran.outcome = "stopped",
+            Ok(Outcome::Stopped(_)) => {
+                ran.outcome = "stopped";
+                if !asked.is_halted() {
+                    // Somebody else did: what waits here was asked for before that, too.
+                    self.shared.halt();
+                }
+            }
             Err(error) => {
                 ran.outcome = "fault";
                 let samples = self.tape.take();
@@ -299,6 +299,13 @@ impl Machine {
             }
         }
         Ok(false)
+    }
+
+    /// A run has ended in this error, and its motion may go on all the same: on its way, or paused and resumed by whoever does that.
+    fn may_move(&self, error: &Error) -> bool {
+        let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
+        matches!(error, Error::Motion(MotionError::LinkLost { .. }))
+            || self.session.last().is_some_and(|status| status.trajectory.is_in(&goes_on))
     }
 }
 

@@ -4,12 +4,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use jtc_core::settings;
+use jtc_core::{JOINTS, settings};
 use jtc_host::log::Account;
+use jtc_host::sample::is_measured;
 use jtc_host::session::ParameterSource;
-use jtc_host::{doctor, words};
+use jtc_host::{StateError, doctor, words};
 use jtc_sim::{HandPath, TypedEvent};
-use jtc_wire::{SettingValue, Status};
+use jtc_wire::{Joint, SettingValue, Status};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -17,7 +18,7 @@ use pyo3::types::{PyDict, PyList};
 use super::Link;
 use crate::arm::Arm;
 use crate::dynamics::{PayloadNumbers, payload};
-use crate::error::Failure;
+use crate::error::{Failure, in_python};
 use crate::log::FlightLog;
 use crate::run::Samples;
 use crate::trajectory::Trajectory;
@@ -26,26 +27,34 @@ use crate::{array, json};
 /// How long a doctor looks.
 const LOOK: Duration = Duration::from_millis(1500);
 
-/// A status as plain values.
+/// Where every joint is measured (rad).
+fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
+    match Joint::ALL.into_iter().find(|joint| !is_measured(status, joint.index())) {
+        Some(joint) => Err(StateError::NotMeasured { joint }),
+        None => Ok(status.positions()),
+    }
+}
+
+/// A status as plain values; NaN where a joint does not report what it measures.
 pub fn status<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("state", status.state.name())?;
     all.set_item("trajectory", status.trajectory.name())?;
     all.set_item("point", status.point)?;
     let joints = &status.joints;
-    let column = |of: fn(&jtc_wire::JointStatus) -> f32| {
-        PyArray1::from_slice(py, &joints.each_ref().map(|joint| f64::from(of(joint))))
+    let column = |of: fn(&jtc_wire::JointStatus) -> f64| {
+        let value = |j: usize| if is_measured(status, j) { of(&joints[j]) } else { f64::NAN };
+        PyArray1::from_slice(py, &std::array::from_fn::<f64, JOINTS, _>(value))
     };
-    all.set_item("position", column(|joint| joint.position))?;
-    all.set_item("velocity", column(|joint| joint.velocity))?;
-    all.set_item("torque", column(|joint| joint.torque))?;
-    let temperature = joints.each_ref().map(|joint| f64::from(joint.temperature));
-    all.set_item("temperature", PyArray1::from_slice(py, &temperature))?;
+    all.set_item("position", column(|joint| joint.position.into()))?;
+    all.set_item("velocity", column(|joint| joint.velocity.into()))?;
+    all.set_item("torque", column(|joint| joint.torque.into()))?;
+    all.set_item("temperature", column(|joint| joint.temperature.into()))?;
     all.set_item("joint_states", joints.each_ref().map(|joint| joint.state.name()).to_vec())?;
     all.set_item("errors", words::causes(status))?;
     all.set_item("warnings", words::warnings(status))?;
     all.set_item("waiting_for", words::waiting_for(status))?;
-    all.set_item("next", words::next_step(status))?;
+    all.set_item("next", in_python(words::next_step(status)))?;
     Ok(all)
 }
 
@@ -170,13 +179,15 @@ impl Link {
             })?;
             given.push(SettingValue { setting: setting.number, joint, value });
         }
-        self.call(py, move |machine, _| Ok(machine.session.set_settings(&given)?))
+        // Checked whole before anything is sent.
+        self.call(py, move |machine, _| Ok(machine.session.change_settings(&given)?))
     }
 
     /// What `jtc doctor` finds, the worst first.
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = self.call(py, |machine, _| {
-            let seen = machine.session.examine(LOOK)?;
+        let found = self.call(py, |machine, asked| {
+            let seen = machine.session.examine_until(LOOK, || asked.is_halted())?;
+            asked.check()?;
             Ok(doctor::findings(&seen))
         })?;
         Ok(json::plain(py, &found)?)
@@ -184,8 +195,8 @@ impl Link {
 
     /// The flight recorder, run again.
     fn fetch_log(&self, py: Python<'_>) -> PyResult<FlightLog> {
-        let account = self.call(py, |machine, _| {
-            let log = machine.session.fetch_log(|_, _| {})?;
+        let account = self.call(py, |machine, asked| {
+            let log = machine.session.fetch_log_until(|| asked.is_halted(), |_, _| {})?;
             let source = jtc_host::Port::name(machine.session.port());
             Ok(Account::of(log, None, &source))
         })?;
@@ -208,11 +219,11 @@ impl Link {
         let start = start.map(|start| array::joints(start, "start")).transpose()?;
         let trajectory = Arc::clone(&trajectory.inner);
         let verdict = self.call(py, move |machine, _| {
-            let arm = machine.device_arm()?;
+            let arm = machine.arm_to_move()?;
             let device = machine.session.device_config()?;
             let start = match start {
                 Some(start) => start,
-                None => machine.session.fresh_status()?.positions(),
+                None => measured(&machine.session.fresh_status()?)?,
             };
             let options =
                 jtc_host::CheckOptions { accept_device_limits, device, ..jtc_host::CheckOptions::default() };

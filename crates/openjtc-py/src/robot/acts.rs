@@ -1,0 +1,150 @@
+//! What moves the arm without a trajectory, and what brings it to rest.
+
+use std::time::Duration;
+
+use jtc_core::JOINTS;
+use jtc_host::error::Facts;
+use jtc_host::{Error, LinkError, Port as _, PortError, words};
+use jtc_wire::{ControllerState, TrajectoryState, fixed};
+
+use super::machine::Machine;
+use super::shared::Asked;
+use super::worker::lock;
+use crate::error::Failure;
+
+/// Longest from a Stop until the arm stands: half a second, or a second where the full torque brakes (J-33).
+const STANDSTILL: Duration = Duration::from_secs(5);
+/// From the last sample of a recording of teaching until no teaching is found to go on.
+const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
+
+/// Somebody stopped the arm, and whoever waits for what it did learns that.
+pub fn stopped(what: &str) -> Failure {
+    Failure::fault(
+        "stopped",
+        format!("{what}: the arm was stopped"),
+        "find out who stopped it, and why; what is asked for from now on is done",
+    )
+}
+
+impl Machine {
+    /// Stops whatever moves and waits until it stands; that nothing does is no error. Who stops an arm wants it held: teaching that was switched on
+    /// here ends.
+    pub fn stop(&mut self) -> Result<(), Failure> {
+        self.session.port_mut().take_over();
+        // Before anything is asked: a line that returns nothing may still carry it.
+        let stopped = match self.session.stop() {
+            // There is nothing to stop.
+            Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
+            done => done,
+        };
+        let held = self.hold();
+        stopped?;
+        self.session.wait_for("standstill", STANDSTILL, |status| !status.is_executing())?;
+        self.shared.set_moves(false);
+        held
+    }
+
+    /// The same of what moves here, and of nothing else.
+    pub fn rest(&mut self) -> Result<(), Failure> {
+        if self.shared.moves() { self.stop() } else { self.hold() }
+    }
+
+    /// Ends the teaching that was switched on here.
+    pub fn hold(&mut self) -> Result<(), Failure> {
+        if self.teaching {
+            self.session.teach(false)?;
+            self.teaching = false;
+        }
+        Ok(())
+    }
+
+    /// Something here broke: a last Stop, for which nothing is waited.
+    pub fn abandon(&mut self) {
+        let port = self.session.port_mut();
+        let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
+        let due = [self.shared.moves(), self.teaching];
+        for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
+            // What cannot be sent is not sent: there is nobody to report it to.
+            let _ = port.write_all(frame);
+        }
+    }
+
+    /// What was begun here has ended, as far as statuses show it.
+    pub fn look(&mut self) {
+        if !self.shared.moves() || !self.session.port().is_shown() {
+            return;
+        }
+        let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
+        if self.session.last().is_some_and(|status| !status.trajectory.is_in(&goes_on)) {
+            self.shared.set_moves(false);
+        }
+    }
+
+    /// Jogs at these velocities (rad/s) for this time, then waits until the arm rests; where (rad).
+    pub fn jog(
+        &mut self,
+        velocity: &[f64; JOINTS],
+        time: Duration,
+        asked: &Asked,
+    ) -> Result<[f64; JOINTS], Failure> {
+        self.same_arm()?;
+        self.session.ask_to_move()?;
+        self.session.settle_for_jog_until(|| asked.is_halted())?;
+        let end = self.session.now() + time;
+        let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
+        // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
+        let rested = self.session.jog_to_rest();
+        if let Ok(Some(_)) = rested {
+            self.shared.set_moves(false);
+        }
+        match jogged {
+            Err(Error::Link(LinkError::Port(PortError::Halted))) | Ok(()) if asked.is_halted() => {
+                rested?;
+                return Err(stopped("jogging ended early"));
+            }
+            jogged => jogged?,
+        }
+        let still = || Failure::fault("still-moving", "the arm still moves", "press the emergency stop");
+        Ok(rested?.ok_or_else(still)?.positions())
+    }
+
+    /// The arm can be led by hand from now on.
+    pub fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
+        self.same_arm()?;
+        let before = self.teaching;
+        // Whatever comes of it, the end of the connection ends it, too.
+        self.teaching = true;
+        let begun = self.session.teach_until(|| asked.is_halted());
+        if let Err(Error::Link(
+            LinkError::Refused { .. } | LinkError::Denied { .. } | LinkError::Port(PortError::Halted),
+        )) = &begun
+        {
+            self.teaching = before;
+        }
+        Ok(begun?)
+    }
+
+    /// Records where the arm is led by hand, for this time, or until somebody stops it.
+    pub fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
+        let start = self.session.now();
+        let mut last = start;
+        while !asked.is_halted() && self.session.now() - start < time {
+            let status = self.session.next_status()?;
+            if status.state == ControllerState::Error || status.errors != 0 {
+                let failure =
+                    Failure::fault("run-fault", words::errors_line(&status), words::next_step(&status));
+                return Err(Failure { facts: Box::new(Facts::of_status(&status)), ..failure });
+            }
+            let now = self.session.now();
+            if status.state == ControllerState::Teaching {
+                last = now;
+                lock(&self.shared.taught).push(((now - start).as_secs_f64(), status.positions()));
+            } else if now - last > TAUGHT_NO_MORE && !asked.is_halted() {
+                let message =
+                    format!("the arm is not taught any more: the controller is in {}", status.state);
+                return Err(Failure::fault("not-teaching", message, "`robot.teach()` begins it again"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,566 @@
+"""What stops an arm, whatever the program does meanwhile: Stop, Ctrl-C, the end of a block, of a motion's waiting and of the program."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import openjtc
+import openjtc.motion
+import pytest
+
+HOME = np.array([0.0, 0.5, -1.0, 0.0, 0.5, 0.0])
+needs_jtc = pytest.mark.skipif("JTC" not in os.environ, reason="the environment names no program jtc")
+
+
+@pytest.fixture
+def live():
+    """One whose time passes, five times faster than the clock."""
+    with openjtc.connect("sim:", speed=5.0) as robot:
+        yield robot
+
+
+@pytest.fixture
+def port(tmp_path: Path):
+    """A simulated controller behind a pseudo-terminal, in a process of its own: it is there when a program has gone."""
+    path = tmp_path / "port"
+    env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
+    serial = [os.environ["JTC"], "sim", "--serial", path]
+    with subprocess.Popen(serial, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=env) as sim:
+        try:
+            assert b"ready" in sim.stdout.readline()
+            with openjtc.connect(str(path)) as robot:
+                robot.use_defaults()
+                robot.wait_ready()
+            yield str(path)
+        finally:
+            sim.terminate()
+
+
+def until(true, seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come true"
+        time.sleep(0.005)
+
+
+def is_moving(robot: openjtc.Robot) -> bool:
+    status = robot.status
+    return status.state == "Operate" and status.point > 200
+
+
+def stands(robot: openjtc.Robot) -> bool:
+    """The arm stands, is held, and stays there."""
+    status = robot.status
+    before, state = status.position, status.state
+    time.sleep(0.15)
+    after = robot.status
+    return state == after.state == "HoldPos" and np.abs(after.position - before).max() < 1e-3
+
+
+class Aside:
+    """Something in a thread of its own, with what it raised."""
+
+    def __init__(self, act) -> None:
+        self.result = self.error = None
+
+        def run() -> None:
+            try:
+                self.result = act()
+            except BaseException as error:
+                self.error = error
+
+        self.thread = threading.Thread(target=run)
+        self.thread.start()
+
+    def join(self) -> None:
+        self.thread.join(30)
+        assert not self.thread.is_alive()
+
+
+def press_when(true) -> Aside:
+    def press() -> None:
+        until(true)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    return Aside(press)
+
+
+def press_after(seconds: float) -> Aside:
+    return Aside(lambda: (time.sleep(seconds), os.kill(os.getpid(), signal.SIGINT)))
+
+
+# What was asked for before a Stop is not done after it.
+
+
+def test_what_waits_for_its_turn_is_not_done_after_a_stop(live, tmp_path: Path):
+    away = live.position + [0.3, 0, 0, 0, 0, 0]
+    plan = live.plan([live.position, away])
+    file = tmp_path / "plan.csv"
+    file.write_text(plan.trajectory.to_csv())
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    acts = {
+        "run": lambda: live.run(file, approach=True),
+        "move": lambda: live.move(np.degrees(away), degrees=True),
+        "disable": live.disable,
+        "use_defaults": live.use_defaults,
+        "gripper": lambda: live.gripper(True),
+        "settings": lambda: live.set_settings({"ramp_ms": 300}),
+        "jog": lambda: live.jog(0.2, 0.5, joint=1),
+        "teach": lambda: live._link.teach(True),
+    }
+    waiting = {name: Aside(act) for name, act in acts.items()}
+    time.sleep(0.3)
+    live.stop()
+    for name, one in waiting.items():
+        one.join()
+        assert isinstance(one.error, openjtc.FaultError) and one.error.code == "cancelled", (name, one.error)
+    assert motion.wait(30).outcome == "stopped"
+    assert stands(live)
+
+
+def test_a_place_by_its_name_is_not_looked_up_first_and_gone_to_after_a_stop(live):
+    arm = openjtc.Arm.parse(openjtc.Arm.avena().to_toml() + '\n[poses]\nup = [0.3, 0.2, -0.4, 0, 0.2, 0]\n')
+    with openjtc.connect("sim:", arm=arm, speed=5.0) as robot:
+        motion = robot.start(openjtc.example("motion"), approach=True)
+        until(lambda: is_moving(robot))
+        waiting = Aside(lambda: robot.move("up"))
+        time.sleep(0.2)
+        motion.stop()
+        waiting.join()
+        assert isinstance(waiting.error, openjtc.FaultError) and waiting.error.code == "cancelled"
+        assert stands(robot)
+        # Looked up before the Stop, and begun after it.
+        asked = robot._link.asked()
+        robot.stop()
+        with pytest.raises(openjtc.FaultError, match="cancelled"):
+            robot._start(asked, robot.plan([robot.position, robot.position + 0.1])).wait(30)
+
+
+def test_a_stop_between_the_upload_and_the_execution_counts(live):
+    plan = live.plan([live.position, HOME])
+    for _ in range(6):
+        motion = live.start(plan)
+        until(lambda: motion.progress[0] in ("upload", "motion", ""))
+        live.stop()
+        try:
+            assert motion.wait(30).outcome == "stopped"
+            plan = live.plan([live.position, HOME])
+        except openjtc.FaultError as error:
+            assert error.code == "cancelled"
+        assert stands(live)
+
+
+# Who stops the arm of whom.
+
+
+def test_a_stop_ends_the_program_that_waits_for_its_motion(live):
+    poses, begun = [HOME, HOME + 0.2, HOME - 0.2, HOME], []
+
+    def cycle() -> None:
+        for pose in poses:
+            begun.append(pose)
+            live.move(pose, speed=30)
+
+    program = Aside(cycle)
+    until(lambda: is_moving(live))
+    live.stop()
+    program.join()
+    error = program.error
+    assert isinstance(error, openjtc.StoppedError) and error.code == "stopped", error
+    assert error.run is not None and error.run.outcome == "stopped" and len(error.run) > 50
+    assert len(begun) == 1 and stands(live)
+
+
+def test_a_motion_that_the_program_stops_itself_is_no_error(live):
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    other = Aside(motion.wait)
+    Aside(motion.stop).join()
+    assert motion.wait(30).outcome == "stopped"
+    other.join()
+    assert other.error is None and other.result.outcome == "stopped"
+    # By a Stop of this thread.
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    live.stop()
+    assert motion.wait(30).outcome == "stopped"
+    # By a Stop of another one.
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    Aside(live.stop).join()
+    with pytest.raises(openjtc.StoppedError):
+        motion.wait(30)
+
+
+def test_a_stop_acts_whatever_the_connection_is_busy_with(live):
+    live.disable()
+    live.use_defaults()
+    # The drives take their time to hold the arm; several wait for that.
+    waiting = [Aside(lambda: live.wait_ready(30)) for _ in range(3)]
+    waiting.append(Aside(live.doctor))
+    time.sleep(0.05)
+    begin = time.monotonic()
+    live.stop()
+    assert time.monotonic() - begin < 1.0
+    for one in waiting:
+        one.join()
+        assert isinstance(one.error, openjtc.FaultError) and one.error.code == "cancelled", one.error
+    live.wait_ready(60)
+
+
+def test_jogging_that_is_stopped_is_an_error_and_the_arm_rests(live):
+    jogging = Aside(lambda: live.jog(0.1, 60.0, joint=1))
+    time.sleep(0.6)
+    live.stop()
+    jogging.join()
+    assert isinstance(jogging.error, openjtc.StoppedError), jogging.error
+    assert stands(live)
+
+
+@needs_jtc
+def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str):
+    def paused() -> None:
+        # A program that ends without a word, while its motion is paused.
+        program = (
+            "import os, sys, time, openjtc\n"
+            "robot = openjtc.connect(sys.argv[1])\n"
+            "motion = robot.start(openjtc.example('motion'), approach=True)\n"
+            "while robot.status.point < 500 or motion.progress[0] != 'motion': pass\n"
+            "robot.pause()\n"
+            "while robot.status.trajectory != 'Pause': pass\n"
+            "os._exit(0)\n"
+        )
+        subprocess.run([sys.executable, "-c", program, port], check=True, timeout=60)
+
+    def look() -> None:
+        with openjtc.connect(port) as robot:
+            assert robot.status.trajectory == "Stop" and stands(robot)
+
+    paused()
+    with openjtc.connect(port) as robot:
+        assert robot.status.trajectory == "Pause"
+        robot.resume()
+        until(lambda: robot.status.trajectory == "Execute")
+    look()
+    paused()
+    with pytest.raises(ZeroDivisionError):
+        with openjtc.connect(port) as robot:
+            robot.resume()
+            1 / 0
+    look()
+    paused()
+    with openjtc.connect(port) as robot:
+        robot.resume()
+        until(lambda: robot.status.trajectory == "Execute")
+        pressed = press_after(0.3)
+        with pytest.raises(KeyboardInterrupt):
+            robot.doctor()
+        pressed.join()
+        assert robot.status.trajectory == "Stop" and stands(robot)
+    # Asked for before a Stop: not resumed after it.
+    paused()
+    with openjtc.connect(port) as robot:
+        doctor = Aside(robot.doctor)
+        time.sleep(0.2)
+        waiting = Aside(robot.resume)
+        time.sleep(0.2)
+        robot.stop()
+        waiting.join()
+        doctor.join()
+        assert waiting.error is not None and robot.status.trajectory == "Stop" and stands(robot)
+
+
+# Status and pause right after the start.
+
+
+def test_a_status_and_a_pause_right_after_the_start_do_not_wait_for_the_end(live):
+    for _ in range(3):
+        motion = live.start(openjtc.example("motion"), approach=True)
+        begin = time.monotonic()
+        assert live.status.state in ("HoldPos", "Operate")
+        assert time.monotonic() - begin < 1.0
+        live.pause()
+        assert not motion.is_done
+        until(lambda: live.status.trajectory == "Pause")
+        motion.stop()
+        assert motion.wait(30).outcome == "stopped"
+
+
+def test_a_second_motion_waits_and_the_first_is_paused(live):
+    motion = live.start(openjtc.example("motion"), approach=True)
+    second = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    # Each has its own.
+    assert motion.progress[0] in ("approach", "upload", "motion") and second.progress[0] == "waiting"
+    begin = time.monotonic()
+    live.speed = 0.5
+    assert live.speed == 0.5 and "simulator" in repr(live)
+    live.pause()
+    assert time.monotonic() - begin < 3.0
+    motion.stop()
+    assert motion.wait(30).outcome == "stopped" and motion.progress[0] == ""
+    with pytest.raises(openjtc.FaultError, match="cancelled"):
+        second.wait(30)
+    live.speed = 1.0
+
+
+def test_several_threads_wait_for_a_motion_and_each_gets_it(live):
+    motion = live.start(live.plan([live.position, HOME], speed=50))
+    waiting = [Aside(motion.wait) for _ in range(3)]
+    time.sleep(0.1)
+    looked = [motion.is_done for _ in range(20)]
+    assert not any(looked)
+    for one in waiting:
+        one.join()
+        assert one.error is None and one.result.outcome == "finished"
+    assert motion.is_done and motion.wait().outcome == "finished"
+
+
+# Ctrl-C.
+
+
+class Pressed:
+    """A bar in whose code Ctrl-C is pressed, or that cannot be drawn."""
+
+    disable = False
+    error: type[BaseException] = KeyboardInterrupt
+
+    def __init__(self, **_: object) -> None:
+        self.n, self.unit, self.looks = 0.0, "", 0
+
+    def __enter__(self) -> Pressed:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def reset(self, **_: object) -> None:
+        pass
+
+    def set_description(self, _: str) -> None:
+        pass
+
+    def refresh(self) -> None:
+        self.looks += 1
+        if self.looks > 10:
+            raise self.error
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_what_breaks_off_the_bar_stops_the_arm(live, monkeypatch: pytest.MonkeyPatch, error: type[BaseException]):
+    monkeypatch.setattr(Pressed, "error", error)
+    monkeypatch.setattr(openjtc.motion, "tqdm", Pressed)
+    with pytest.raises(error):
+        live.run(openjtc.example("motion"), approach=True, progress=True)
+    assert live.status.state == "HoldPos" and stands(live)
+
+
+def test_ctrl_c_with_a_bar_stops_the_arm(live, capsys: pytest.CaptureFixture[str]):
+    pressed = press_when(lambda: is_moving(live))
+    with pytest.raises(KeyboardInterrupt):
+        live.run(openjtc.example("motion"), approach=True, progress=True)
+    pressed.join()
+    assert live.status.state == "HoldPos" and stands(live)
+
+
+def test_ctrl_c_in_a_status_and_a_pause_stops_the_arm_and_stays_what_it_is(live):
+    motion = live.start(openjtc.example("motion"), approach=True)
+    until(lambda: is_moving(live))
+    pressed = press_after(0.3)
+    with pytest.raises(KeyboardInterrupt):
+        while not motion.is_done:
+            live.status
+    pressed.join()
+    assert stands(live) and motion.is_done
+    motion = live.start(openjtc.example("motion"), approach=True)
+    pressed = press_when(lambda: is_moving(live))
+    with pytest.raises(KeyboardInterrupt):
+        while not motion.is_done:
+            live.speed = 0.9
+    pressed.join()
+    assert stands(live)
+    live.speed = 1.0
+
+
+def test_what_came_of_a_motion_is_there_after_ctrl_c(live):
+    motion = live.start(openjtc.example("motion"), approach=True)
+    pressed = press_when(lambda: is_moving(live))
+    with pytest.raises(KeyboardInterrupt):
+        motion.wait()
+    pressed.join()
+    run = motion.wait(1)
+    assert run.outcome == "stopped" and len(run) > 50
+
+
+def test_ctrl_c_ends_waiting_for_what_does_not_come(live):
+    live.disable()
+    pressed = press_after(0.3)
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        live.wait_ready(300)
+        time.sleep(1)
+    pressed.join()
+    assert time.monotonic() - begin < 2.0
+    live.use_defaults()
+    live.wait_ready(60)
+
+
+# Teaching is off when nobody teaches.
+
+
+def test_teaching_ends_with_a_stop_an_error_ctrl_c_and_the_connection(live):
+    with pytest.raises(ZeroDivisionError), live.teach():
+        assert live.status.state == "Teaching"
+        1 / 0
+    until(lambda: live.status.state == "HoldPos")
+    with live.teach() as teaching:
+        stop = Aside(lambda: (time.sleep(0.5), live.stop()))
+        teaching.record(100)
+        stop.join()
+        until(lambda: live.status.state == "HoldPos")
+        assert len(teaching.time) > 5
+        with pytest.raises(openjtc.FaultError, match="not taught"):
+            teaching.record(100)
+    with pytest.raises(KeyboardInterrupt), live.teach() as teaching:
+        press_after(0.5)
+        teaching.record(100)
+    assert len(teaching.time) > 5
+    until(lambda: live.status.state == "HoldPos")
+
+
+@needs_jtc
+def test_teaching_ends_with_the_connection_and_what_was_asked_before_a_stop_does_not_begin_it(port: str):
+    robot = openjtc.connect(port)
+    robot._link.teach(True)
+    assert robot.status.state == "Teaching"
+    robot.close()
+    with openjtc.connect(port) as robot:
+        until(lambda: robot.status.state == "HoldPos")
+        # Stopped while the controller waits with it until the arm rests.
+        jogging = Aside(lambda: robot.jog(0.2, 0.5, joint=1))
+        teaching = Aside(lambda: robot._link.teach(True))
+        time.sleep(0.8)
+        robot.stop()
+        jogging.join()
+        teaching.join()
+        assert teaching.error is not None
+        time.sleep(0.5)
+        assert robot.status.state == "HoldPos"
+
+
+# The end of programs.
+
+
+@needs_jtc
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_program_that_is_told_to_end_stops_its_arm(port: str, number: signal.Signals):
+    program = (
+        "import sys, time, openjtc\n"
+        "motion = openjtc.connect(sys.argv[1]).start(openjtc.example('motion'), approach=True)\n"
+        "while motion.progress[0] != 'motion' or motion.progress[1] < 0.3: pass\n"
+        "print('moves', flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program, port], stdout=subprocess.PIPE) as ran:
+        assert ran.stdout.readline() == b"moves\n"
+        ran.send_signal(number)
+        assert ran.wait(20) == 128 + number
+    with openjtc.connect(port) as robot:
+        assert robot.status.trajectory == "Stop" and stands(robot)
+
+
+@needs_jtc
+def test_a_program_that_keeps_the_motion_alone_stops_it_at_its_end(port: str):
+    program = (
+        "import gc, sys, openjtc\n"
+        "motion = openjtc.connect(sys.argv[1]).start(openjtc.example('motion'), approach=True)\n"
+        "gc.collect()\n"
+        "while motion.progress[0] != 'motion' or motion.progress[1] < 0.3: pass\n"
+    )
+    subprocess.run([sys.executable, "-c", program, port], check=True, timeout=60)
+    with openjtc.connect(port) as robot:
+        assert robot.status.trajectory == "Stop" and stands(robot)
+
+
+def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
+    program = (
+        "import os, openjtc\n"
+        "with openjtc.connect('sim:', speed=5.0) as robot:\n"
+        "    motion = robot.start(openjtc.example('motion'), approach=True)\n"
+        "    while motion.progress[0] != 'motion': pass\n"
+        "    child = os.fork()\n"
+        "    if child == 0:\n"
+        "        assert robot.is_closed\n"
+        "        try:\n"
+        "            robot.status\n"
+        "        except openjtc.NoLinkError as error:\n"
+        "            assert 'process' in error.next\n"
+        "            raise SystemExit(7)\n"
+        "    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"
+        "    assert not robot.is_closed and not motion.is_done\n"
+    )
+    subprocess.run([sys.executable, "-W", "ignore", "-c", program], cwd=tmp_path, check=True, timeout=60)
+
+
+@needs_jtc
+def test_that_the_arm_may_be_moving_is_to_be_seen_in_what_ended_the_block(tmp_path: Path):
+    path = tmp_path / "port"
+    serial = [os.environ["JTC"], "sim", "--serial", path]
+    env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
+    with subprocess.Popen(serial, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=env) as sim:
+        try:
+            assert b"ready" in sim.stdout.readline()
+            has_notes = sys.version_info >= (3, 11)
+            warned = contextlib.nullcontext() if has_notes else pytest.warns(RuntimeWarning, match="MAY BE MOVING")
+            with pytest.raises(ZeroDivisionError) as caught, warned:
+                with openjtc.connect(str(path)) as robot:
+                    robot.use_defaults()
+                    robot.wait_ready()
+                    robot.start(openjtc.example("motion"), approach=True)
+                    until(lambda: is_moving(robot))
+                    sim.kill()
+                    sim.wait()
+                    time.sleep(0.2)
+                    1 / 0
+            if has_notes:
+                assert any("MAY BE MOVING" in note for note in caught.value.__notes__), caught.value.__notes__
+        finally:
+            sim.kill()
+
+
+# asyncio.
+
+
+def test_whatever_ends_a_task_stops_its_arm(live):
+    async def main() -> None:
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(live.run_async(openjtc.example("motion"), approach=True), 0.5)
+        assert stands(live)
+        # Before it has begun at all.
+        task = asyncio.create_task(live.run_async(openjtc.example("motion"), approach=True))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        await asyncio.sleep(0.2)
+        assert stands(live)
+        task = asyncio.create_task(live.run_async(openjtc.example("motion"), approach=True))
+        while not is_moving(live):
+            await asyncio.sleep(0.01)
+        live.stop()
+        with pytest.raises(openjtc.StoppedError):
+            await task
+        with pytest.raises(openjtc.UsageError):
+            await live.run_async(openjtc.example("motion"), repeat=0)
+
+    asyncio.run(main())

@@ -5,17 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import pty
 import signal
 import subprocess
 import sys
 import threading
 import time
+import tty
 from pathlib import Path
 
 import numpy as np
 import openjtc
 import openjtc.motion
 import pytest
+from openjtc.control import encode
+from openjtc.sim import Simulator
 
 HOME = np.array([0.0, 0.5, -1.0, 0.0, 0.5, 0.0])
 needs_jtc = pytest.mark.skipif("JTC" not in os.environ, reason="the environment names no program jtc")
@@ -43,6 +47,54 @@ def port(tmp_path: Path):
             yield str(path)
         finally:
             sim.terminate()
+
+
+class Wire:
+    """A simulated controller at a pseudo-terminal whose bytes are seen, and which can be silenced."""
+
+    def __init__(self) -> None:
+        self.simulator, self.sent, self.is_silent, self.is_over = Simulator(), b"", False, False
+        #: What somebody else sends.
+        self.to_send = b""
+        self.master, self.slave = pty.openpty()
+        tty.setraw(self.master)
+        self.path = os.ttyname(self.slave)
+        os.set_blocking(self.master, False)
+        self.thread = threading.Thread(target=self._pass)
+        self.thread.start()
+
+    def _pass(self) -> None:
+        while not self.is_over:
+            with contextlib.suppress(BlockingIOError):
+                data = os.read(self.master, 4096)
+                self.sent += data
+                self.simulator.write(data)
+            if self.to_send:
+                self.simulator.write(self.to_send)
+                self.to_send = b""
+            self.simulator.step(5)
+            answer = self.simulator.read()
+            if not self.is_silent:
+                os.write(self.master, answer)
+            time.sleep(0.005)
+
+    def stops(self) -> int:
+        return self.sent.count(encode.stop())
+
+    def close(self) -> None:
+        self.is_over = True
+        self.thread.join()
+        os.close(self.master)
+        os.close(self.slave)
+
+
+@pytest.fixture
+def wire():
+    wire = Wire()
+    try:
+        yield wire
+    finally:
+        wire.close()
 
 
 def until(true, seconds: float = 30.0) -> None:
@@ -216,6 +268,57 @@ def test_a_stop_acts_whatever_the_connection_is_busy_with(live):
         one.join()
         assert isinstance(one.error, openjtc.FaultError) and one.error.code == "cancelled", one.error
     live.wait_ready(60)
+
+
+def test_a_stop_is_written_first_of_all(wire: Wire):
+    with openjtc.connect(wire.path) as robot:
+        robot.use_defaults()
+        robot.wait_ready()
+        assert wire.stops() == 0
+        # Nothing moves here, and nothing is asked before it is written.
+        before = len(wire.sent)
+        robot.stop()
+        assert wire.sent[before:].startswith(encode.stop())
+        # While the connection waits for something else; and where nothing comes back, which it says.
+        robot.disable()
+        waiting = Aside(lambda: robot.wait_ready(60))
+        time.sleep(0.2)
+        wire.is_silent, before = True, wire.stops()
+        begin = time.monotonic()
+        stopping = Aside(robot.stop)
+        until(lambda: wire.stops() > before, 0.5)
+        assert time.monotonic() - begin < 0.3
+        stopping.join()
+        waiting.join()
+        assert isinstance(stopping.error, openjtc.NoLinkError) and "stop was sent" in stopping.error.message
+        wire.is_silent = False
+
+
+def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):
+    with openjtc.connect(wire.path) as robot:
+        robot.use_defaults()
+        robot.wait_ready()
+        motion = robot.start(openjtc.example("motion"), approach=True)
+        second = robot.start(openjtc.example("motion"), approach=True)
+        until(lambda: is_moving(robot))
+        # As an agent passes on the Stop of another client.
+        wire.to_send = encode.stop()
+        with pytest.raises(openjtc.StoppedError) as caught:
+            motion.wait(30)
+        assert caught.value.run is not None and caught.value.run.outcome == "stopped"
+        with pytest.raises(openjtc.FaultError, match="cancelled"):
+            second.wait(30)
+        executed = wire.sent.count(encode.execute())
+        assert stands(robot) and wire.sent.count(encode.execute()) == executed
+
+
+def test_an_arm_that_others_move_is_left_alone_by_the_end_of_a_connection(wire: Wire):
+    with openjtc.connect(wire.path) as robot:
+        robot.use_defaults()
+        robot.wait_ready()
+        robot.move(robot.position + [0.05, 0, 0, 0, 0, 0])
+        stops = wire.stops()
+    assert wire.stops() == stops == 0
 
 
 def test_jogging_that_is_stopped_is_an_error_and_the_arm_rests(live):

@@ -1,5 +1,9 @@
-//! `jtc firmware` with drives that are folders; the ST-LINK and its board are in the tests of the library.
+//! `jtc firmware` with drives that are folders, and boards behind pseudo-terminals. All that an ST-LINK may do is in the tests of the
+//! library.
 
+#[cfg(unix)]
+#[path = "firmware/board.rs"]
+mod board;
 mod common;
 
 use std::fs;
@@ -23,18 +27,29 @@ fn image(board: &str) -> Vec<u8> {
     for (at, text) in [(0x40C, "0.2.0"), (0x418, board), (0x430, "0123456789abc")] {
         bytes[at..at + text.len()].copy_from_slice(text.as_bytes());
     }
+    bytes[0x458..0x45C].copy_from_slice(&115_200u32.to_le_bytes());
     bytes[0x600] = 1;
+    bytes[0xFFF] = 1;
+    if board.starts_with("nucleo-h745") {
+        // The program of the second core.
+        bytes.resize(1024 * 1024, 0xFF);
+        for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
+            bytes.extend(word.to_le_bytes());
+        }
+    }
     bytes
 }
 
-/// A drive with this label, an image beside it, and a catalogue that lists the image with a wrong digest.
+/// A drive with this label, an image, and in another folder a catalogue that lists the image with a wrong digest.
 fn desk(label: &str) -> (Dir, String, String) {
     let dir = Dir::new();
     fs::create_dir(dir.path(label)).unwrap();
     dir.file(&format!("{label}/DETAILS.TXT"), "Version: V3J13M4B5S1\n");
     fs::write(dir.path("new.bin"), image(H745)).unwrap();
+    fs::create_dir(dir.path("installed")).unwrap();
+    fs::write(dir.path("installed/new.bin"), image(H745)).unwrap();
     dir.file(
-        "firmware.json",
+        "installed/firmware.json",
         &format!(
             r#"{{"version":"0.2.0","images":[{{"board":"{H745}","file":"new.bin","sha256":"{WRONG}","address":134217728,"bytes":4096}}]}}"#
         ),
@@ -45,7 +60,7 @@ fn desk(label: &str) -> (Dir, String, String) {
 
 fn jtc(dir: &Dir, words: &[&str]) -> CommandOutput {
     let mut jtc: Command = command();
-    jtc.env("OPENJTC_FIRMWARE", dir.path(""));
+    jtc.env("OPENJTC_FIRMWARE", dir.path("installed"));
     run(jtc, words, "")
 }
 
@@ -74,18 +89,38 @@ fn images_and_drives_are_listed() {
 #[test]
 fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let (dir, drive, new) = desk("NOD_H745ZIQ");
-    let words =
-        ["--json", "firmware", "flash", "--image", &new, "--drive", &drive, "--no-read-back", "--wait", "1"];
+    let words = [
+        "--json",
+        "firmware",
+        "flash",
+        "--image",
+        &new,
+        "--drive",
+        &drive,
+        "--no-read-back",
+        "--wait",
+        "1",
+        "--accept-supply",
+    ];
     let refused = json(&jtc(&dir, &words).ends(4));
     assert_eq!(refused["error"]["code"], "not-confirmed-by-person");
+    let question = refused["error"]["message"].as_str().unwrap();
+    assert!(question.contains("safety wires") && question.contains("cut short"), "{question}");
     nothing_written(&drive);
-    let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(0));
-    assert_eq!(
-        (&done["written"], &done["proved"], &done["board"]),
-        (&true.into(), &false.into(), &H745.into())
-    );
-    assert_eq!(done["drive_after"], "stayed");
+    // A drive that stays has not taken the image, and that is no success.
+    let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
+    assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
+}
+
+#[test]
+fn the_supply_of_a_silent_board_has_to_be_answered_for() {
+    let (dir, drive, new) = desk("NOD_H745ZIQ");
+    let words =
+        ["--json", "firmware", "flash", "--image", &new, "--drive", &drive, "--no-read-back", "--yes"];
+    let refused = json(&jtc(&dir, &words).ends(4));
+    assert_eq!(refused["error"]["code"], "other-supply");
+    nothing_written(&drive);
 }
 
 #[test]
@@ -109,6 +144,10 @@ fn what_does_not_fit_is_refused_before_anything_is_written() {
     let text =
         dir.file("text.bin", "this is a text and no program, and long enough for a stack and an entry");
     assert_eq!(flash(&["--image", &text], 2), "no-image");
+    assert_eq!(flash(&["--image", &dir.path("installed/new.bin")], 4), "damaged-image");
+    fs::write(dir.path("cut.bin"), &image(H745)[..0x1000]).unwrap();
+    assert_eq!(flash(&["--image", &dir.path("cut.bin")], 2), "no-image");
+    assert_eq!(flash(&["--image", &new, "--port", "http://127.0.0.1:1"], 2), "usage");
     fs::write(dir.path("ldo.bin"), image("nucleo-h745zi-q-ldo")).unwrap();
     assert_eq!(flash(&["--image", &dir.path("ldo.bin")], 4), "other-board");
     let folder = dir.path("");
@@ -142,4 +181,101 @@ fn a_controller_that_holds_its_arm_or_is_another_one_is_not_reset() {
     // A simulator has no flash.
     let verified = sim.json(&["firmware", "verify", "--image", &new], 5);
     assert_eq!(verified["error"]["code"], "not-reported");
+}
+
+#[cfg(unix)]
+mod with_a_board {
+    use std::time::Duration;
+
+    use cli_kit::trial::Terminal;
+    use common::agent::Agent;
+    use jtc_wire::ControllerState;
+
+    use super::board::{Board, appear, program_of};
+    use super::*;
+
+    /// `jtc firmware flash` of this board's image.
+    fn words<'a>(board: &'a Board, drive: &'a str, new: &'a str) -> Vec<&'a str> {
+        let image =
+            ["firmware", "flash", "--image", new, "--drive", drive, "--accept-supply", "--wait", "60"];
+        [&image[..], &["--port", &board.port]].concat()
+    }
+
+    #[test]
+    fn j67_a_board_is_flashed_and_proves_it() {
+        let (dir, drive, new) = desk("NOD_H745ZIQ");
+        let board = Board::new(H745, Path::new(&drive), image(H745).len());
+        let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
+        let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
+        // The second time it runs the image already; whether that is the board with this drive is not known.
+        for _ in 0..2 {
+            let done = json(&jtc(&dir, &words).ends(0));
+            assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
+            assert_eq!(done["program"]["crc32"], crc32.as_str());
+            assert_eq!((&done["port"], &done["same_device"]), (&board.port.as_str().into(), &Value::Null));
+            assert_eq!((&done["drive_after"], &done["stored_arm"]), (&"came_back".into(), &"kept".into()));
+            assert_eq!(done["doubt"], Value::Null);
+        }
+        let verified = jtc(&dir, &["--json", "firmware", "verify", "--image", &new, "--port", &board.port]);
+        assert_eq!(json(&verified.ends(0))["proved"], true);
+        // And without proof, when the drive has come back.
+        let done = json(&jtc(&dir, &[&words[..], &["--no-read-back"]].concat()).ends(0));
+        assert_eq!((&done["proved"], &done["drive_after"]), (&false.into(), &"came_back".into()), "{done}");
+    }
+
+    #[test]
+    fn what_changes_while_a_person_thinks_is_seen() {
+        let (dir, drive, new) = desk("NOD_H745ZIQ");
+        let board = Board::new(H745, Path::new(&drive), usize::MAX);
+        let answer_after = |meanwhile: &dyn Fn(), says: &str| {
+            let mut command = command();
+            command.env("OPENJTC_FIRMWARE", dir.path("installed")).args(words(&board, &drive, &new));
+            let mut terminal = Terminal::new(1_000, 30);
+            let mut child = terminal.start(&command);
+            terminal.until_it_shows("type yes to go on");
+            meanwhile();
+            std::thread::sleep(Duration::from_millis(200));
+            terminal.press("yes\n");
+            assert_eq!(terminal.ends(&mut child), 4, "{}", terminal.picture.text());
+            assert!(terminal.picture.text().contains(says), "{}", terminal.picture.text());
+            nothing_written(&drive);
+        };
+        answer_after(
+            &|| board.set_status(|status| status.state = ControllerState::HoldPos.into()),
+            "holds an arm",
+        );
+        board.set_status(|status| status.state = ControllerState::Init.into());
+        answer_after(
+            &|| {
+                board.set_status(|status| {
+                    status.gripper = Some(jtc_wire::GripperStatus { pump: 1, ..Default::default() });
+                });
+            },
+            "meanwhile the board reports something else",
+        );
+        // The drive is unmounted, and the folder stays; and another drive is there.
+        let page = Path::new(&drive).join("MBED.HTM");
+        answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is there");
+        fs::remove_file(page).unwrap();
+        answer_after(
+            &|| fs::remove_file(Path::new(&drive).join("DETAILS.TXT")).unwrap(),
+            "the drive has gone",
+        );
+        appear(Path::new(&drive));
+    }
+
+    #[test]
+    fn a_board_that_an_agent_owns_is_not_flashed() {
+        let (dir, drive, new) = desk("NOD_H745ZIQ");
+        let board = Board::new(H745, Path::new(&drive), usize::MAX);
+        let agent = Agent::start(&["--port", &board.port]);
+        for more in [&["--yes"][..], &["--yes", "--no-read-back"]] {
+            let mut command = agent.command(&["--json", "firmware", "flash"], &board.port);
+            command.env("OPENJTC_FIRMWARE", dir.path("installed"));
+            let image = ["--image", &new, "--drive", &drive, "--accept-supply", "--wait", "1"];
+            let refused = json(&run(command, &[&image[..], more].concat(), "").ends(4));
+            assert_eq!(refused["error"]["code"], "not-asked");
+            nothing_written(&drive);
+        }
+    }
 }

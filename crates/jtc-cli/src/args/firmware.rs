@@ -19,12 +19,15 @@ pub enum FirmwareCommand {
     List,
     /// Put an image onto a Nucleo board by the drive of its ST-LINK, and prove that it runs
     #[command(
-        after_help = "The board is reset: an arm that it holds falls. A controller that reports torque is never flashed; one that does not\n\
-                            report that it has none, by a line of the same USB device as the drive, has to be answered for: on a terminal this is asked,\n\
-                            --yes answers. What runs afterwards is asked over the serial line, and compared with the image by the CRC-32 of\n\
-                            what the program finds in its own flash. The rate of the line is that of the image. The stored arm may be lost:\n\
-                            `jtc arm pull -o FILE` before.\n\nExamples:\n  jtc firmware flash\n  jtc firmware flash --board nucleo-h745zi-q --port /dev/ttyACM0\n  \
-                            jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2\n  \
+        after_help = "The board is reset: an arm that it holds falls. The serial port of the drive's own USB device (known on Linux) is always\n\
+                            asked, and --port beside it; a port that cannot be asked, and a controller that reports torque, end the command with 4,\n\
+                            whatever options are given. Without a question a board is flashed only where its own port reports no torque, every joint\n\
+                            answers it and the gripper is off; else this is asked on a terminal, --yes answers. How the core is supplied is\n\
+                            known where that port reports the very board of the image; else a board that comes in both kinds needs --accept-supply.\n\
+                            What runs afterwards is asked over the same port, and compared with the image by the CRC-32 of what the program finds\n\
+                            in its own flash. --baud is the rate of what runs before; afterwards it is that of the image. The stored arm\n\
+                            may be lost: `jtc arm pull -o FILE` before.\n\nExamples:\n  jtc firmware flash\n  jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
+                            jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2 --port /dev/ttyUSB0\n  \
                             jtc firmware flash --image openjtc.bin --no-read-back --yes"
     )]
     Flash(FlashArgs),
@@ -60,7 +63,7 @@ pub struct FlashArgs {
     /// Where the drive of the board is mounted; default: the only one found
     #[arg(long, env = "JTC_DRIVE", value_name = "DIR")]
     pub drive: Option<PathBuf>,
-    /// Do not ask: the arm is supported, and its drives are without power
+    /// Do not ask: the arm is supported, its drives are without power, and the safety wires are as in the image
     #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
     pub yes: bool,
     /// The drive does not name its board: it is that of the image
@@ -72,7 +75,7 @@ pub struct FlashArgs {
     /// Flash also a board that runs this very image
     #[arg(long, env = "JTC_AGAIN", value_parser = FalseyValueParser::new())]
     pub again: bool,
-    /// Do not ask the controller what it runs then: nothing proves that the image arrived
+    /// Do not ask the controller afterwards what it runs: nothing proves that the image arrived
     #[arg(long, env = "JTC_NO_READ_BACK", value_parser = FalseyValueParser::new())]
     pub no_read_back: bool,
     /// How long the board may take to run the image, s

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use cli_kit::{Failure, Output};
+use jtc_client::agents::owner_of;
+use jtc_host::Port;
 use jtc_host::firmware::{
-    Answers, Before, Catalogue, Drive, DriveAfter, FirmwareError, Fit, Image, Limits, Permissions, Places,
-    Proof, compare, info_with_program, look, may_flash, prove, put, same_usb_device, wait_for_drive,
+    Catalogue, Drive, DriveAfter, FirmwareError, Fit, Image, Limits, Lines, Permissions, Places, Proof,
+    compare, info_with_program, may_flash, prove, put, wait_for_drive,
 };
-use jtc_host::port::{PortError, SerialPort};
-use jtc_host::{Port, Session};
+use jtc_host::port::{PortError, PortInfo, SerialPort, list as ports, only_one};
 use jtc_wire::Program;
 use serde_json::{Value, json};
 
@@ -66,7 +67,7 @@ fn list(out: &Output) -> Result<(), Failure> {
 
 fn drive_json(drive: &Drive) -> Value {
     json!({
-        "path": drive.path,
+        "path": drive.path.display().to_string(),
         "label": drive.label,
         "board": drive.board().map(|(name, _)| name),
         "details": drive.details.trim(),
@@ -99,8 +100,7 @@ fn board_of(drive: &Drive, catalogue: &Catalogue) -> Result<String, Failure> {
     })
 }
 
-fn the_drive(named: Option<&PathBuf>) -> Result<Drive, Failure> {
-    let places = Places::of_system();
+fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure> {
     if let Some(path) = named {
         return Ok(places.at(path)?);
     }
@@ -115,29 +115,51 @@ fn the_drive(named: Option<&PathBuf>) -> Result<Drive, Failure> {
     }
 }
 
-/// The serial port, when there is one to ask; it is not shared, for the board behind it is reset.
-fn line(link: &LinkArgs, needed: bool) -> Result<Option<String>, Failure> {
-    if link.port.is_none() && !needed {
-        return Ok(None);
+/// The port that is asked beside those of the drive's own USB device: the one that is named, or the only one, where the board has to prove
+/// what it runs and the system does not say which port is its own.
+fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
+    match &link.port {
+        Some(url) if url.contains("://") => {
+            let what = format!(
+                "{url} is an address, and the board is asked over its serial port itself; nothing was sent"
+            );
+            Err(Failure::usage(what).hint("end the agent that owns the port, and name the port, or none"))
+        }
+        Some(port) => Ok(Some(port.clone())),
+        None if has_own || !needed => Ok(None),
+        None => only_port().map(Some).map_err(|failure| {
+            let hint = format!("{}; --no-read-back goes without a port", failure.hint);
+            Failure::nothing_sent(failure).hint(hint)
+        }),
     }
-    drop(link.own().map_err(|failure| {
-        let hint = format!(
-            "{}. The board is asked over its serial port itself, not by an agent; --no-read-back goes without",
-            failure.hint
-        );
-        Failure::nothing_sent(failure).hint(hint)
-    })?);
-    Ok(Some(link.name()?))
 }
 
-fn open(name: &str, baud: u32) -> Result<Box<dyn Port>, PortError> {
-    Ok(Box::new(SerialPort::open(name, baud)?))
+/// The only port that is there. One that another program has open counts: it may be that of the board.
+fn only_port() -> Result<String, Failure> {
+    let there = |port: &PortInfo| matches!(port.problem, None | Some(PortError::Busy { .. }));
+    let mut paths: Vec<String> = ports()?.into_iter().filter(there).map(|port| port.path).collect();
+    match paths.len() {
+        0 => Ok(only_one()?),
+        1 => Ok(paths.remove(0)),
+        _ => Err(PortError::Several { paths }.into()),
+    }
+}
+
+/// Opens a port for this program alone.
+fn open(port: &str, baud: u32) -> Result<Box<dyn Port>, PortError> {
+    if owner_of(port).is_some() {
+        return Err(PortError::Busy { path: port.to_owned() });
+    }
+    Ok(Box::new(SerialPort::open(port, baud)?))
 }
 
 fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
-    let drive = the_drive(args.drive.as_ref())?;
+    let places = Places::of_system();
+    let drive = the_drive(&places, args.drive.as_ref())?;
     let image = image(&args.image, |catalogue| board_of(&drive, catalogue))?;
-    let port = line(&args.link, !args.no_read_back)?;
+    let named = named_port(&args.link, !places.ports_of(&drive).is_empty(), !args.no_read_back)?;
+    let mut opener = |port: &str| open(port, args.link.baud);
+    let mut lines = Lines::open(&places, &drive, named.as_deref(), &mut opener)?;
     let record = image.record();
     out.note(format!(
         "{} {} for {}, build {}: {} bytes onto {}",
@@ -148,56 +170,93 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         image.bytes().len(),
         drive.path.display()
     ));
+    if !image.is_whole() {
+        out.note("no firmware.json beside the file lists it: that it is not cut short cannot be proved before it is written");
+    }
 
-    let answers = match &port {
-        Some(name) => look(&mut Session::new(open(name, args.link.baud)?))?,
-        None => Answers::NoPort,
-    };
-    let same_device = port.as_ref().and_then(|name| same_usb_device(name, &drive));
-    let before = Before { answers, same_device };
+    let before = lines.look()?;
     let permissions = Permissions { assume_board: args.assume_board, accept_supply: args.accept_supply };
     may_flash(&image, &drive, &before, permissions)?;
-    if let Some(Ok(program)) = before.info().map(|info| compare(&image, info)).filter(|_| !args.again) {
-        out.result(&result(&image, &drive, false, Some(program)), || {
+    let line = lines.proving().map(|(port, same_device)| (port.to_owned(), same_device));
+    // Another board that runs the image says nothing about this one.
+    if let Some(program) =
+        before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
+    {
+        out.result(&result(&image, &drive, line.as_ref(), false, Some(program)), || {
             format!("the board runs this image already ({program}); nothing was written\nnext: --again flashes it all the same")
         });
         return Ok(());
     }
-    if let Some(question) = before.to_confirm().filter(|_| !args.yes) {
+    let question = before.to_confirm(&image).filter(|_| !args.yes);
+    if let Some(question) = &question {
         confirm(question, "--yes")?;
     }
+    // A person may have thought about it for minutes.
+    let now = lines.look()?;
+    may_flash(&image, &drive, &now, permissions)?;
+    if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
+        return Err(FirmwareError::Changed {
+            what: format!("meanwhile the board reports something else: {other}"),
+        }
+        .into());
+    }
+    places.still_there(&drive)?;
 
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
-    let written = put(&drive, &image, &mut |bytes| bar.set_position(bytes as u64));
+    let mut lines = Some(lines);
+    let written = put(&drive, &image, &mut |bytes| {
+        // Closed as soon as the copying has begun: with its drive the ST-LINK may take its serial port from USB, and one that is open then
+        // comes back under another name.
+        drop(lines.take());
+        bar.set_position(bytes as u64);
+    });
     bar.finish_and_clear();
     let written = written?;
     let limits = Limits { wait: Duration::from_secs(args.wait), ..Limits::default() };
-    let Some(name) = port.filter(|_| !args.no_read_back) else {
-        let seen = wait_for_drive(&drive, &written, limits)?;
-        let mut value = result(&image, &drive, true, None);
+    let Some((port, same_device)) = line.filter(|_| !args.no_read_back) else {
+        let seen = wait_for_drive(&places, &drive, &written, limits)?;
+        let mut value = result(&image, &drive, None, true, None);
         value["drive_after"] = json!(seen);
-        out.result(&value, || not_proved(seen));
+        value["doubt"] = json!(written.doubt);
+        out.result(&value, || not_proved(seen, written.doubt.as_deref()));
         return Ok(());
     };
     out.note("copied; the ST-LINK writes it into the flash, and the board starts");
-    let mut opener = || open(&name, args.link.baud);
-    let proof = prove(&image, &drive, &written, &mut opener, limits)?;
-    let mut value = result(&image, &drive, true, Some(proof.program));
+    // The board may come back at another name.
+    let mut again = || {
+        let own = places.ports_of(&drive).into_iter().next();
+        open(own.as_ref().unwrap_or(&port), record.baud)
+    };
+    let proof = prove(&places, &image, &drive, &written, &mut again, limits)?;
+    let line = (port.clone(), same_device);
+    let mut value = result(&image, &drive, Some(&line), true, Some(proof.program));
     value["drive_after"] = json!(proof.drive);
+    value["doubt"] = json!(written.doubt);
     value["took_s"] = json!(proof.took.as_secs_f64());
-    value["stored_arm"] = json!(stored_arm(before.stored_arm(), proof.stored_arm()));
-    out.result(&value, || proved(&proof, before.stored_arm()));
+    value["stored_arm"] = json!(stored_arm(now.stored_arm(), proof.stored_arm()));
+    out.result(&value, || proved(&proof, &line, now.stored_arm()));
     Ok(())
 }
 
-fn result(image: &Image, drive: &Drive, written: bool, program: Option<Program>) -> Value {
+/// A serial port, and whether it is of the drive's USB device.
+type Line = (String, Option<bool>);
+
+fn result(
+    image: &Image,
+    drive: &Drive,
+    line: Option<&Line>,
+    written: bool,
+    program: Option<Program>,
+) -> Value {
     json!({
-        "image": image.path(),
+        "image": image.path().display().to_string(),
         "board": image.record().board,
         "version": image.record().version,
         "build": image.record().build,
         "bytes": image.bytes().len(),
-        "drive": drive.path,
+        "drive": drive.path.display().to_string(),
+        "port": line.map(|(port, _)| port),
+        "same_device": line.and_then(|(_, same_device)| *same_device),
         "written": written,
         "proved": program.is_some(),
         "program": program.map(program_json),
@@ -218,14 +277,20 @@ fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
     }
 }
 
-fn proved(proof: &Proof, stored_before: Option<bool>) -> String {
+fn proved(proof: &Proof, (port, same_device): &Line, stored_before: Option<bool>) -> String {
+    let device = match same_device {
+        Some(true) => "is of the same USB device as the drive",
+        Some(false) => "is of another USB device than the drive: is it the board that was flashed?",
+        None => "may be of another board than the drive: the system does not say",
+    };
     let arm = match stored_arm(stored_before, proof.stored_arm()) {
         "lost" => "\nthe stored arm is lost; next: jtc arm push FILE --store",
         "kept" => "\nthe stored arm is still there",
         _ => "",
     };
     format!(
-        "the board runs {} on {}; what it reads in its flash is the image: {} ({:.0} s){arm}\n\
+        "the board runs {} on {}; what it reads in its flash is the image: {} ({:.0} s)\n\
+         {port}, over which it was asked, {device}{arm}\n\
          next: cycle the power once where this firmware is new on the board, then jtc doctor",
         proof.info.firmware_and_revision(),
         proof.info.board,
@@ -234,13 +299,10 @@ fn proved(proof: &Proof, stored_before: Option<bool>) -> String {
     )
 }
 
-fn not_proved(seen: DriveAfter) -> String {
-    let drive = match seen {
-        DriveAfter::CameBack => "the drive vanished and came back without a report",
-        DriveAfter::Gone => "the drive vanished, and has not come back",
-        DriveAfter::Stayed => "the drive has not vanished: it is not certain that it took the image",
-    };
-    format!("copied, and not proved: {drive}\nnext: jtc firmware verify, over the board's serial port")
+fn not_proved(seen: DriveAfter, doubt: Option<&str>) -> String {
+    let doubt = doubt
+        .map_or(String::new(), |doubt| format!(" (at the end of the copying the system reported: {doubt})"));
+    format!("copied, and not proved: {seen}{doubt}\nnext: jtc firmware verify, over the board's serial port")
 }
 
 fn verify(args: &ImageArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -252,7 +314,7 @@ fn verify(args: &ImageArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure
     let image = image(args, |_| Ok(info.board.as_str().to_owned()))?;
     let program = compare(&image, &info)?;
     let value = json!({
-        "image": image.path(),
+        "image": image.path().display().to_string(),
         "board": image.record().board,
         "version": image.record().version,
         "build": image.record().build,

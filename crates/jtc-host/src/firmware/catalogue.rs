@@ -30,6 +30,22 @@ pub struct CatalogueImage {
     pub bytes: u64,
 }
 
+impl CatalogueImage {
+    /// What a file holds is what is listed.
+    fn check(&self, path: &Path, bytes: &[u8]) -> Result<(), FirmwareError> {
+        let sha256: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        if bytes.len() as u64 == self.bytes && sha256.eq_ignore_ascii_case(&self.sha256) {
+            return Ok(());
+        }
+        Err(FirmwareError::Damaged {
+            path: path.to_owned(),
+            sha256,
+            bytes: bytes.len() as u64,
+            listed: Box::new(self.clone()),
+        })
+    }
+}
+
 /// What `firmware.json` lists.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct Catalogue {
@@ -97,6 +113,21 @@ impl Catalogue {
         Ok(catalogue)
     }
 
+    /// A catalogue in the folder of this file lists it, and it is the file that is listed. A folder without a catalogue, and one that cannot be
+    /// read, list nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::Damaged`] when another file is listed by this name.
+    pub(super) fn lists(path: &Path, bytes: &[u8]) -> Result<bool, FirmwareError> {
+        let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
+        let Ok(catalogue) = Self::read(folder) else { return Ok(false) };
+        match catalogue.images.iter().find(|image| name == image.file.as_str()) {
+            Some(listed) => listed.check(path, bytes).map(|()| true),
+            None => Ok(false),
+        }
+    }
+
     /// The image of a board, once its file was found to be the one that was released.
     ///
     /// # Errors
@@ -112,16 +143,8 @@ impl Catalogue {
         };
         let path = self.folder.join(&listed.file);
         let bytes = fs::read(&path).map_err(|source| FirmwareError::File { path: path.clone(), source })?;
-        let sha256: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        if bytes.len() as u64 != listed.bytes || !sha256.eq_ignore_ascii_case(&listed.sha256) {
-            return Err(FirmwareError::Damaged {
-                path,
-                sha256,
-                bytes: bytes.len() as u64,
-                listed: Box::new(listed.clone()),
-            });
-        }
-        let image = Image::parse(&path, bytes)?;
+        listed.check(&path, &bytes)?;
+        let image = Image::parse(&path, bytes)?.listed();
         if image.record().board != board {
             let why = format!("{} is listed for {board}, and is for {}", listed.file, image.record().board);
             return Err(FirmwareError::BadCatalogue { path: self.folder.join(FILE), why });

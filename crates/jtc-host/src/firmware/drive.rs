@@ -36,6 +36,19 @@ pub struct Drive {
     pub details: String,
     /// The device that is mounted there, such as `/dev/sda`, where the system says so.
     pub device: Option<PathBuf>,
+    /// The USB device that it is a function of, where the system says so.
+    pub usb: Option<UsbDevice>,
+    /// Number of the file system at the path, where systems number them: another one is there once the drive has gone.
+    pub volume: Option<u64>,
+}
+
+/// A USB device: of the ST-LINK of a board, which is a drive, a serial port and a debugger at once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsbDevice {
+    /// Its folder in the system's tree of devices, which names the connector that it is plugged into.
+    pub folder: PathBuf,
+    /// Its number on the bus: another one each time that it is plugged in.
+    pub number: String,
 }
 
 /// Whether a drive is that of a board.
@@ -72,14 +85,15 @@ impl Drive {
             code: page.as_deref().and_then(code),
             details: details.unwrap_or_default(),
             device: None,
+            usb: None,
+            volume: fs::metadata(path).ok().as_ref().and_then(volume),
         })
     }
 
-    /// The same with what the system knows of it.
-    pub fn of_system(mut self, device: Option<PathBuf>, label: Option<String>) -> Self {
-        self.device = device;
-        self.label = label.or(self.label);
-        self
+    /// The same with what the system knows of it. Where the device is known, its own label counts and no name of a folder: who mounts a
+    /// second drive of a label appends a digit, and `NODE_H743ZI2` would be the first board of that name.
+    pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {
+        Self { device: Some(device), label, usb, ..self }
     }
 
     /// The board, as labels call it: `H745ZIQ`; and whether that is its whole name. `None` when it is not named.
@@ -122,6 +136,19 @@ impl Drive {
     }
 }
 
+/// The file system in which a file or folder is.
+#[cfg(unix)]
+pub(super) fn volume(found: &fs::Metadata) -> Option<u64> {
+    use std::os::unix::fs::MetadataExt as _;
+    Some(found.dev())
+}
+
+/// The file system in which a file or folder is; this system does not number them.
+#[cfg(not(unix))]
+pub(super) fn volume(_: &fs::Metadata) -> Option<u64> {
+    None
+}
+
 /// A board as labels call it: `nucleo-h745zi-q-ldo` is the same board as `nucleo-h745zi-q`, `H745ZIQ`.
 fn short_name(board: &str) -> String {
     let name = same_board(board);
@@ -131,6 +158,12 @@ fn short_name(board: &str) -> String {
 /// The board without how its core is supplied.
 pub(super) fn same_board(board: &str) -> &str {
     board.strip_suffix("-ldo").unwrap_or(board)
+}
+
+/// The core of this board can be supplied in two ways, and an image is for one of them: `-q` in the maker's names stands for a
+/// switching regulator beside the linear one.
+pub(super) fn has_two_supplies(board: &str) -> bool {
+    same_board(board).ends_with("-q") || same_board(board) != board
 }
 
 fn text(folder: &Path, file: &str) -> Option<String> {
@@ -145,6 +178,11 @@ fn code(page: &str) -> Option<String> {
     code.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| code.to_owned())
 }
 
+/// The chip of this board has a second core, which starts wherever bank 2 of the flash begins.
+pub(super) fn has_second_core(board: &str) -> bool {
+    ["nucleo-h745", "nucleo-h755"].iter().any(|chip| board.starts_with(chip))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +194,8 @@ mod tests {
             code: code.map(Into::into),
             details: String::new(),
             device: None,
+            usb: None,
+            volume: None,
         }
     }
 
@@ -180,6 +220,15 @@ mod tests {
             let drive = drive(label, code);
             assert_eq!((drive.fit(h745), drive.fit(h743)), (of_h745, of_h743), "{label} {code:?}");
             assert_eq!(drive.fit("nucleo-h745zi-q-ldo"), of_h745, "it is the same board");
+        }
+    }
+
+    #[test]
+    fn boards_with_a_switching_regulator_come_in_two_kinds() {
+        for (board, two) in
+            [("nucleo-h745zi-q", true), ("nucleo-h745zi-q-ldo", true), ("nucleo-h743zi2", false)]
+        {
+            assert_eq!(has_two_supplies(board), two, "{board}");
         }
     }
 

@@ -3,10 +3,9 @@
 use std::io;
 use std::path::PathBuf;
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{Code, ControllerState};
 
-use super::CatalogueImage;
+use super::{CatalogueImage, DriveAfter};
 use crate::port::PortError;
 
 /// Why a board was not flashed, or is not known to run what was flashed.
@@ -82,15 +81,35 @@ pub enum FirmwareError {
         /// Where.
         drives: Vec<PathBuf>,
     },
+    /// A serial port has to be asked before the board is flashed, and cannot be used.
+    #[error("the board has to be asked over {port} before it is flashed: {source}")]
+    NotAsked {
+        /// The port.
+        port: String,
+        /// Why it cannot be used.
+        source: PortError,
+    },
+    /// What was looked at before is not what is there.
+    #[error("{what}")]
+    Changed {
+        /// What is another one.
+        what: String,
+    },
     /// The arm has torque.
-    #[error("the controller holds an arm (state {state}); flashing resets the board, and the arm falls")]
+    #[error(
+        "the controller at {port} holds an arm (state {state}); flashing resets the board, and the arm falls"
+    )]
     HasTorque {
+        /// Its port.
+        port: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
     /// The controller on the line is no board for this image.
-    #[error("the controller on the serial line runs on {runs}, and the image is for {board}")]
+    #[error("the controller at {port} runs on {runs}, and the image is for {board}")]
     OtherController {
+        /// Its port.
+        port: String,
         /// What it reports.
         runs: String,
         /// Board of the image.
@@ -117,11 +136,11 @@ pub enum FirmwareError {
         board: String,
     },
     /// The image may supply the core in another way than the board is wired for.
-    #[error("the image is for {board}, {}", as_supplied(runs))]
+    #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
         /// Board of the image.
         board: String,
-        /// What the board runs now, where it is known.
+        /// What the board runs now, where it reports it and it is another image.
         runs: Option<String>,
     },
     /// The drive takes no file of this size.
@@ -134,8 +153,18 @@ pub enum FirmwareError {
         /// Its `FAIL.TXT`.
         failure: Option<String>,
     },
+    /// No file can be made on the drive.
+    #[error("{}: {}: {source}", path.display(), cannot_open(source))]
+    NotOpened {
+        /// The file on the drive.
+        path: PathBuf,
+        /// The device that is mounted there, where it is known.
+        device: Option<PathBuf>,
+        /// The system's words.
+        source: io::Error,
+    },
     /// The copying ended early.
-    #[error("{}: {source} after {written} bytes; the board holds a part of the image", path.display())]
+    #[error("{}: {source} after {written} bytes; the board may hold a part of the image", path.display())]
     NotWritten {
         /// The file on the drive.
         path: PathBuf,
@@ -151,6 +180,14 @@ pub enum FirmwareError {
         drive: PathBuf,
         /// What `FAIL.TXT` says.
         text: String,
+    },
+    /// The drive does not behave as one does that has taken an image.
+    #[error("the image was copied, and {seen}{}", with_doubt(doubt))]
+    NotTaken {
+        /// What became of the drive.
+        seen: DriveAfter,
+        /// What the system reported of the copying.
+        doubt: Option<String>,
     },
     /// The program that runs is another one.
     #[error("the board does not run {}: {why}; it reports {runs}", path.display())]
@@ -199,10 +236,26 @@ fn of_label(label: &Option<String>) -> String {
     label.as_ref().map_or(String::new(), |label| format!(", {label},"))
 }
 
-fn as_supplied(runs: &Option<String>) -> String {
+fn as_supplied(board: &str, runs: &Option<String>) -> String {
     match runs {
         Some(runs) => format!("and the board runs {runs}: its core may be supplied in another way"),
-        None => "whose core is supplied by the LDO; as it is sold the board supplies it by the SMPS".into(),
+        None if board.ends_with("-ldo") => {
+            "whose core is supplied by the LDO; as it is sold the board supplies it by the SMPS, \
+             and no firmware reports that this one does not"
+                .into()
+        }
+        None => {
+            "whose core is supplied by the SMPS as it is sold, and no firmware reports that this one still is"
+                .into()
+        }
+    }
+}
+
+fn cannot_open(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::PermissionDenied => "nothing was written; this user may not write to the drive",
+        io::ErrorKind::ReadOnlyFilesystem => "nothing was written; the drive is mounted read-only",
+        _ => "nothing was written; no file can be made on the drive",
     }
 }
 
@@ -214,113 +267,4 @@ fn with_doubt(doubt: &Option<String>) -> String {
     doubt
         .as_ref()
         .map_or(String::new(), |doubt| format!(" (at the end of the copying the system reported: {doubt})"))
-}
-
-impl Diagnose for FirmwareError {
-    fn diagnosis(&self) -> Diagnosis {
-        use ErrorKind::{Device, Fault, NoLink, Refused, Usage};
-        let of = Diagnosis::new;
-        match self {
-            Self::File { .. } => of(Usage, "file", "check the name and the rights of the file"),
-            Self::NoImage { .. } => of(
-                Usage,
-                "no-image",
-                "`jtc firmware list` shows the images that are installed; `cargo xtask firmware` builds them; nothing was written",
-            ),
-            Self::NoCatalogue { .. } => of(
-                Usage,
-                "no-images",
-                "name a file: `jtc firmware flash --image FILE`; or install the package, which brings the images; OPENJTC_FIRMWARE names \
-                 another folder",
-            ),
-            Self::BadCatalogue { .. } => {
-                of(Usage, "bad-catalogue", "install the package again; nothing was written")
-            }
-            Self::NoBoard { .. } => of(
-                Usage,
-                "no-board",
-                "the name is printed on the board; `jtc firmware list` shows the images",
-            ),
-            Self::Damaged { .. } => of(
-                Refused,
-                "damaged-image",
-                "nothing was written. Install the package again: the file is not the one that was released",
-            ),
-            Self::NoDrive { .. } => of(
-                Usage,
-                "no-drive",
-                "`jtc firmware list` shows the drives that are found; nothing was written",
-            ),
-            Self::NoneFound => of(
-                NoLink,
-                "no-drive",
-                "connect the USB connector of the ST-LINK (CN1) and mount its drive (`udisksctl mount -b /dev/sdX`); `--drive DIR` names \
-                 where it is",
-            ),
-            Self::Several { .. } => {
-                of(Usage, "several-drives", "choose one with `--drive DIR`; nothing was written")
-            }
-            Self::HasTorque { .. } => of(
-                Refused,
-                "has-torque",
-                "nothing was written. Support the arm, then `jtc disable` takes its torque off; flash then",
-            ),
-            Self::OtherController { .. } => of(
-                Refused,
-                "other-controller",
-                "nothing was written. Name the serial port of the board that has the drive: `jtc ports`, then `--port PATH`",
-            ),
-            Self::OtherBoard { .. } => of(
-                Refused,
-                "other-board",
-                "nothing was written. `jtc firmware list` shows drives and images; the name is printed on the board",
-            ),
-            Self::UnnamedBoard { .. } => of(
-                Refused,
-                "unnamed-board",
-                "nothing was written. Read the name that is printed on the board; if it is that of the image: `--assume-board`",
-            ),
-            Self::Supply { .. } => of(
-                Refused,
-                "other-supply",
-                "nothing was written. Firmware for the wrong supply makes a board unreachable (docs/board.md, section 5); if the solder \
-                 bridges are as the image needs them: `--accept-supply`",
-            ),
-            Self::DriveFull { .. } => of(
-                Fault,
-                "drive-full",
-                "a drive of a few kB means that the ST-LINK does not reach the processor: BOOT0 to 3.3 V, power off and on, and try again \
-                 (docs/board.md, section 5)",
-            ),
-            Self::NotWritten { .. } => {
-                of(Fault, "not-written", "is the cable in place? Plug the board in again, and flash again")
-            }
-            Self::Refused { .. } => of(
-                Device,
-                "flash-refused",
-                "unplug the board and plug it in again, and flash again; what the words mean: docs/board.md, section 3",
-            ),
-            Self::OtherProgram { .. } => of(
-                Fault,
-                "other-program",
-                "flash the image again: what is in flash is not it, and may not be run with an arm",
-            ),
-            Self::NotReported { .. } => of(
-                Fault,
-                "not-reported",
-                "firmware from 0.2.0 on reports its flash; `jtc info` shows what this one reports",
-            ),
-            Self::NoController => of(
-                NoLink,
-                "no-controller",
-                "is it the port of the board, at the rate of its firmware? `jtc doctor` looks for the reason",
-            ),
-            Self::NotStarted { .. } => of(
-                Fault,
-                "not-started",
-                "press the board's reset button and compare again: `jtc firmware verify`; the rate of the line is that of the image (`--baud`)",
-            ),
-            Self::Port(e) => e.diagnosis(),
-        }
-    }
 }

@@ -9,15 +9,21 @@ use std::time::{Duration, Instant};
 
 use jtc_wire::{Answer, DataStatus, FrameType, Info, Name, Program, Response, Status, StoreState};
 
-use super::Drive;
+use super::image::{BANK1, ERASED};
+use super::{Drive, Image};
 use crate::port::test::ScriptedPort;
 use crate::port::{Port, PortError};
 
-/// An image of a board, with a content that depends on `seed`.
+/// Bytes of the program in an image.
+const PROGRAM: usize = 0x1000;
+
+/// An image of a board, with a content that depends on `seed`; with a program for the second core where the board has one.
 pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
-    let mut bytes = vec![0; 0x1000];
+    let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
     bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
+    // An interrupt at the end of the program.
+    bytes[20..24].copy_from_slice(&0x0800_0F05u32.to_le_bytes());
     let record = &mut bytes[0x400..0x460];
     record[..8].copy_from_slice(b"OPENJTC\0");
     record[8..12].copy_from_slice(&[1, 0, 96, 0]);
@@ -28,11 +34,18 @@ pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     for (n, byte) in bytes[0x500..].iter_mut().enumerate() {
         *byte = (n as u8).wrapping_mul(31).wrapping_add(seed) | 1;
     }
+    if super::drive::has_second_core(board) {
+        bytes.resize(BANK1, ERASED);
+        for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
+            bytes.extend(word.to_le_bytes());
+        }
+    }
     bytes
 }
 
-/// What a device reports that has these bytes in flash and nothing behind them; bit by bit, as the definition has it.
-pub fn program_of(bytes: &[u8]) -> Program {
+/// What a device reports that has this image in flash; bit by bit, as the definition has it.
+pub fn program_of(image: &[u8]) -> Program {
+    let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
     for byte in bytes {
         register ^= u32::from(*byte);
@@ -77,9 +90,10 @@ struct Flashed {
 }
 
 impl Board {
-    /// One that has run this image for an hour.
+    /// One that has run this image for an hour, with an arm that is configured and has no torque.
     pub fn running(board: &str, program: Option<Program>) -> Self {
-        let status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
+        let mut status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
+        status.joints.iter_mut().for_each(|joint| joint.state = jtc_wire::NodeState::READY);
         Self(Arc::new(Mutex::new(Flashed {
             held: false,
             program,
@@ -98,6 +112,13 @@ impl Board {
     /// Nothing comes from it.
     pub fn hold(&self, held: bool) {
         self.0.lock().unwrap().held = held;
+    }
+
+    /// The same; what it ran until then, and the name of the board in that.
+    fn hold_with(&self, held: bool) -> (Option<Program>, String) {
+        self.hold(held);
+        let flashed = self.0.lock().unwrap();
+        (flashed.program, flashed.board.clone())
     }
 
     fn start_with(&self, board: &str, program: Option<Program>) {
@@ -158,6 +179,8 @@ pub enum Behaviour {
     Takes,
     /// The same, with a part of the flash left empty, as it happens where the bytes come in another order.
     LeavesHole,
+    /// The same, and the program of before starts anew before the ST-LINK stops it.
+    StartsBeforeAnew,
     /// `FAIL.TXT` appears.
     Fails(&'static str),
     /// Nothing happens.
@@ -192,7 +215,7 @@ impl StLink {
                 }
                 // As long as a file grows it is not whole.
                 let Ok(bytes) = fs::read(&file) else { continue };
-                if bytes.is_empty() || bytes.len() != length {
+                if Image::parse(&file, bytes.clone()).is_err() || bytes.len() != length {
                     length = bytes.len();
                     continue;
                 }
@@ -227,15 +250,20 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
     match behaviour {
         Behaviour::Ignores => {}
         Behaviour::Fails(text) => fs::write(path.join("FAIL.TXT"), text).unwrap(),
-        Behaviour::Takes | Behaviour::LeavesHole => {
-            board.hold(true);
+        Behaviour::Takes | Behaviour::LeavesHole | Behaviour::StartsBeforeAnew => {
+            let (before, name) = board.hold_with(true);
             fs::remove_dir_all(path).unwrap();
-            let name = super::Record::parse(&bytes).unwrap().board;
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
             // No processor starts within what the clocks may differ by.
             thread::sleep(Duration::from_millis(400));
+            if *behaviour == Behaviour::StartsBeforeAnew {
+                board.start_with(&name, before);
+                thread::sleep(Duration::from_millis(600));
+                board.hold(true);
+            }
+            let name = super::Record::parse(&bytes).unwrap().board;
             appear(path);
             board.start_with(&name, Some(program_of(&bytes)));
         }

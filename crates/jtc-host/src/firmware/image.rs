@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use jtc_wire::Program;
 
-use super::FirmwareError;
+use super::drive::has_second_core;
 use super::elf;
+use super::{Catalogue, FirmwareError};
 
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
@@ -15,6 +16,8 @@ pub const FLASH: u32 = 0x0800_0000;
 pub(super) const BANK1: usize = 1024 * 1024;
 /// Where the memory of the stored arm begins: an image ends before it.
 pub(super) const STORED_ARM: usize = 0x1C_0000;
+/// Words at the beginning of a program that are a stack and entries: of the core, and of the chip's interrupts.
+const VECTORS: usize = 166;
 /// What erased flash reads as.
 pub(super) const ERASED: u8 = 0xFF;
 
@@ -42,6 +45,8 @@ impl Record {
     const MAGIC: &[u8] = b"OPENJTC\0";
     /// Bytes of its first form; later ones are longer.
     const LEN: usize = 96;
+    /// Rates that a build can have, Bd.
+    const RATES: std::ops::RangeInclusive<u32> = 9_600..=15_000_000;
 
     /// From an image; `None` when there is none at its place.
     pub fn parse(image: &[u8]) -> Option<Self> {
@@ -55,12 +60,11 @@ impl Record {
             let printable = !text.is_empty() && text.iter().all(u8::is_ascii_graphic);
             printable.then(|| String::from_utf8_lossy(text).into_owned())
         };
-        Some(Self {
-            version: text(12..24)?,
-            board: text(24..48)?,
-            build: text(48..72)?,
-            baud: u32::from_le_bytes(*bytes[88..].first_chunk()?),
-        })
+        let baud = u32::from_le_bytes(*bytes[88..].first_chunk()?);
+        if !Self::RATES.contains(&baud) {
+            return None;
+        }
+        Some(Self { version: text(12..24)?, board: text(24..48)?, build: text(48..72)?, baud })
     }
 }
 
@@ -70,6 +74,7 @@ pub struct Image {
     path: PathBuf,
     bytes: Vec<u8>,
     record: Record,
+    whole: bool,
 }
 
 impl std::fmt::Debug for Image {
@@ -79,14 +84,18 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// Reads a binary or an ELF file, and looks whether it is firmware of a board of this project.
+    /// Reads a binary or an ELF file, and looks whether it is firmware of a board of this project. Where a catalogue beside it lists it, it
+    /// has to be the file that is listed.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] when it cannot be read, [`FirmwareError::NoImage`] when it is no such firmware.
+    /// [`FirmwareError::File`] when it cannot be read, [`FirmwareError::NoImage`] when it is no such firmware, and
+    /// [`FirmwareError::Damaged`].
     pub fn read(path: &Path) -> Result<Self, FirmwareError> {
         let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
-        Self::parse(path, bytes)
+        let listed = Catalogue::lists(path, &bytes)?;
+        let image = Self::parse(path, bytes)?;
+        Ok(if listed { image.listed() } else { image })
     }
 
     /// The same of what the file at `path` holds.
@@ -95,11 +104,24 @@ impl Image {
     ///
     /// [`FirmwareError::NoImage`].
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        let flat = if elf::is_elf(&bytes) { elf::flat(&bytes) } else { Ok(bytes) };
+        // An ELF file says where each of its parts ends.
+        let whole = elf::is_elf(&bytes);
+        let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
         let (record, bytes) =
             looked_at.map_err(|why| FirmwareError::NoImage { path: path.to_owned(), why })?;
-        Ok(Self { path: path.to_owned(), bytes, record })
+        Ok(Self { path: path.to_owned(), bytes, record, whole })
+    }
+
+    /// A catalogue lists its length and its digest.
+    pub(super) fn listed(self) -> Self {
+        Self { whole: true, ..self }
+    }
+
+    /// It is known that nothing is missing at its end: by the form of the file, or by a catalogue. What a binary file by itself shows is that it
+    /// is not *certainly* cut.
+    pub fn is_whole(&self) -> bool {
+        self.whole
     }
 
     /// The file that it was read from.
@@ -158,16 +180,41 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
         return Err(format!("its first word, {stack:#010x}, is no stack in the memory of these processors"));
     }
     let program = FLASH..FLASH + bytes.len().min(BANK1) as u32;
-    if reset % 2 == 0 || !program.contains(&(reset & !1)) {
+    let entry = |word: u32| word % 2 == 1 && program.contains(&(word & !1));
+    if !entry(reset) {
         return Err(format!("its second word, {reset:#010x}, is no entry of a program within it"));
     }
-    Record::parse(bytes)
-        .ok_or_else(|| format!("no record of this project's firmware at {:#x}", Record::OFFSET))
+    let record = Record::parse(bytes)
+        .ok_or_else(|| format!("no record of this project's firmware at {:#x}", Record::OFFSET))?;
+    let unused = |word: u32| word == 0 || word == u32::MAX;
+    let lost = (2..VECTORS).filter_map(|n| word(4 * n)).find(|word| !unused(*word) && !entry(*word));
+    if let Some(lost) = lost {
+        return Err(format!(
+            "cut short or damaged: an interrupt leads to {lost:#010x}, which is not within it"
+        ));
+    }
+    if has_second_core(&record.board) && !starts_second_core(bytes) {
+        return Err(format!(
+            "cut short: {} bytes, and the program of the second core, {BANK1} bytes behind the first, is not whole",
+            bytes.len()
+        ));
+    }
+    Ok(record)
+}
+
+/// The program of the second core, at the beginning of bank 2, is there with the instructions at which it starts.
+fn starts_second_core(bytes: &[u8]) -> bool {
+    let bank2 = FLASH + BANK1 as u32;
+    let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    // Two instructions, the second of which leads back to the first.
+    reset.is_some_and(|reset| {
+        reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::fake::{image_bytes, program_of};
+    use super::super::fake::{catalogue, image_bytes, program_of};
     use super::*;
 
     fn parsed(bytes: Vec<u8>) -> Result<Image, String> {
@@ -195,6 +242,7 @@ mod tests {
         for (bytes, why) in [
             (vec![1, 2, 3], "3 bytes, too few"),
             (good()[..0x400].to_vec(), "is no entry"),
+            (good()[..0xF00].to_vec(), "0x08000f05, which is not within it"),
             (b"#!/bin/sh\necho this is no program at all".to_vec(), "is no stack"),
             (with(0, &[0; 4]), "0x00000000, is no stack"),
             (with(0, &0x2002_0008u32.to_le_bytes()), "is no stack"),
@@ -203,6 +251,7 @@ mod tests {
             (with(0x400, b"openjtc"), "no record"),
             (with(0x40A, &[95, 0]), "no record"),
             (with(0x418, &[0]), "no record"),
+            (with(0x458, &[0, 0, 0]), "no record"),
             (long, "stored arm"),
         ] {
             let said = parsed(bytes).unwrap_err();
@@ -211,8 +260,41 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_cut_before_the_program_of_the_second_core_is_refused() {
+        let good = image_bytes("nucleo-h745zi-q", 7);
+        assert!(parsed(good.clone()).is_ok());
+        for end in [0x1000, BANK1 - 1, BANK1, BANK1 + 4, BANK1 + 66, good.len() - 1] {
+            let said = parsed(good[..end].to_vec()).unwrap_err();
+            assert!(said.contains("cut short") && said.contains("second core"), "{end}: {said}");
+        }
+        // The other board has one core.
+        assert_eq!(image_bytes("nucleo-h743zi2", 7).len(), 0x1000);
+        assert!(parsed(image_bytes("nucleo-h743zi2", 7)).is_ok());
+    }
+
+    #[test]
+    fn a_binary_is_known_to_be_whole_where_a_catalogue_lists_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("nucleo-h743zi2.bin");
+        fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
+        assert!(!Image::read(&path).unwrap().is_whole());
+        // A list of other files, or one that is none, says nothing about it.
+        catalogue(folder.path(), &["nucleo-h745zi-q"]);
+        assert!(!Image::read(&path).unwrap().is_whole());
+        fs::write(folder.path().join("firmware.json"), "{").unwrap();
+        assert!(!Image::read(&path).unwrap().is_whole());
+        catalogue(folder.path(), &["nucleo-h743zi2"]);
+        assert!(Image::read(&path).unwrap().is_whole());
+        // Cut where nothing of the file itself shows it.
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..0xFF0]).unwrap();
+        assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
+        assert!(matches!(Image::read(&path), Err(FirmwareError::Damaged { .. })));
+    }
+
+    #[test]
     fn j67_what_runs_is_the_image_or_it_is_not() {
-        let image = parsed(image_bytes("nucleo-h745zi-q", 7)).unwrap();
+        let image = parsed(image_bytes("nucleo-h743zi2", 7)).unwrap();
         let program = program_of(image.bytes());
         assert_eq!(image.is_what_runs(program), Ok(()));
         // The two words of the second core, far behind the program, change nothing; nor does what fills up the gap.
@@ -225,7 +307,7 @@ mod tests {
             let said = parsed(longer).unwrap().is_what_runs(program).unwrap_err();
             assert!(said.contains("that of the image does not"), "{said}");
         }
-        let other = parsed(image_bytes("nucleo-h745zi-q", 8)).unwrap();
+        let other = parsed(image_bytes("nucleo-h743zi2", 8)).unwrap();
         assert!(other.is_what_runs(program).unwrap_err().contains("CRC-32"));
         let more = Program { bytes: program.bytes + 1, ..program };
         assert!(image.is_what_runs(more).unwrap_err().contains("the image"));

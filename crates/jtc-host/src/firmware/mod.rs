@@ -6,24 +6,28 @@
 //! `FAIL.TXT` when it could not do it. That it shows none is no proof: where the bytes arrive in another order than it expects, parts of the
 //! flash stay empty and nothing is reported. So what is in flash is asked of the controller itself, over its serial line.
 //!
-//! The order of a flash is [`Image`], [`Drive`], [`look`] (does the board hold an arm?), [`may_flash`], [`put`], [`prove`].
+//! The order of a flash is [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`], [`prove`]. Where a
+//! person is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] come once more, directly before [`put`].
 
 mod before;
 mod catalogue;
+mod diagnosis;
 mod drive;
 mod elf;
 mod error;
 mod image;
+mod lines;
 mod mounts;
 mod proof;
 mod put;
 
-pub use before::{Answers, Before, Permissions, look, may_flash};
+pub use before::{Answers, Asked, Before, Permissions, look, may_flash};
 pub use catalogue::{Catalogue, CatalogueImage};
-pub use drive::{Drive, Fit};
+pub use drive::{Drive, Fit, UsbDevice};
 pub use error::FirmwareError;
 pub use image::{FLASH, Image, Record};
-pub use mounts::{Places, same_usb_device};
+pub use lines::{Lines, OpenLine};
+pub use mounts::Places;
 pub use proof::{DriveAfter, Limits, OpenPort, Proof, compare, info_with_program, prove, wait_for_drive};
 pub use put::{Written, put};
 

@@ -1,11 +1,11 @@
-//! Where the drives of boards are mounted, and which serial port is on the same USB device.
+//! Where the drives of boards are mounted, and which serial ports are on the same USB device.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Drive;
+use super::{Drive, FirmwareError, UsbDevice};
 
-/// Places of the system in which drives are looked for.
+/// Places of the system in which drives and ports are looked for.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// The table of mounts, as Linux has it.
@@ -14,6 +14,10 @@ pub struct Places {
     pub by_label: PathBuf,
     /// Folders in which each folder may be a drive.
     pub folders: Vec<PathBuf>,
+    /// Classes of devices, with links into the tree of devices.
+    pub classes: PathBuf,
+    /// Nodes of devices.
+    pub nodes: PathBuf,
 }
 
 impl Places {
@@ -23,13 +27,20 @@ impl Places {
         if cfg!(windows) {
             folders.clear();
         }
-        Self { mounts: "/proc/self/mounts".into(), by_label: "/dev/disk/by-label".into(), folders }
+        Self {
+            mounts: "/proc/self/mounts".into(),
+            by_label: "/dev/disk/by-label".into(),
+            folders,
+            classes: "/sys/class".into(),
+            nodes: "/dev".into(),
+        }
     }
 
     /// The drives of ST-LINKs that are mounted, by path.
     pub fn drives(&self) -> Vec<Drive> {
+        let mounted = self.mounted().into_iter();
         let mut drives: Vec<Drive> =
-            self.mounted().iter().filter_map(|(device, path)| self.drive(device, path)).collect();
+            mounted.filter_map(|(device, path)| Some(self.known(Drive::at(&path).ok()?, device))).collect();
         let entries = self.folders.iter().filter_map(|folder| fs::read_dir(folder).ok());
         let others = entries.flatten().flatten().filter_map(|entry| Drive::at(&entry.path()).ok());
         drives.extend(others);
@@ -47,29 +58,65 @@ impl Places {
     /// # Errors
     ///
     /// Those of [`Drive::at`].
-    pub fn at(&self, path: &Path) -> Result<Drive, super::FirmwareError> {
+    pub fn at(&self, path: &Path) -> Result<Drive, FirmwareError> {
         let drive = Drive::at(path)?;
         let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let device = self.mounted().into_iter().find(|(_, at)| *at == real).map(|(device, _)| device);
-        let label = device.as_deref().and_then(|device| self.label(device));
-        Ok(drive.of_system(device, label))
+        Ok(match device {
+            Some(device) => self.known(drive, device),
+            None => drive,
+        })
     }
 
-    fn drive(&self, device: &Path, path: &Path) -> Option<Drive> {
-        let drive = Drive::at(path).ok()?;
-        Some(drive.of_system(Some(device.to_owned()), self.label(device)))
-    }
-
-    /// Devices and where they are mounted, of file systems that such a drive can have.
-    fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
-        let text = fs::read_to_string(&self.mounts).unwrap_or_default();
-        let mount = |line: &str| {
-            let mut words = line.split(' ');
-            let (device, path, kind) = (words.next()?, words.next()?, words.next()?);
-            let fat = matches!(kind, "vfat" | "msdos" | "fuseblk" | "exfat");
-            (fat && device.starts_with('/')).then(|| (unescaped(device).into(), unescaped(path).into()))
+    /// The drive that was looked at is still there, and no other one in its place.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::Changed`]: nothing was written.
+    pub fn still_there(&self, drive: &Drive) -> Result<(), FirmwareError> {
+        let what = match self.at(&drive.path) {
+            Ok(now) if now == *drive => return Ok(()),
+            Ok(_) => "another drive is there than was looked at",
+            Err(_) => "the drive has gone",
         };
-        text.lines().filter_map(mount).collect()
+        Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
+    }
+
+    /// The drive as it is now: at its path, or in another folder when it was plugged out and in meanwhile and its USB device is known.
+    pub fn again(&self, drive: &Drive) -> Option<Drive> {
+        let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
+        let own = connector(drive);
+        // One that has gone from USB may still be mounted.
+        let here = self.at(&drive.path).ok().filter(|found| connector(found) == own);
+        here.or_else(|| {
+            own.as_ref()?;
+            self.drives().into_iter().find(|found| connector(found) == own)
+        })
+    }
+
+    fn known(&self, drive: Drive, device: PathBuf) -> Drive {
+        let (label, usb) = (self.label(&device), self.usb_device("block", &device));
+        drive.of_system(device, label, usb)
+    }
+
+    /// Devices and where they are mounted, of file systems that such a drive can have. Of several at one place the last one is seen.
+    fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
+        let table = fs::read(&self.mounts).unwrap_or_default();
+        let mount = |line: &[u8]| {
+            let mut words = line.split(|byte| *byte == b' ');
+            let (device, path, kind) = (words.next()?, words.next()?, words.next()?);
+            let fat = [&b"vfat"[..], b"msdos", b"fuseblk", b"exfat"].contains(&kind);
+            if !fat || !device.starts_with(b"/") {
+                return None;
+            }
+            Some((path_of(unescaped(device))?, path_of(unescaped(path))?))
+        };
+        let mut mounted: Vec<(PathBuf, PathBuf)> = Vec::new();
+        for (device, path) in table.split(|byte| *byte == b'\n').filter_map(mount) {
+            mounted.retain(|(_, at)| *at != path);
+            mounted.push((device, path));
+        }
+        mounted
     }
 
     fn label(&self, device: &Path) -> Option<String> {
@@ -81,133 +128,251 @@ impl Places {
         };
         links.into_iter().find_map(label)
     }
+
+    /// The serial ports that are functions of the drive's USB device, by name: those of its own board. Empty where the system does not
+    /// say it; Linux does.
+    pub fn ports_of(&self, drive: &Drive) -> Vec<String> {
+        let Some(usb) = &drive.usb else { return Vec::new() };
+        let entries = fs::read_dir(self.classes.join("tty")).into_iter().flatten().flatten();
+        let nodes = entries.map(|entry| self.nodes.join(entry.file_name()));
+        let own = nodes.filter(|node| self.usb_device("tty", node).is_some_and(|of| of.folder == usb.folder));
+        let mut ports: Vec<String> = own.map(|node| node.to_string_lossy().into_owned()).collect();
+        ports.sort();
+        ports
+    }
+
+    /// A serial port and a drive are functions of one USB device, so of one board. `None` where the system does not say; Linux does.
+    pub fn same_usb_device(&self, port: &str, drive: &Drive) -> Option<bool> {
+        let of_port = self.usb_device("tty", Path::new(port))?;
+        Some(of_port.folder == drive.usb.as_ref()?.folder)
+    }
+
+    /// The USB device that a node of a device is a function of.
+    fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
+        let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
+        let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
+        // The device itself is what has the number of its maker.
+        while !folder.join("idVendor").exists() {
+            folder = folder.parent()?.to_owned();
+        }
+        let number = fs::read_to_string(folder.join("devnum")).unwrap_or_default().trim().to_owned();
+        Some(UsbDevice { folder, number })
+    }
 }
 
-/// A path as the table of mounts writes it: `\040` is a blank.
-fn unescaped(text: &str) -> String {
-    let mut plain = String::new();
+/// Bytes of a path as the table of mounts writes it: `\040` is a blank.
+fn unescaped(text: &[u8]) -> Vec<u8> {
+    let mut plain = Vec::new();
     let mut rest = text;
-    while let Some((before, behind)) = rest.split_once('\\') {
-        plain += before;
-        match behind.get(..3).and_then(|digits| u8::from_str_radix(digits, 8).ok()) {
+    while let [first, behind @ ..] = rest {
+        let digits = behind.get(..3).filter(|_| *first == b'\\').and_then(|d| std::str::from_utf8(d).ok());
+        match digits.and_then(|digits| u8::from_str_radix(digits, 8).ok()) {
             Some(byte) => {
-                plain.push(byte.into());
+                plain.push(byte);
                 rest = &behind[3..];
             }
             None => {
-                plain.push('\\');
+                plain.push(*first);
                 rest = behind;
             }
         }
     }
-    plain + rest
+    plain
 }
 
-/// A serial port and a drive are functions of one USB device, so of one board. `None` where the system does not say; Linux does.
-pub fn same_usb_device(port: &str, drive: &Drive) -> Option<bool> {
-    same_usb_device_in(Path::new("/sys/class"), port, drive)
+/// A path of these bytes, whatever they are.
+#[cfg(unix)]
+fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
+    use std::os::unix::ffi::OsStringExt as _;
+    Some(std::ffi::OsString::from_vec(bytes).into())
 }
 
-fn same_usb_device_in(classes: &Path, port: &str, drive: &Drive) -> Option<bool> {
-    let of_port = usb_device(&classes.join("tty"), Path::new(port))?;
-    let of_drive = usb_device(&classes.join("block"), drive.device.as_deref()?)?;
-    Some(of_port == of_drive)
-}
-
-/// The folder of the USB device that a device node is a function of.
-fn usb_device(class: &Path, node: &Path) -> Option<PathBuf> {
-    let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
-    let mut at = fs::canonicalize(class.join(node.file_name()?)).ok()?;
-    // The device itself is what has the number of its maker.
-    while !at.join("idVendor").exists() {
-        at = at.parent()?.to_owned();
-    }
-    Some(at)
+/// A path of these bytes, where they are a text.
+#[cfg(not(unix))]
+fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
+    String::from_utf8(bytes).ok().map(Into::into)
 }
 
 #[cfg(all(test, unix))]
 mod tests {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
     use std::os::unix::fs::symlink;
 
     use super::super::Fit;
     use super::*;
 
-    #[test]
-    fn drives_are_found_where_they_are_mounted_with_their_labels() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        for name in ["dev", "by-label", "a b", "usb", "empty", "more", "more/NOD_H743ZI2"] {
-            fs::create_dir(at(name)).unwrap();
+    /// Two boards at USB, with drive and serial port each, and the places of a system that has them.
+    struct Desk {
+        folder: tempfile::TempDir,
+        places: Places,
+        table: Vec<u8>,
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let at = |name: &str| folder.path().join(name);
+            for name in ["dev", "by-label", "class/tty", "class/block"] {
+                fs::create_dir_all(at(name)).unwrap();
+            }
+            for (usb, disk, tty) in [("1-2", "sda", "ttyACM0"), ("1-3", "sdb", "ttyACM1")] {
+                for (class, part, name) in [("block", "1.1/host0/block", disk), ("tty", "1.2/tty", tty)] {
+                    let device = at(&format!("{usb}/{usb}:{part}/{name}"));
+                    fs::create_dir_all(&device).unwrap();
+                    symlink(&device, at(&format!("class/{class}/{name}"))).unwrap();
+                    fs::write(at(&format!("dev/{name}")), "").unwrap();
+                }
+                fs::write(at(usb).join("idVendor"), "0483\n").unwrap();
+                fs::write(at(usb).join("devnum"), "7\n").unwrap();
+            }
+            // A port that is on no USB device.
+            fs::create_dir_all(at("platform/ttyS0")).unwrap();
+            symlink(at("platform/ttyS0"), at("class/tty/ttyS0")).unwrap();
+            let places = Places {
+                mounts: at("mounts"),
+                by_label: at("by-label"),
+                folders: vec![at("more"), at("nowhere")],
+                classes: at("class"),
+                nodes: at("dev"),
+            };
+            Self { folder, places, table: b"proc /proc proc rw 0 0\nbroken\n".to_vec() }
         }
-        for device in ["dev/sda", "dev/sdb", "dev/sdc"] {
-            fs::write(at(device), "").unwrap();
+
+        fn at(&self, name: &str) -> PathBuf {
+            self.folder.path().join(name)
         }
-        for drive in ["a b", "usb", "more/NOD_H743ZI2"] {
-            fs::write(at(drive).join("DETAILS.TXT"), "Version: V3J13\n").unwrap();
+
+        /// A drive at a folder of this name.
+        fn mount(&mut self, device: &str, name: &[u8], kind: &str) -> PathBuf {
+            let path = self.folder.path().join(OsStr::from_bytes(name));
+            fs::create_dir_all(&path).unwrap();
+            fs::write(path.join("DETAILS.TXT"), "Version: V3J13\n").unwrap();
+            self.table.extend(format!("{} ", self.at(device).display()).bytes());
+            for byte in path.as_os_str().as_bytes() {
+                match byte {
+                    b' ' => self.table.extend(b"\\040"),
+                    _ => self.table.push(*byte),
+                }
+            }
+            self.table.extend(format!(" {kind} rw 0 0\n").bytes());
+            fs::write(self.at("mounts"), &self.table).unwrap();
+            path
         }
-        symlink(at("dev/sda"), at("by-label/NOD_H745ZIQ")).unwrap();
-        let line = |device: &str, path: &str, kind: &str| {
-            format!(
-                "{} {} {kind} rw 0 0\n",
-                at(device).display(),
-                at(path).display().to_string().replace(' ', "\\040")
-            )
-        };
-        let mounts = line("dev/sda", "a b", "vfat")
-            + &line("dev/sdb", "empty", "vfat")
-            + &line("dev/sdc", "usb", "ext4");
-        fs::write(at("mounts"), mounts + "proc /proc proc rw 0 0\nbroken\n").unwrap();
-        let places = Places {
-            mounts: at("mounts"),
-            by_label: at("by-label"),
-            folders: vec![at("more"), at("nowhere")],
-        };
-        let drives = places.drives();
-        let found: Vec<_> = drives.iter().map(|d| (d.path.clone(), d.label.as_deref())).collect();
-        assert_eq!(found, [(at("a b"), Some("NOD_H745ZIQ")), (at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]);
-        // One that is named is the same drive, with the label of its device.
-        let named = places.at(&at("a b")).unwrap();
-        assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
-        assert_eq!(places.at(&at("usb")).unwrap().label.as_deref(), Some("usb"));
+
+        fn label(&self, device: &str, label: &str) {
+            symlink(self.at(device), self.at("by-label").join(label)).unwrap();
+        }
     }
 
     #[test]
-    fn a_port_and_a_drive_are_of_one_board_when_they_are_of_one_usb_device() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        for name in [
-            "1-2/1-2:1.1/host0/block/sda",
-            "1-2/1-2:1.2/tty/ttyACM0",
-            "1-3/1-3:1.2/tty/ttyACM1",
-            "class/tty",
-            "class/block",
-        ] {
-            fs::create_dir_all(at(name)).unwrap();
-        }
-        for device in ["1-2", "1-3"] {
-            fs::write(at(device).join("idVendor"), "0483\n").unwrap();
-        }
-        symlink(at("1-2/1-2:1.1/host0/block/sda"), at("class/block/sda")).unwrap();
-        symlink(at("1-2/1-2:1.2/tty/ttyACM0"), at("class/tty/ttyACM0")).unwrap();
-        symlink(at("1-3/1-3:1.2/tty/ttyACM1"), at("class/tty/ttyACM1")).unwrap();
-        let drive = |device: Option<&str>| Drive {
-            path: at("x"),
-            label: None,
-            code: None,
-            details: String::new(),
-            device: device.map(Into::into),
+    fn drives_are_found_where_they_are_mounted_with_their_labels() {
+        let mut desk = Desk::new();
+        fs::create_dir_all(desk.at("more/NOD_H743ZI2")).unwrap();
+        fs::write(desk.at("more/NOD_H743ZI2/DETAILS.TXT"), "").unwrap();
+        let one = desk.mount("dev/sda", b"a b", "vfat");
+        let other = desk.mount("dev/sdc", b"usb", "ext4");
+        desk.label("dev/sda", "NOD_H745ZIQ");
+        let drives = desk.places.drives();
+        let found: Vec<_> = drives.iter().map(|d| (d.path.clone(), d.label.as_deref())).collect();
+        assert_eq!(
+            found,
+            [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
+        );
+        // One that is named is the same drive, with the label of its device.
+        let named = desk.places.at(&one).unwrap();
+        assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
+        assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
+    }
+
+    #[test]
+    fn a_path_of_any_bytes_hides_no_drive() {
+        let mut desk = Desk::new();
+        let strange = desk.mount("dev/sdb", b"caf\xE9", "vfat");
+        let one = desk.mount("dev/sda", b"one", "vfat");
+        let paths: Vec<_> = desk.places.drives().into_iter().map(|drive| drive.path).collect();
+        assert_eq!(paths, [strange, one]);
+    }
+
+    #[test]
+    fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
+        let mut desk = Desk::new();
+        // The second NUCLEO-H743ZI of a desk: its label is that of the first, with a digit from the one who mounted it.
+        let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
+        let drive = desk.places.at(&path).unwrap();
+        assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
+        assert_eq!(desk.places.drives(), [drive]);
+    }
+
+    #[test]
+    fn a_drive_has_the_ports_of_its_own_usb_device() {
+        let mut desk = Desk::new();
+        let path = desk.mount("dev/sda", b"one", "vfat");
+        let drive = desk.places.at(&path).unwrap();
+        let port = |name: &str| desk.at("dev").join(name).to_str().unwrap().to_owned();
+        assert_eq!(desk.places.ports_of(&drive), [port("ttyACM0")]);
+        let same = |name: &str| desk.places.same_usb_device(name, &drive);
+        assert_eq!(same(&port("ttyACM0")), Some(true));
+        assert_eq!(same(&port("ttyACM1")), Some(false));
+        assert_eq!((same("/dev/ttyS0"), same("/tmp/jtc")), (None, None));
+        // A drive of which nothing is known has none.
+        let unknown = Drive::at(&path).unwrap();
+        assert_eq!(desk.places.ports_of(&unknown), [""; 0]);
+        assert_eq!(desk.places.same_usb_device(&port("ttyACM0"), &unknown), None);
+    }
+
+    #[test]
+    fn a_drive_that_comes_back_elsewhere_is_found_by_its_connector() {
+        let mut desk = Desk::new();
+        let path = desk.mount("dev/sda", b"one", "vfat");
+        let other = desk.mount("dev/sdb", b"other", "vfat");
+        let drive = desk.places.at(&path).unwrap();
+        let again = |desk: &Desk| desk.places.again(&drive).map(|found| found.path);
+        assert_eq!(again(&desk), Some(path));
+        // The device has gone, and whoever mounts drives has not noticed.
+        fs::remove_file(desk.at("class/block/sda")).unwrap();
+        assert_eq!(again(&desk), None);
+        let elsewhere = desk.mount("dev/sdd", b"one1", "vfat");
+        symlink(desk.at("1-2/1-2:1.1/host0/block/sda"), desk.at("class/block/sdd")).unwrap();
+        assert_eq!(again(&desk), Some(elsewhere));
+        assert_ne!(again(&desk), Some(other));
+    }
+
+    #[test]
+    fn another_drive_in_the_same_place_is_not_the_one_that_was_looked_at() {
+        let mut desk = Desk::new();
+        let path = desk.mount("dev/sda", b"one", "vfat");
+        desk.label("dev/sda", "NOD_H745ZIQ");
+        let drive = desk.places.at(&path).unwrap();
+        desk.places.still_there(&drive).unwrap();
+        let refused = |desk: &Desk| {
+            let error = desk.places.still_there(&drive).unwrap_err();
+            assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
         };
-        let same = |port: &str, device| same_usb_device_in(&at("class"), port, &drive(device));
-        assert_eq!(same("/dev/ttyACM0", Some("/dev/sda")), Some(true));
-        assert_eq!(same("/dev/ttyACM1", Some("/dev/sda")), Some(false));
-        assert_eq!(same("/tmp/jtc", Some("/dev/sda")), None);
-        assert_eq!(same("/dev/ttyACM0", Some("/dev/sdz")), None);
-        assert_eq!(same("/dev/ttyACM0", None), None);
+        // It was unplugged and plugged in again.
+        fs::write(desk.at("1-2/devnum"), "8\n").unwrap();
+        refused(&desk);
+        fs::write(desk.at("1-2/devnum"), "7\n").unwrap();
+        desk.places.still_there(&drive).unwrap();
+        // Another board is mounted there.
+        desk.mount("dev/sdb", b"one", "vfat");
+        refused(&desk);
+        // Nothing is mounted there, and the folder is one of this computer's disk.
+        fs::write(desk.at("mounts"), "").unwrap();
+        refused(&desk);
+        fs::remove_dir_all(&path).unwrap();
+        refused(&desk);
     }
 
     #[test]
     fn paths_of_the_table_of_mounts_are_read() {
-        for (text, plain) in [("/a", "/a"), ("/a\\040b\\134c", "/a b\\c"), ("/a\\9", "/a\\9"), ("\\", "\\")] {
+        for (text, plain) in [
+            (&b"/a"[..], &b"/a"[..]),
+            (b"/a\\040b\\134c", b"/a b\\c"),
+            (b"/a\\9", b"/a\\9"),
+            (b"\\", b"\\"),
+            (b"\xE9\\303\\251", b"\xE9\xC3\xA9"),
+        ] {
             assert_eq!(unescaped(text), plain);
         }
     }

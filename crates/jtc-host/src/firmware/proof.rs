@@ -1,11 +1,12 @@
 //! After an image was copied to a drive: what the drive reports, and what the program that runs now reports of the flash that it runs from.
 
+use std::fmt;
 use std::thread::sleep;
 use std::time::Duration;
 
 use jtc_wire::{Info, Program, StoreState};
 
-use super::{Drive, FirmwareError, Image, Written};
+use super::{Drive, FirmwareError, Image, Places, Written};
 use crate::error::LinkError;
 use crate::port::{Port, PortError};
 use crate::session::{Session, Timeouts};
@@ -14,6 +15,11 @@ use crate::session::{Session, Timeouts};
 const READ_WITHIN: Duration = Duration::from_secs(3);
 /// What two clocks may differ by: a share, and what a start may be seen late.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
+
+/// Within this time after the copying another program may run yet: the one of before, which the ST-LINK stops only then.
+const OTHER_STOPS: Duration = Duration::from_secs(10);
+/// Most time that is waited for a controller to read its flash, by the clock of the line.
+const READS_NOW: Duration = Duration::from_secs(5);
 
 /// How long is waited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +52,16 @@ pub enum DriveAfter {
     Stayed,
 }
 
+impl fmt::Display for DriveAfter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::CameBack => "the drive vanished and came back without a report",
+            Self::Gone => "the drive vanished, and has not come back",
+            Self::Stayed => "the drive has not vanished, as it does when it takes an image",
+        })
+    }
+}
+
 /// A controller that has proved that it runs the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
@@ -68,6 +84,7 @@ impl Proof {
 
 /// Looks at a drive again and again.
 struct Watch<'a> {
+    places: &'a Places,
     drive: &'a Drive,
     written: &'a Written,
     seen: DriveAfter,
@@ -76,52 +93,70 @@ struct Watch<'a> {
 impl Watch<'_> {
     /// An error when the drive reports one.
     fn look(&mut self) -> Result<(), FirmwareError> {
-        self.seen = match (self.drive.is_there(), self.seen) {
-            (false, _) => DriveAfter::Gone,
-            (true, DriveAfter::Stayed) => DriveAfter::Stayed,
-            (true, _) => DriveAfter::CameBack,
+        let now = self.places.again(self.drive);
+        self.seen = match (&now, self.seen) {
+            (None, _) => DriveAfter::Gone,
+            (Some(now), DriveAfter::Stayed) if now.path == self.drive.path && now.usb == self.drive.usb => {
+                DriveAfter::Stayed
+            }
+            (Some(_), _) => DriveAfter::CameBack,
         };
+        let Some(now) = now else { return Ok(()) };
         // A report of before, which it shows until it has vanished, is none of this image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
-        match self.drive.failure() {
-            Some(text) if !stale(&text) => {
-                Err(FirmwareError::Refused { drive: self.drive.path.clone(), text })
-            }
+        match now.failure() {
+            Some(text) if !stale(&text) => Err(FirmwareError::Refused { drive: now.path, text }),
             _ => Ok(()),
         }
     }
 }
 
-/// Waits until the drive has come back, or has not vanished at all for all the time; for boards without a serial line.
+/// Waits until the drive has come back, or all the time; for boards without a serial line. What it returns is no proof.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`].
-pub fn wait_for_drive(drive: &Drive, written: &Written, limits: Limits) -> Result<DriveAfter, FirmwareError> {
-    let mut watch = Watch { drive, written, seen: DriveAfter::Stayed };
-    while written.began.elapsed() < limits.wait && watch.seen != DriveAfter::CameBack {
-        sleep(limits.pause);
+/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] when the drive has not vanished, or has not come back and the system could not confirm
+/// that all was written.
+pub fn wait_for_drive(
+    places: &Places,
+    drive: &Drive,
+    written: &Written,
+    limits: Limits,
+) -> Result<DriveAfter, FirmwareError> {
+    let mut watch = Watch { places, drive, written, seen: DriveAfter::Stayed };
+    loop {
         watch.look()?;
+        if watch.seen == DriveAfter::CameBack || written.began.elapsed() >= limits.wait {
+            break;
+        }
+        sleep(limits.pause);
     }
-    Ok(watch.seen)
+    let (seen, doubt) = (watch.seen, written.doubt.clone());
+    match seen {
+        DriveAfter::CameBack => Ok(seen),
+        // Where nobody mounts drives it does not come back.
+        DriveAfter::Gone if doubt.is_none() => Ok(seen),
+        DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
+    }
 }
 
-/// Waits until the controller on the line has started with the image, and proves it; `note` gets what is seen meanwhile.
+/// Waits until the controller on the line has started with the image, and proves it.
 ///
 /// # Errors
 ///
 /// [`FirmwareError::Refused`] by the drive, [`FirmwareError::OtherProgram`] when something else runs, [`FirmwareError::NotReported`] when
 /// the program does not report its flash, [`FirmwareError::NotStarted`] when none started in time.
 pub fn prove(
+    places: &Places,
     image: &Image,
     drive: &Drive,
     written: &Written,
     open: &mut OpenPort<'_>,
     limits: Limits,
 ) -> Result<Proof, FirmwareError> {
-    let mut watch = Watch { drive, written, seen: DriveAfter::Stayed };
+    let mut watch = Watch { places, drive, written, seen: DriveAfter::Stayed };
     loop {
         watch.look()?;
         let last = match open().map_err(LinkError::from).and_then(|port| ask(port, limits)) {
@@ -129,10 +164,15 @@ pub fn prove(
                 "the program of before still runs".into()
             }
             Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
-            Ok(Some(info)) => {
-                let program = compare(image, &info)?;
-                return Ok(Proof { info, program, drive: watch.seen, took: written.began.elapsed() });
-            }
+            Ok(Some(info)) => match compare(image, &info) {
+                Ok(program) => {
+                    // The drive may have come back meanwhile, with a report.
+                    watch.look()?;
+                    return Ok(Proof { info, program, drive: watch.seen, took: written.began.elapsed() });
+                }
+                Err(error) if settled(&watch, limits) => return Err(error),
+                Err(error) => error.to_string(),
+            },
             Ok(None) => "a controller without extensions answers".into(),
             Err(e) => e.to_string(),
         };
@@ -142,6 +182,14 @@ pub fn prove(
         }
         sleep(limits.pause);
     }
+}
+
+/// What runs now is what stays. Before the ST-LINK begins to write, and when it only has reset the processor, the program of before starts anew.
+fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
+    let written = watch.written;
+    watch.seen == DriveAfter::CameBack
+        || written.ended.elapsed() >= OTHER_STOPS
+        || written.began.elapsed() >= limits.wait
 }
 
 /// The device has started within this time.
@@ -155,15 +203,16 @@ fn still_reads(info: &Info) -> bool {
     info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
 }
 
-/// Who the controller is, once it has read its flash; `None` for a device without extensions.
+/// Who the controller is, once it has read its flash, or has not for five seconds; `None` for a device without extensions.
 ///
 /// # Errors
 ///
 /// Those of [`Session::info`].
 pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Info>, LinkError> {
+    let end = session.now() + READS_NOW;
     loop {
         match session.info()? {
-            Some(info) if still_reads(&info) => drop(session.next_status()?),
+            Some(info) if still_reads(&info) && session.now() < end => drop(session.next_status()?),
             info => return Ok(info),
         }
     }

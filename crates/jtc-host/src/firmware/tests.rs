@@ -5,11 +5,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use host_kit::{Diagnose, ErrorKind};
-use jtc_wire::{ControllerState, NodeState};
 
 use super::fake::{Behaviour, Board, StLink, image_bytes, program_of};
 use super::*;
 use crate::Session;
+
+mod before;
+#[cfg(unix)]
+mod lines;
 
 const H745: &str = "nucleo-h745zi-q";
 /// What is waited for comes at once, or never.
@@ -20,19 +23,37 @@ fn image(board: &str, seed: u8) -> Image {
     Image::parse(Path::new("new.bin"), image_bytes(board, seed)).unwrap()
 }
 
+/// Those of a system that knows nothing of drives and ports.
+fn places() -> Places {
+    let nowhere = || Path::new("/nowhere-of-test").to_owned();
+    Places {
+        mounts: nowhere(),
+        by_label: nowhere(),
+        folders: Vec::new(),
+        classes: nowhere(),
+        nodes: nowhere(),
+    }
+}
+
+/// What the board reports on a line of which this is known.
+fn asked(board: &Board, same_device: Option<bool>) -> Before {
+    let answers = look(&mut Session::new(board.port())).unwrap();
+    Before { lines: vec![Asked { port: "ttyX".into(), same_device, answers }] }
+}
+
 /// The board runs the image of seed 1; that of seed 2 is flashed.
 fn flash(behaviour: Behaviour, limits: Limits) -> (Result<Proof, FirmwareError>, Board, StLink) {
     let board = Board::running(H745, Some(program_of(&image_bytes(H745, 1))));
     let link = StLink::new("NOD_H745ZIQ", &board, behaviour);
     let (drive, new) = (link.drive(), image(H745, 2));
-    let before = Before { answers: look(&mut Session::new(board.port())).unwrap(), same_device: Some(true) };
-    assert_eq!((before.to_confirm(), before.stored_arm()), (None, Some(true)));
+    let before = asked(&board, Some(true));
+    assert_eq!((before.to_confirm(&new), before.stored_arm()), (None, Some(true)));
     may_flash(&new, &drive, &before, Permissions::default()).unwrap();
     assert!(compare(&new, before.info().unwrap()).is_err(), "it does not run yet");
     let mut copied = 0;
     let written = put(&drive, &new, &mut |bytes| copied = bytes).unwrap();
     assert_eq!((copied, &written.doubt, &written.failure_before), (new.bytes().len(), &None, &None));
-    let proof = prove(&new, &drive, &written, &mut board.opener(), limits);
+    let proof = prove(&places(), &new, &drive, &written, &mut board.opener(), limits);
     (proof, board, link)
 }
 
@@ -60,6 +81,34 @@ fn j67_a_hole_that_the_drive_does_not_report_is_found() {
 }
 
 #[test]
+fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
+    let (proof, ..) = flash(Behaviour::StartsBeforeAnew, LIMITS);
+    assert_eq!(proof.unwrap().program, program_of(&image_bytes(H745, 2)));
+}
+
+#[test]
+fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
+    // One whose clock stands still is in its first second for ever.
+    let mut asked = 0;
+    let port = crate::port::test::ScriptedPort::new(Some(9_600), move |_, bytes| {
+        if bytes.is_empty() {
+            return jtc_wire::Status::default().emit().to_vec();
+        }
+        asked += 1;
+        assert!(asked < 10_000, "it is asked for ever");
+        let response =
+            jtc_wire::Response::good(jtc_wire::FrameType::GetInfo, jtc_wire::DataStatus::NoError, 6);
+        let mut out = jtc_wire::Status { response, ..Default::default() }.emit().to_vec();
+        let mut frame = [0; jtc_wire::ANSWER_MAX];
+        let n = jtc_wire::Answer::Info(jtc_wire::Info::default()).emit(&mut frame).unwrap();
+        out.extend(&frame[..n]);
+        out
+    });
+    let info = info_with_program(&mut Session::new(port)).unwrap().unwrap();
+    assert_eq!(info.program, None);
+}
+
+#[test]
 fn what_fail_txt_says_is_reported() {
     let (proof, _, link) = flash(Behaviour::Fails("The target flash is write protected\r\n"), LIMITS);
     let error = proof.unwrap_err();
@@ -69,8 +118,8 @@ fn what_fail_txt_says_is_reported() {
     let (drive, new) = (link.drive(), image(H745, 2));
     let written = put(&drive, &new, &mut |_| {}).unwrap();
     assert_eq!(written.failure_before.as_deref(), Some("The target flash is write protected"));
-    let seen = wait_for_drive(&drive, &written, SHORT);
-    assert!(matches!(seen, Ok(DriveAfter::Stayed)), "{seen:?}");
+    let seen = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
+    assert!(matches!(seen, FirmwareError::NotTaken { seen: DriveAfter::Stayed, .. }), "{seen}");
 }
 
 #[test]
@@ -87,7 +136,42 @@ fn without_a_line_the_drive_is_all_there_is() {
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Takes);
     let drive = link.drive();
     let written = put(&drive, &image(H745, 2), &mut |_| {}).unwrap();
-    assert_eq!(wait_for_drive(&drive, &written, LIMITS).unwrap(), DriveAfter::CameBack);
+    assert_eq!(wait_for_drive(&places(), &drive, &written, LIMITS).unwrap(), DriveAfter::CameBack);
+}
+
+#[test]
+fn a_drive_that_does_not_come_back_is_no_success_where_the_system_is_in_doubt() {
+    let board = Board::running(H745, None);
+    let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
+    let drive = link.drive();
+    let written = put(&drive, &image(H745, 2), &mut |_| {}).unwrap();
+    let doubtful = Written { doubt: Some("Input/output error".into()), ..written.clone() };
+    // One that stays has not taken it, and one that has gone may have.
+    let stayed = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
+    assert!(stayed.to_string().contains("has not vanished"), "{stayed}");
+    fs::remove_dir_all(&link.path).unwrap();
+    assert_eq!(wait_for_drive(&places(), &drive, &written, SHORT).unwrap(), DriveAfter::Gone);
+    let gone = wait_for_drive(&places(), &drive, &doubtful, SHORT).unwrap_err();
+    assert!(gone.to_string().contains("Input/output error"), "{gone}");
+    assert_eq!((stayed.kind(), gone.kind()), (ErrorKind::Fault, ErrorKind::Fault));
+}
+
+#[test]
+fn nothing_is_written_where_the_drive_has_gone() {
+    let board = Board::running(H745, None);
+    let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
+    let drive = link.drive();
+    let refused = |drive: &Drive| {
+        let error = put(drive, &image(H745, 2), &mut |_| {}).unwrap_err();
+        assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
+        assert_eq!(error.kind(), ErrorKind::Refused);
+        assert!(!link.path.join("openjtc.bin").exists());
+    };
+    // Another file system is there now.
+    refused(&Drive { volume: Some(u64::MAX), ..drive.clone() });
+    // The folder in which it was mounted has nothing in it.
+    fs::remove_file(link.path.join("DETAILS.TXT")).unwrap();
+    refused(&drive);
 }
 
 #[test]
@@ -99,97 +183,26 @@ fn a_program_that_does_not_report_its_flash_proves_nothing() {
 }
 
 #[test]
-fn an_arm_with_torque_is_not_dropped() {
-    let board = Board::running(H745, None);
-    let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
-    let ask = || {
-        let answers = look(&mut Session::new(board.port())).unwrap();
-        let before = Before { answers, same_device: Some(true) };
-        let all = Permissions { assume_board: true, accept_supply: true };
-        may_flash(&image(H745, 2), &link.drive(), &before, all)
-    };
-    assert!(ask().is_ok(), "Init, no drive enabled");
-    for state in ControllerState::ALL {
-        board.set_status(|status| status.state = state.into());
-        let idle = [ControllerState::Init, ControllerState::Error].contains(&state);
-        match ask() {
-            Err(error @ FirmwareError::HasTorque { .. }) if !idle => {
-                assert_eq!(error.kind(), ErrorKind::Refused)
-            }
-            asked => assert!(asked.is_ok() && idle, "{state}: {asked:?}"),
-        }
-    }
-    // One drive that is enabled is enough.
-    board.set_status(|status| {
-        status.state = ControllerState::Error.into();
-        status.joints[5].state = NodeState::ENABLED;
-    });
-    assert!(matches!(ask(), Err(FirmwareError::HasTorque { .. })));
-}
-
-#[test]
-fn who_cannot_be_asked_has_to_be_answered_for() {
-    let board = Board::running(H745, None);
-    let answers = look(&mut Session::new(board.port())).unwrap();
-    let of = |answers: &Answers, same_device| Before { answers: answers.clone(), same_device }.to_confirm();
-    assert_eq!(of(&answers, Some(true)), None);
-    for (answers, same) in
-        [(&answers, Some(false)), (&answers, None), (&Answers::Nothing, Some(true)), (&Answers::NoPort, None)]
-    {
-        assert!(of(answers, same).unwrap().contains("supported"), "{answers:?} {same:?}");
-    }
-    board.hold(true);
-    assert_eq!(look(&mut Session::new(board.port())).unwrap(), Answers::Nothing);
-}
-
-#[test]
-fn an_image_goes_onto_its_own_board_only() {
-    let quiet = |label: &str| {
-        let link = StLink::new(label, &Board::running(H745, None), Behaviour::Ignores);
-        let drive = link.drive();
-        (link, drive)
-    };
-    let ask = |board: &str, drive: &Drive, runs: Option<&str>, permissions| {
-        let answers = runs.map_or(Answers::Nothing, |runs| {
-            look(&mut Session::new(Board::running(runs, None).port())).unwrap()
-        });
-        let before = Before { answers, same_device: Some(true) };
-        let asked = may_flash(&image(board, 2), drive, &before, permissions);
-        asked.map_err(|error| {
-            assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
-            error.code()
-        })
-    };
-    let none = Permissions::default();
-    let (_h745, h745) = quiet("NOD_H745ZIQ");
-    let (_cut, cut) = quiet("NODE_H743ZI");
-    let all = Permissions { assume_board: true, accept_supply: true };
-    assert_eq!(ask(H745, &h745, None, none), Ok(()));
-    assert_eq!(ask("nucleo-h743zi2", &h745, None, all), Err("other-board"));
-    // A label that is cut: the controller that runs there names the board, or a person.
-    assert_eq!(ask("nucleo-h743zi2", &cut, None, none), Err("unnamed-board"));
-    assert_eq!(ask("nucleo-h743zi2", &cut, None, Permissions { assume_board: true, ..none }), Ok(()));
-    assert_eq!(ask("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), none), Ok(()));
-    // Something else at the line is no board of this image, whatever a person says.
-    assert_eq!(ask(H745, &h745, Some("simulator"), all), Err("other-controller"));
-    // The supply of the core cannot be seen from outside.
-    let ldo = "nucleo-h745zi-q-ldo";
-    assert_eq!(ask(ldo, &h745, None, none), Err("other-supply"));
-    assert_eq!(ask(ldo, &h745, Some(H745), none), Err("other-supply"));
-    assert_eq!(ask(H745, &h745, Some(ldo), none), Err("other-supply"));
-    assert_eq!(ask(ldo, &h745, Some(ldo), none), Ok(()));
-    assert_eq!(ask(ldo, &h745, Some(H745), Permissions { accept_supply: true, ..none }), Ok(()));
-}
-
-#[test]
 fn a_drive_that_cannot_be_written_is_an_error_with_the_path() {
     let board = Board::running(H745, None);
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
     let drive = link.drive();
     fs::create_dir(link.path.join("openjtc.bin")).unwrap();
     let error = put(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
-    assert!(matches!(error, FirmwareError::NotWritten { written: 0, .. }), "{error}");
+    assert!(matches!(error, FirmwareError::NotOpened { .. }), "{error}");
     assert!(error.to_string().contains("openjtc.bin"), "{error}");
+    assert!(error.to_string().contains("nothing was written"), "{error}");
+    assert_eq!(error.kind(), ErrorKind::Refused);
+}
+
+#[test]
+fn a_drive_that_may_not_be_written_says_how_it_can() {
+    for (os, words) in [(13, "this user may not write"), (30, "mounted read-only")] {
+        let (path, device) = ("/media/x/openjtc.bin".into(), Some("/dev/sdq".into()));
+        let error = FirmwareError::NotOpened { path, device, source: std::io::Error::from_raw_os_error(os) };
+        assert!(error.to_string().contains(words), "{error}");
+        assert!(error.hint().contains("udisksctl mount -b /dev/sdq"), "{}", error.hint());
+    }
 }
 
 /// The device that is always full is the system's own.
@@ -202,6 +215,7 @@ fn a_drive_that_is_full_says_what_that_means() {
     std::os::unix::fs::symlink("/dev/full", link.path.join("openjtc.bin")).unwrap();
     fs::write(link.path.join("FAIL.TXT"), "no target").unwrap();
     let error = put(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
-    assert!(matches!(&error, FirmwareError::DriveFull { bytes: 0x1000, .. }), "{error}");
+    assert!(matches!(&error, FirmwareError::DriveFull { .. }), "{error}");
+    assert!(error.to_string().contains("1048644 bytes"), "{error}");
     assert!(error.to_string().contains("no target") && error.hint().contains("BOOT0"), "{error}");
 }

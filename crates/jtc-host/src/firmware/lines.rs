@@ -1,0 +1,85 @@
+//! The serial lines over which a board is asked before it is flashed.
+//!
+//! The drive belongs to an ST-LINK, and so does the serial port of the same USB device: it leads to the very board that is flashed, and is
+//! always asked. Another port can be named beside it, as the controller may be used over its RS422 line.
+
+use std::fs;
+use std::path::PathBuf;
+
+use super::before::{Asked, Before, look};
+use super::{Drive, FirmwareError, Places};
+use crate::port::{Port, PortError};
+use crate::session::Session;
+
+/// Opens a serial port for this program alone.
+pub type OpenLine<'a> = dyn FnMut(&str) -> Result<Box<dyn Port>, PortError> + 'a;
+
+/// Lines that are asked. As long as they are open no other program, and no agent, gets at the controller through them.
+pub struct Lines(Vec<Line>);
+
+struct Line {
+    port: String,
+    same_device: Option<bool>,
+    session: Session<Box<dyn Port>>,
+}
+
+impl Lines {
+    /// Opens the serial ports of the drive's own USB device, and the one that is named.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NotAsked`] when a port of the drive's own device cannot be opened, or the named one is in use;
+    /// [`FirmwareError::Port`] when the named one cannot be opened for another reason.
+    pub fn open(
+        places: &Places,
+        drive: &Drive,
+        named: Option<&str>,
+        open: &mut OpenLine<'_>,
+    ) -> Result<Self, FirmwareError> {
+        let own = places.ports_of(drive);
+        let mut lines = Vec::new();
+        for port in &own {
+            let session = open(port).map(Session::new).map_err(|source| not_asked(port, source))?;
+            lines.push(Line { port: port.clone(), same_device: Some(true), session });
+        }
+        if let Some(port) = named.filter(|named| !own.iter().any(|own| real(own) == real(named))) {
+            let session = open(port).map(Session::new).map_err(|source| match source {
+                PortError::Busy { .. } => not_asked(port, source),
+                source => FirmwareError::Port(source),
+            })?;
+            let same_device = places.same_usb_device(port, drive);
+            lines.push(Line { port: port.to_owned(), same_device, session });
+        }
+        Ok(Self(lines))
+    }
+
+    /// What is reported on each of them now.
+    ///
+    /// # Errors
+    ///
+    /// [`FirmwareError::NotAsked`] when a port has gone.
+    pub fn look(&mut self) -> Result<Before, FirmwareError> {
+        let ask = |line: &mut Line| {
+            let answers = look(&mut line.session).map_err(|error| match error {
+                FirmwareError::Port(source) => not_asked(&line.port, source),
+                error => error,
+            })?;
+            Ok(Asked { port: line.port.clone(), same_device: line.same_device, answers })
+        };
+        Ok(Before { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
+    }
+
+    /// The line over which a board proves what it runs: its own, or else the one that was named; and whether it is of the drive's device.
+    pub fn proving(&self) -> Option<(&str, Option<bool>)> {
+        self.0.first().map(|line| (line.port.as_str(), line.same_device))
+    }
+}
+
+fn not_asked(port: &str, source: PortError) -> FirmwareError {
+    FirmwareError::NotAsked { port: port.to_owned(), source }
+}
+
+/// The node that a name leads to.
+fn real(port: &str) -> PathBuf {
+    fs::canonicalize(port).unwrap_or_else(|_| port.into())
+}

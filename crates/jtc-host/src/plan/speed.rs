@@ -10,8 +10,12 @@ use crate::trajectory::{Point, Trajectory};
 ///
 /// # Errors
 ///
-/// [`PlanError::Speed`] outside 1..200 %, [`PlanError::TooLong`] when the slower one does not fit into the controller.
+/// [`PlanError::Speed`] outside 1..200 %, [`PlanError::TooLong`] when the slower one does not fit into the controller,
+/// [`PlanError::Plan`] without a point.
 pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, PlanError> {
+    if trajectory.points.is_empty() {
+        return Err(jtc_plan::PlanError::TooFew { count: 0 }.into());
+    }
     if !(1.0..=200.0).contains(&speed_pct) {
         return Err(PlanError::Speed { percent: speed_pct, most: 200.0 });
     }
@@ -88,6 +92,15 @@ mod tests {
     use super::*;
     use crate::check::Checker;
     use crate::plan::joint_move;
+
+    #[test]
+    fn a_trajectory_without_points_has_no_other_speed() {
+        let none = Trajectory { step_ms: 10, points: Vec::new() };
+        for speed in [50.0, 70.0, 100.0] {
+            let error = at_speed(&none, speed).unwrap_err();
+            assert!(matches!(error, PlanError::Plan(jtc_plan::PlanError::TooFew { count: 0 })), "{error}");
+        }
+    }
 
     fn pose() -> impl Strategy<Value = [f64; JOINTS]> {
         prop::array::uniform6(-1.5..1.5f64)

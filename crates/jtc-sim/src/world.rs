@@ -202,7 +202,9 @@ impl World {
             }
         }
         if let Some(exchange) = &mut self.exchange {
-            **exchange = Exchange { host: fresh.clone(), ..Exchange::default() };
+            // The pin keeps its level where no tick comes.
+            let safety_output = self.safety_output;
+            **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
         self.board.receive(now, &fresh);
     }
@@ -214,6 +216,9 @@ impl World {
             if self.board.miss() {
                 self.log.push(self.now_us(), Event::WatchdogReset);
                 self.restart();
+                if let Some(exchange) = &mut self.exchange {
+                    exchange.safety_output = self.safety_output;
+                }
             }
             return;
         }

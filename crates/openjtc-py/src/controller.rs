@@ -41,6 +41,8 @@ pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failur
 pub struct Controller {
     board: Board,
     now_us: u64,
+    /// A pin keeps its level where no tick comes.
+    safety_output: bool,
 }
 
 #[pymethods]
@@ -51,7 +53,7 @@ impl Controller {
         let (config, stored) = of_arm(arm.map(|arm| &*arm.inner))?;
         let world = SimConfig::default();
         let board = Board::new(config, stored, world.inter_byte_timeout_us, world.watchdog_ms);
-        Ok(Self { board, now_us: 0 })
+        Ok(Self { board, now_us: 0, safety_output: false })
     }
 
     /// One millisecond.
@@ -72,7 +74,8 @@ impl Controller {
         self.now_us += 1_000;
         if !ticked {
             let reset = self.board.miss();
-            return Ok((None, PyBytes::new(py, &[]), false, reset));
+            self.safety_output &= !reset;
+            return Ok((None, PyBytes::new(py, &[]), self.safety_output, reset));
         }
         let outputs = self.board.tick(&Pins {
             bus: &frames,
@@ -82,7 +85,8 @@ impl Controller {
         });
         let sent = outputs.bus.map(|frame| to_python(py, &frame));
         let to_host = PyBytes::new(py, &self.board.bytes_to_host(&outputs));
-        Ok((sent, to_host, outputs.safety_output, false))
+        self.safety_output = outputs.safety_output;
+        Ok((sent, to_host, self.safety_output, false))
     }
 
     /// What the last tick computed.

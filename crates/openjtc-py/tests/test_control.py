@@ -136,8 +136,10 @@ def test_drives_in_python_are_brought_up_and_held_until_they_are_silent():
 def test_a_timer_that_does_not_come_is_reset_by_the_watchdog():
     controller = Controller()
     controller.tick()
-    resets = [controller.tick(Inputs(ticked=False)).reset for _ in range(10)]
-    assert resets == [False] * 9 + [True]
+    held = [controller.tick().safety_output for _ in range(3)][-1]
+    missed = [controller.tick(Inputs(ticked=False)) for _ in range(10)]
+    assert [out.reset for out in missed] == [False] * 9 + [True]
+    assert [out.safety_output for out in missed] == [held] * 9 + [False] and held, "a pin keeps its level until the reset"
 
 
 def test_wrong_frames_are_refused():

@@ -70,7 +70,7 @@ class Outputs:
     Attributes:
         bus: The frame for the joint bus; None in the first tick, and where the tick did not come.
         host: Bytes for the host: a status (25 times a second), an answer, or nothing.
-        safety_output: Level of the safety output; True is no error.
+        safety_output: Level of the safety output; True is no error. Where the tick did not come it is as before; after a reset False.
         telemetry: What the tick computed: set values, measured values, the torque in its parts.
         reset: The watchdog has reset the controller.
     """

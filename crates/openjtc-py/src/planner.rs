@@ -252,7 +252,7 @@ fn thinned<'py>(
             .next("0.01 rad is half a degree"));
     }
     let (rows, _) = array::rows(positions, "positions")?;
-    let kept = jtc_host::waypoints::thinned(&rows, tolerance);
+    let kept = py.detach(|| jtc_host::waypoints::thinned(&rows, tolerance));
     Ok(array::matrix(py, &kept.into_iter().map(|i| rows[i]).collect::<Vec<_>>()))
 }
 

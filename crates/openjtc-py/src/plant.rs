@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::array;
 use crate::error::Failure;
-use crate::simulated::SimulatedArm;
+use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
 /// Boot of the drives, ms: until it is over the mean of their speed has forgotten that there was none before.
@@ -62,10 +62,9 @@ impl Plant {
     }
 
     /// Milliseconds under a torque.
-    fn step(&mut self, py: Python<'_>, torque: &Bound<'_, PyAny>, ms: u64) -> Result<(), Failure> {
+    fn step(&mut self, py: Python<'_>, torque: &Bound<'_, PyAny>, ms: u64) -> PyResult<()> {
         let torque = array::joints(torque, "torque")?;
-        py.detach(|| (0..ms).for_each(|_| self.millisecond(&torque)));
-        Ok(())
+        pass(py, ms, || self.millisecond(&torque))
     }
 
     #[getter]

@@ -63,6 +63,21 @@ impl SimulatedArm<'_> {
     }
 }
 
+/// So much of a long time is simulated before signals (Ctrl-C) are looked at, ms.
+const SLICE_MS: u64 = 1_000;
+
+/// Milliseconds pass, without the GIL.
+pub fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> PyResult<()> {
+    let mut left = ms;
+    while left > 0 {
+        let slice = left.min(SLICE_MS);
+        py.detach(|| (0..slice).for_each(|_| millisecond()));
+        left -= slice;
+        py.check_signals()?;
+    }
+    Ok(())
+}
+
 /// What supports the arm while its drives are not enabled.
 pub fn support(name: &str) -> Result<Support, Failure> {
     Ok(match name {

@@ -9,7 +9,7 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::array;
 use crate::controller::{PyFrame, to_python};
 use crate::error::Failure;
-use crate::simulated::{SimulatedArm, faults, hand, support};
+use crate::simulated::{SimulatedArm, faults, hand, pass, support};
 use crate::telemetry::Telemetry;
 
 /// Inputs of the controller in a millisecond: frames, bytes of the host, acknowledged, bus-off, safety input, status free, ticked.
@@ -54,8 +54,8 @@ impl Simulator {
     }
 
     /// Milliseconds pass.
-    fn step(&mut self, py: Python<'_>, ms: u64) {
-        py.detach(|| (0..ms).for_each(|_| self.world.step()));
+    fn step(&mut self, py: Python<'_>, ms: u64) -> PyResult<()> {
+        pass(py, ms, || self.world.step())
     }
 
     #[getter]

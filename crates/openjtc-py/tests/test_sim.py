@@ -1,5 +1,8 @@
 """The simulated world and the plant for controllers of one's own."""
 
+import _thread
+import threading
+
 import numpy as np
 import pytest
 
@@ -38,6 +41,17 @@ def test_a_stored_arm_is_brought_up_and_held():
     assert np.abs(simulator.position - before).max() < 1e-3
     assert simulator.safety_output and simulator.bus_frames and 0 < simulator.statistics["bus_load"] < 1
     assert any("HoldPos" in words for _, words in simulator.events)
+
+
+def test_a_long_step_is_ended_by_ctrl_c():
+    simulator, plant = Simulator(), Plant()
+    for step in (lambda: simulator.step(10**9), lambda: plant.step(np.zeros(6), ms=10**9)):
+        timer = threading.Timer(0.3, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            step()
+        timer.join()
+    assert simulator.time > 0.5 and plant.time > 0.5
 
 
 def test_a_push_moves_the_arm_and_it_comes_back():

@@ -38,9 +38,13 @@ impl SimulatedArm<'_> {
         config.arm.payload = payload(self.payload)?;
         config.model_error = ModelError::NONE;
         if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
-            let factors = mass_factors.iter().flatten().chain(friction_factors.iter().flatten());
-            if let Some(bad) = factors.chain([&mass, &friction]).find(|f| !(0.0..=10.0).contains(*f)) {
-                return Err(Failure::usage(format!("model_error: {bad} is not within 0..10")));
+            // A share beyond 1 would draw masses below 0.
+            if let Some(bad) = [mass, friction].iter().find(|share| !(0.0..=1.0).contains(*share)) {
+                return Err(Failure::usage(format!("model_error: a share of {bad} is not within 0..1")));
+            }
+            let mut factors = mass_factors.iter().flatten().chain(friction_factors.iter().flatten());
+            if let Some(bad) = factors.find(|factor| !(0.0..=10.0).contains(*factor)) {
+                return Err(Failure::usage(format!("model_error: a factor of {bad} is not within 0..10")));
             }
             config.model_error = ModelError { mass, friction, mass_factors, friction_factors };
         }

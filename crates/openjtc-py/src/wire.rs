@@ -1,10 +1,10 @@
 //! Frames of the host's line and of the joint bus, made and read.
 
 use jtc_bus::{Answer, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale};
-use jtc_core::settings;
+use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX, settings};
 use jtc_host::frame;
 use jtc_host::words;
-use jtc_wire::{Command, EncodeError, ExecCommand, FRAME_POINTS_MAX, FrameType, Status, StatusReceiver};
+use jtc_wire::{Command, EncodeError, ExecCommand, FrameType, Status, StatusReceiver};
 use numpy::PyArray1;
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
@@ -76,14 +76,17 @@ fn encode_trajectory<'py>(
     number: u16,
     points_a_frame: usize,
 ) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
-    if !(1..=FRAME_POINTS_MAX).contains(&points_a_frame) {
-        let message = format!("points_a_frame: {points_a_frame} is not within 1..{FRAME_POINTS_MAX}");
+    if !(1..=SEGMENT_POINTS_MAX).contains(&points_a_frame) {
+        let message = format!("points_a_frame: {points_a_frame} is not within 1..{SEGMENT_POINTS_MAX}");
         return Err(Failure::usage(message));
     }
     let points = trajectory.inner.raw().map_err(|error| Failure::usage(error.to_string()))?;
     let segments: Vec<_> = points.chunks(points_a_frame).collect();
     let count = |n: usize| {
-        u16::try_from(n).map_err(|_| Failure::usage(format!("{n} frames: the frame carries 65535 at most")))
+        u16::try_from(n).ok().filter(|n| usize::from(*n) <= SEGMENTS_MAX).ok_or_else(|| {
+            Failure::usage(format!("{n} frames: a trajectory has {SEGMENTS_MAX} at most"))
+                .next("pass more points_a_frame")
+        })
     };
     let all = count(segments.len())?;
     let made = segments.iter().enumerate().map(|(n, part)| {

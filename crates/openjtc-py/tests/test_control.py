@@ -152,6 +152,8 @@ def test_wrong_frames_are_refused():
         bus.parse((0x2F0, b"\x01"))
     with pytest.raises(UsageError, match="points_a_frame"):
         encode.trajectory(quintic([0] * 6, [1] * 6, 1), points_a_frame=0)
+    with pytest.raises(UsageError, match="100 at most"):
+        encode.trajectory(quintic([0] * 6, [1] * 6, 10), points_a_frame=1)
 
 
 def test_frames_of_the_host_are_the_worked_bytes_of_the_protocol():

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from openjtc import _native
 from openjtc._native import Arm
+from openjtc.errors import UsageError
 from openjtc.payload import Payload
 
 __all__ = ["Dynamics", "Payload"]
@@ -33,15 +34,17 @@ class Dynamics:
     Args:
         arm: The arm.
         payload: What it carries at its flange.
-        gravity: Acceleration of gravity in the base frame, m/s²; that of the arm's file where none is given.
+        gravity: Acceleration of gravity (3,) in the base frame, m/s²; that of the arm's file where none is given.
 
     Raises:
         UsageError: The payload is no body, or gravity is no vector of finite numbers.
     """
 
     def __init__(self, arm: Arm, payload: Payload | None = None, gravity: ArrayLike | None = None) -> None:
-        vector: Any = None if gravity is None else np.asarray(gravity, dtype=np.float64).tolist()
-        self._native = _native.Dynamics(arm, None if payload is None else payload._numbers(), vector)
+        vector: Any = None if gravity is None else np.asarray(gravity, dtype=np.float64)
+        if vector is not None and vector.shape != (3,):
+            raise UsageError(f"gravity: has the shape {vector.shape}, not (3,)", "usage")
+        self._native = _native.Dynamics(arm, None if payload is None else payload._numbers(), None if vector is None else vector.tolist())
 
     def inverse(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Floats:
         """Joint torques for positions, velocities and accelerations, by the recursive Newton-Euler algorithm.

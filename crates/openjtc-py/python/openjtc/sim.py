@@ -13,8 +13,10 @@ bit for bit. Arrays are (6,), base to wrist; positions are rad, velocities rad/s
 from __future__ import annotations
 
 import json
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +25,7 @@ from openjtc import _native
 from openjtc._native import Arm
 from openjtc.control import Frame, Inputs, Outputs, Status, StatusReader, Telemetry, encode
 from openjtc.payload import Payload
-from openjtc.errors import DeviceError, FaultError, NoLinkError
+from openjtc.errors import DeviceError, FaultError, NoLinkError, UsageError
 
 __all__ = ["ModelError", "Plant", "PlantState", "Simulator"]
 
@@ -35,16 +37,39 @@ class ModelError:
     """How far the true arm is from the one that its file describes.
 
     Attributes:
-        mass: Each link's mass, and its inertia with it, times 1 ± up to this, drawn from the seed.
-        friction: Each joint's friction times 1 ± up to this, drawn from the seed.
-        mass_factors: Factors of the base's and the six links' masses in place of drawn ones.
-        friction_factors: Factors of the six joints' frictions in place of drawn ones.
+        mass: Each link's mass, and its inertia with it, times 1 ± up to this, 0 to 1, drawn from the seed.
+        friction: Each joint's friction times 1 ± up to this, 0 to 1, drawn from the seed.
+        mass_factors: Factors (7,) of the base's and the six links' masses in place of drawn ones, 0 to 10.
+        friction_factors: Factors (6,) of the six joints' frictions in place of drawn ones, 0 to 10.
     """
 
     mass: float = 0.10
     friction: float = 0.20
     mass_factors: Sequence[float] | None = None
     friction_factors: Sequence[float] | None = None
+
+
+def _natural(value: SupportsIndex, what: str) -> int:
+    """A whole number that is not below 0, and fits into 64 bits."""
+    number = operator.index(value)
+    if not 0 <= number < 1 << 64:
+        raise UsageError(f"{what}: {number} is not within 0..2^64-1", "usage")
+    return number
+
+
+def _floats(value: ArrayLike, count: int, what: str) -> list[float]:
+    """So many numbers."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (count,):
+        raise UsageError(f"{what}: has the shape {array.shape}, not ({count},)", "usage")
+    return [float(number) for number in array]
+
+
+def _plain(value: object) -> object:
+    """A number of numpy as one of Python."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise UsageError(f"a fault has no value like {value!r}", "usage", next="`jtc help faults` lists kinds and keys")
 
 
 def _arm(
@@ -61,15 +86,15 @@ def _arm(
         error = (
             float(model_error.mass),
             float(model_error.friction),
-            None if masses is None else [float(f) for f in masses],
-            None if frictions is None else [float(f) for f in frictions],
+            None if masses is None else _floats(masses, 7, "mass_factors"),
+            None if frictions is None else _floats(frictions, 6, "friction_factors"),
         )
     return {
         "arm": arm,
-        "seed": seed,
+        "seed": _natural(seed, "seed"),
         "payload": None if payload is None else payload._numbers(),
         "model_error": error,
-        "start": None if start is None else np.asarray(start, dtype=np.float64).tolist(),
+        "start": None if start is None else _floats(start, 6, "start"),
         "friction": friction,
     }
 
@@ -117,8 +142,12 @@ class Simulator:
         self._status: Status | None = None
 
     def step(self, ms: int = 1) -> None:
-        """Milliseconds pass."""
-        self._native.step(ms)
+        """Milliseconds pass; Ctrl-C ends it after each second of them.
+
+        Raises:
+            UsageError: Less than none.
+        """
+        self._native.step(_natural(ms, "ms"))
 
     @property
     def time(self) -> float:
@@ -264,7 +293,7 @@ class Simulator:
         if not {"at_s", "in_state", "at_point"} & entry.keys():
             entry["at_s"] = self.time
         # Keys and values of TOML: strings and numbers are those of JSON.
-        lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
+        lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False, default=_plain)}" for key, value in entry.items())
         self._native.inject(f"format = 2\n[[fault]]\n{lines}\n")
 
     def push(self, joint: int, torque: float, seconds: float) -> None:
@@ -363,9 +392,9 @@ class Plant:
         """Milliseconds under torques (6,), N·m. The drives round them to 0.011 N·m and reach :attr:`torque_max` at most.
 
         Raises:
-            UsageError: Not six finite numbers.
+            UsageError: Not six finite numbers, or less than no milliseconds.
         """
-        self._native.step(torque, ms)
+        self._native.step(torque, _natural(ms, "ms"))
         return self.state
 
     def reset(self, position: ArrayLike) -> PlantState:

@@ -51,7 +51,7 @@ def trajectory(trajectory: Trajectory, *, number: int = 1, points_a_frame: int =
     Args:
         trajectory: The points.
         number: A number of its own, 0 to 65535.
-        points_a_frame: 1 to 1500; the trajectory has at most 100 frames.
+        points_a_frame: 1 to 1500; a trajectory has at most 100 frames.
 
     Raises:
         UsageError: A number that no frame carries, or too many frames.

@@ -277,7 +277,8 @@ impl Chain {
     fn samples(this: PyRef<'_, Self>, py: Python<'_>, boards: Option<&str>) -> PyResult<ChainSamples> {
         let boards = boards.map(self::boards).transpose()?;
         let listener = this.owner.call(py, move |hands| {
-            let running: Vec<u8> = hands.local.borrow().running.iter().copied().collect();
+            let running: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
+            let of_all = boards.as_ref().is_none_or(|boards| *boards == Boards::All);
             let numbers = match boards {
                 None if !running.is_empty() => running,
                 boards => hands.driver.numbers(&boards.unwrap_or(Boards::All))?,

@@ -1,26 +1,18 @@
 //! The operator of the session: what happens on the bus becomes events, samples and alarms, also in the middle of a procedure.
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
 use serde_json::json;
-use ucom_host::master::io::Snapshot;
 use ucom_host::master::{Event, Master, Supervision};
-use ucom_host::session::{Followed, Known, Link, Notice, Operator};
+use ucom_host::session::{Held, Link, Notice, Operator};
 
 use super::shared::{Halt, Shared};
 
-/// What the owner's thread remembers, also in the middle of a procedure.
+/// What the owner's thread remembers of its turns.
 #[derive(Default)]
-pub struct Local {
-    pub followed: Followed,
-    pub snapshots: BTreeMap<u8, Snapshot>,
-    pub known: BTreeMap<u8, Arc<Known>>,
-    /// Boards whose applications this session has started, and those whose control loops.
-    pub started: BTreeSet<u8>,
-    pub running: BTreeSet<u8>,
+struct Local {
     /// The Stop at the session's end is on the bus.
     end_sent: bool,
     now_us: u64,
@@ -28,18 +20,24 @@ pub struct Local {
 
 /// The operator of the session.
 pub struct Hand {
-    pub shared: Arc<Shared>,
-    pub local: Rc<RefCell<Local>>,
+    shared: Arc<Shared>,
+    held: Rc<RefCell<Held>>,
+    local: RefCell<Local>,
 }
 
 impl Hand {
+    /// Of a session that holds this.
+    pub fn new(shared: Arc<Shared>, held: Rc<RefCell<Held>>) -> Self {
+        Self { shared, held, local: RefCell::default() }
+    }
+
     /// A change of a board that runs: an event, and an alarm where it was lost or has left its loop by itself.
-    pub fn noticed(shared: &Shared, local: &Local, notice: &Notice, text: Option<&String>) {
+    pub fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
         let Notice { board, change, time_s, .. } = *notice;
         let text = notice.text().or_else(|| text.cloned());
         let text = text.unwrap_or_else(|| format!("board {board}: {}", change.name()));
         shared.event(time_s, change.name(), Some(board), text);
-        shared.alarm(change, board, (local.running.contains(&board), !local.started.is_empty()));
+        shared.alarm(change, board, (held.running().contains(&board), !held.started().is_empty()));
     }
 }
 
@@ -54,18 +52,17 @@ impl Operator for Hand {
     }
 
     fn happened(&self, event: &Event, text: Option<String>) {
-        let mut local = self.local.borrow_mut();
-        let now_us = local.now_us;
+        let mut held = self.held.borrow_mut();
+        let now_us = self.local.borrow().now_us;
         let time_s = now_us as f64 * 1e-6;
-        if let Some(notice) = local.followed.see(event, now_us) {
-            Self::noticed(&self.shared, &local, &notice, text.as_ref());
+        if let Some(notice) = held.see(event, now_us) {
+            Self::noticed(&self.shared, &held, &notice, text.as_ref());
         }
         let (kind, board) = match event {
             Event::Snapshot { board, snapshot } => {
-                if let Some(known) = local.known.get(board) {
+                if let Some(known) = held.known.get(board) {
                     self.shared.sampled(known, snapshot);
                 }
-                local.snapshots.insert(*board, snapshot.clone());
                 return;
             }
             // Of boards that run it is an event already.
@@ -79,7 +76,7 @@ impl Operator for Hand {
             Event::CompetingMaster { .. } => ("competing-master", None),
             Event::Foreign(_) => ("foreign", None),
             Event::NumberShared { board, found } => {
-                if local.running.contains(board) {
+                if held.running().contains(board) {
                     self.shared.number_shared(*board, found);
                 }
                 ("number-shared", Some(*board))
@@ -94,6 +91,7 @@ impl Operator for Hand {
     fn turned(&self, master: &mut Master, link: &mut Link) {
         let mut local = self.local.borrow_mut();
         local.now_us = link.now_us();
+        let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
             // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
@@ -104,11 +102,8 @@ impl Operator for Hand {
             match halt {
                 Halt::All => master.stop_at_once(local.now_us, None),
                 Halt::Boards(boards) => master.stop_at_once(local.now_us, Some(&boards)),
-                Halt::Started if local.started.is_empty() => {}
-                Halt::Started => {
-                    let started: Vec<u8> = local.started.iter().copied().collect();
-                    master.stop_at_once(local.now_us, Some(&started));
-                }
+                Halt::Started if started.is_empty() => {}
+                Halt::Started => master.stop_at_once(local.now_us, Some(&started)),
             }
         }
         self.shared.seen(json!({

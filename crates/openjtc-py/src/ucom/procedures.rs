@@ -194,7 +194,7 @@ pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>,
             Some(board) => hands.forget(board),
             None => {
                 hands.runs_no_more(None);
-                hands.local.borrow_mut().known.clear();
+                hands.held.borrow_mut().known.clear();
             }
         }
     }

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
 use ucom_host::session::{
-    Assignment, Boards, Cache, ParameterFile, Prepared, SessionError, Stopped, only, plans, remember,
+    Assignment, Boards, Cache, ParameterFile, Prepared, Session, SessionError, Stopped, only, plans, remember,
 };
 
 use super::failure::BoardFailure;
@@ -44,11 +44,11 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, BoardFailure> {
     if let Some(file) = &file {
         file.identities(&mut hands.driver)?;
     }
-    let begin = |hands: &mut Hands, cache: &Cache| {
+    let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
-        let started = begin(hands, cache, &numbers, &run, file.as_ref(), &mut prepared);
+        let started = begin(session, cache, &numbers, &run, file.as_ref(), &mut prepared);
         // What the procedure began it has taken back itself.
-        let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
+        let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
     let (report, prepared) = hands.starting(&numbers, |hands| hands.by_names(begin))?;
@@ -74,7 +74,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, BoardFailure> {
 
 /// Names, plans, and the start of all boards.
 fn begin(
-    hands: &mut Hands,
+    session: &mut Session,
     cache: &Cache,
     numbers: &[u8],
     run: &Run,
@@ -82,11 +82,11 @@ fn begin(
     prepared: &mut Prepared,
 ) -> Result<RunReport, SessionError> {
     for board in numbers {
-        prepared.add(&mut hands.driver, cache, &hands.signals, *board, run.force)?;
+        prepared.add(&mut session.driver, cache, &session.signals, *board, run.force)?;
     }
-    let plans = plans(&hands.driver, prepared, file, &run.inputs, &run.parameters)?;
+    let plans = plans(&session.driver, prepared, file, &run.inputs, &run.parameters)?;
     let options = RunOptions { boards: plans.clone(), active: run.active, force: run.force };
-    match hands.driver.run(Request::Run(options))? {
+    match session.driver.run(Request::Run(options))? {
         Outcome::Running(report) => {
             remember(cache, prepared, &plans);
             Ok(report)
@@ -98,7 +98,7 @@ fn begin(
 /// Enables outputs of boards that run, or makes them safe. What makes them safe goes to each board, whatever another one does.
 pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), BoardFailure> {
     let numbers = match boards {
-        Boards::All => hands.local.borrow().running.iter().copied().collect(),
+        Boards::All => hands.held.borrow().running().iter().copied().collect(),
         boards => hands.driver.numbers(boards)?,
     };
     if !active {

@@ -86,11 +86,11 @@ pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure>
 
 /// The same of boards that run; outputs that are old are an error.
 pub fn running(hands: &mut Hands) -> Result<Value, BoardFailure> {
-    let numbers: Vec<u8> = hands.local.borrow().running.iter().copied().collect();
+    let numbers: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
     let all = values(hands, &Boards::Some(numbers))?;
     for one in all.as_array().into_iter().flatten().filter(|one| one["stale"] == json!(true)) {
         let board = one["board"].as_u64().and_then(|board| u8::try_from(board).ok()).unwrap_or_default();
-        let known = hands.local.borrow().known.get(&board).cloned();
+        let known = hands.held.borrow().known.get(&board).cloned();
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
@@ -105,13 +105,13 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
     let known = hands.known(board)?;
     let (inputs, parameters) = objects::settings(&known, &hands.driver.master);
     let now_us = hands.driver.now_us();
-    let local = hands.local.borrow();
-    let followed = local.followed.outputs(&hands.driver.master, now_us);
+    let held = hands.held.borrow();
+    let followed = held.followed.outputs(&hands.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
     // A board that somebody else runs.
     let other =
-        || local.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
+        || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
     Ok(json!({
         "board": board,
@@ -205,7 +205,8 @@ pub fn apply_parameters(
 ) -> Result<usize, BoardFailure> {
     file.identities(&mut hands.driver)?;
     // What is written to must run. To check, what is known will do.
-    let known = hands.cache.all(&mut hands.driver, &hands.signals, &file.numbers(), |_| !dry_run)?;
+    let session = &mut hands.session;
+    let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =
         file.words(|number| known.iter().find(|k| k.board == number)).map_err(SessionError::from)?;
     let mut all = Vec::new();

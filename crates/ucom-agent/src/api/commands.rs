@@ -11,9 +11,7 @@ use serde_json::json;
 use ucom_host::files::SignalValue;
 use ucom_host::master::io::Kind as Buffer;
 use ucom_host::master::{AdminChange, Error, Outcome, Request, StopLevel};
-use ucom_host::session::{
-    Assignment, Boards, SessionError, arrived, become_master, note_rounded, with_names, words,
-};
+use ucom_host::session::{Assignment, Boards, SessionError, arrived, become_master, note_rounded, words};
 use utoipa::{IntoParams, ToSchema};
 
 use super::boards::numbers;
@@ -358,13 +356,4 @@ pub(super) async fn reset_board(
         other => Err(other.into()),
     };
     Ok(Json(agent.command(&asker, ("reset", board, Some(after)), act).await?))
-}
-
-/// Does something by names; where a board turns out to have others than were kept, once more by those that it sends.
-pub(super) fn by_names<T>(
-    hands: &mut Hands,
-    mut act: impl FnMut(&mut Hands, &ucom_host::session::Cache) -> Result<T, SessionError>,
-) -> Result<T, SessionError> {
-    let cache = hands.cache.clone();
-    with_names(&cache, |cache| act(hands, cache))
 }

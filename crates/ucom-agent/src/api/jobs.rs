@@ -11,11 +11,11 @@ use axum::http::StatusCode;
 use host_kit::ErrorKind;
 use serde_json::json;
 use ucom_host::master::{InitOptions, Outcome, Request, RunOptions, RunReport};
-use ucom_host::session::{Assignment, Boards, Cache, Prepared, SessionError, only, plans, remember};
+use ucom_host::session::{Assignment, Boards, Cache, Prepared, Session, SessionError, only, plans, remember};
 use utoipa::ToSchema;
 
 use super::boards::numbers;
-use super::commands::{GivenValue, by_names};
+use super::commands::GivenValue;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
@@ -198,14 +198,14 @@ pub(super) async fn run(
         let numbers = hands.driver.numbers(&boards)?;
         only(&numbers, &ci, "run")?;
         only(&numbers, &par, "run")?;
-        let begin = |hands: &mut Hands, cache: &Cache| {
+        let begin = |session: &mut Session, cache: &Cache| {
             let mut prepared = Prepared::default();
-            let started = start(hands, cache, &numbers, (&ci, &par), request.active, &mut prepared);
+            let started = start(session, cache, &numbers, (&ci, &par), request.active, &mut prepared);
             // What the procedure began it has taken back itself.
-            let report = started.inspect_err(|_| prepared.undo(&mut hands.driver))?;
+            let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
             Ok((report, prepared))
         };
-        let (report, prepared) = hands.starting(&numbers, |hands| by_names(hands, begin))?;
+        let (report, prepared) = hands.starting(&numbers, |session| session.by_names(begin))?;
         for known in prepared.known.into_values() {
             hands.knows(known);
         }
@@ -216,7 +216,7 @@ pub(super) async fn run(
 
 /// Names, plans, and the start of all boards.
 fn start(
-    hands: &mut Hands,
+    session: &mut Session,
     cache: &Cache,
     numbers: &[u8],
     (ci, par): (&[Assignment], &[Assignment]),
@@ -224,10 +224,10 @@ fn start(
     prepared: &mut Prepared,
 ) -> Result<RunReport, SessionError> {
     for board in numbers {
-        prepared.add(&mut hands.driver, cache, &hands.signals, *board, false)?;
+        prepared.add(&mut session.driver, cache, &session.signals, *board, false)?;
     }
-    let plans = plans(&hands.driver, prepared, None, ci, par)?;
-    match hands.driver.run(Request::Run(RunOptions { boards: plans.clone(), active, force: false }))? {
+    let plans = plans(&session.driver, prepared, None, ci, par)?;
+    match session.driver.run(Request::Run(RunOptions { boards: plans.clone(), active, force: false }))? {
         Outcome::Running(report) => {
             remember(cache, prepared, &plans);
             Ok(report)

@@ -3,7 +3,6 @@ mod ask;
 mod hands;
 mod operator;
 mod shared;
-mod started;
 mod stop;
 
 use std::sync::Arc;

@@ -1,14 +1,14 @@
 //! The operator of the session: what happens on the bus becomes events and a picture, also in the middle of a procedure.
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use agent_kit::api::Problem;
-use ucom_host::master::io::{DescriptionKey, Snapshot};
+use ucom_host::master::io::DescriptionKey;
 use ucom_host::master::{Event, Master, Supervision};
-use ucom_host::session::{Followed, Known, Link, Operator};
+use ucom_host::session::{Held, Known, Link, Operator};
 
 use super::shared::Shared;
 use crate::happening::Happening;
@@ -30,15 +30,9 @@ type Step = (u64, Vec<u8>, u32, u32);
 /// What the owner's thread remembers, also in the middle of a procedure.
 #[derive(Default)]
 pub(super) struct Local {
-    pub followed: Followed,
-    pub snapshots: BTreeMap<u8, Snapshot>,
-    pub known: BTreeMap<u8, Arc<Known>>,
     /// Boards that gave no names when somebody asked who only looks: when, and why.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
-    /// Boards whose applications this agent has started, and those whose control loops.
-    pub started: BTreeSet<u8>,
-    pub running: BTreeSet<u8>,
     /// Stops that have been sent, and when the last one began to be.
     pub halts_sent: u64,
     pub halted_us: Option<u64>,
@@ -59,6 +53,7 @@ pub(super) struct Local {
 /// The operator of the session.
 pub(super) struct Hand {
     pub shared: Arc<Shared>,
+    pub held: Rc<RefCell<Held>>,
     pub local: Rc<RefCell<Local>>,
 }
 
@@ -79,11 +74,13 @@ impl Operator for Hand {
     fn happened(&self, event: &Event, text: Option<String>) {
         let mut local = self.local.borrow_mut();
         let now_us = local.now_us;
-        local.followed.see(event, now_us);
+        // What it is to those who supervise is an event of each turn.
+        let _ = self.held.borrow_mut().see(event, now_us);
         let job = local.job;
         let mut write = Vec::new();
         match event {
-            Event::Snapshot { board, snapshot } => drop(local.snapshots.insert(*board, snapshot.clone())),
+            // It is in the picture.
+            Event::Snapshot { .. } => {}
             Event::Supervision { board, change } => {
                 let (board, change) = match change {
                     Supervision::Late => (Some(*board), "late"),
@@ -147,7 +144,7 @@ impl Operator for Hand {
         if self.shared.has_ended() && !local.end_sent {
             // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
             local.end_sent = true;
-            let started: Vec<u8> = local.started.iter().copied().collect();
+            let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
             master.stop_at_once(local.now_us, Some(&started));
         }
         if !local.happened.is_empty() || local.published.is_none_or(|at| at.elapsed() >= PICTURE) {
@@ -169,17 +166,18 @@ impl Hand {
             }
         }
         local.states = states;
+        let held = self.held.borrow();
         // Another application has other names.
         let is_its = |(number, known): &(&u8, &Arc<Known>)| {
             let info = boards.get(**number).and_then(|board| board.info);
             info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))
         };
         let values = |(number, known): (&u8, &Arc<Known>)| {
-            let outputs = local.snapshots.get(number).cloned();
+            let outputs = held.snapshots.get(number).cloned();
             let (inputs, parameters) = (master.inputs(*number), master.parameters(*number));
             (*number, Values { known: known.clone(), outputs, inputs, parameters })
         };
-        let values = local.known.iter().filter(is_its).map(values).collect();
+        let values = held.known.iter().filter(is_its).map(values).collect();
         let competing_us = master.competing_master().map(|(at, ..)| at);
         let picture = Picture {
             now_us: local.now_us,

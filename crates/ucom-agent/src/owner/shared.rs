@@ -81,8 +81,8 @@ pub(crate) struct Shared {
     leases: Mutex<Leases<Policy>>,
     /// Who commanded when it was last looked.
     holder: Mutex<Option<String>>,
-    /// This agent has started boards.
-    runs: AtomicBool,
+    /// This agent has started boards: before anything is sent to them, and until they are stopped.
+    pub(super) runs: Arc<AtomicBool>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -105,7 +105,7 @@ impl Shared {
             jobs: Jobs::default(),
             leases: Mutex::default(),
             holder: Mutex::default(),
-            runs: AtomicBool::new(false),
+            runs: Arc::default(),
         }
     }
 
@@ -250,11 +250,6 @@ impl Shared {
     /// Somebody has the lease.
     pub(super) fn is_commanded(&self) -> bool {
         lock(&self.leases).lease().is_some()
-    }
-
-    /// Whether boards run that this agent has started.
-    pub(super) fn set_runs(&self, runs: bool) {
-        self.runs.store(runs, Ordering::Relaxed);
     }
 
     /// Shows a new picture, then what has happened: who reads of it finds it there.

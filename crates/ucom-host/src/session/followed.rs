@@ -95,8 +95,6 @@ impl Notice {
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// A board was lost, or has rebooted: by `on_lost` others may have been stopped for it.
-    lost: bool,
     /// Since when no board is in its loop.
     nobody_since: Option<u64>,
 }
@@ -105,6 +103,8 @@ pub struct Followed {
 struct One {
     last: Option<Snapshot>,
     out: bool,
+    /// A board was lost, or has rebooted, since this one runs: by `on_lost` it may have been stopped for that.
+    lost: bool,
     /// It was out of its loop at some time, and not because another board was lost.
     left: bool,
     /// By its status, where its own word was lost.
@@ -115,8 +115,23 @@ struct One {
 impl Followed {
     /// These boards run now.
     pub fn new(boards: impl Iterator<Item = u8>, now_us: u64) -> Self {
-        let one = || One { asked_us: now_us, ..One::default() };
-        Self { boards: boards.map(|board| (board, one())).collect(), ..Self::default() }
+        let mut new = Self::default();
+        new.add(&boards.collect::<Vec<_>>(), now_us);
+        new
+    }
+
+    /// These boards run now, too, or have been started anew. What became of the others is remembered.
+    pub fn add(&mut self, boards: &[u8], now_us: u64) {
+        for board in boards {
+            let one = self.boards.entry(*board).or_default();
+            *one = One { last: one.last.take(), asked_us: now_us, ..One::default() };
+        }
+        self.nobody_since = None;
+    }
+
+    /// This board is followed no more.
+    pub fn remove(&mut self, board: u8) {
+        self.boards.remove(&board);
     }
 
     /// An event of the bus, beside what the driver prints of it.
@@ -143,7 +158,9 @@ impl Followed {
                     Supervision::Rebooted { .. } | Supervision::UnknownRebooted { .. } => Change::Rebooted,
                 };
                 let followed = self.boards.contains_key(board);
-                self.lost |= change == Change::Lost || (change == Change::Rebooted && followed);
+                if change == Change::Lost || (change == Change::Rebooted && followed) {
+                    self.boards.values_mut().for_each(|one| one.lost = true);
+                }
                 return Some(Notice { board: *board, change, time_s: seconds(now_us), age_s: None });
             }
             _ => {}
@@ -160,9 +177,9 @@ impl Followed {
             let out = board.admin.is_some_and(|admin| !admin.run) || one.status_out;
             if out != one.out {
                 one.out = out;
-                one.left |= out && !self.lost;
+                one.left |= out && !one.lost;
                 let age_s = one.last.as_ref().map(|last| age_s(last, now_us));
-                let change = match (out, self.lost) {
+                let change = match (out, one.lost) {
                     (true, false) => Change::LeftLoop,
                     (true, true) => Change::StoppedByPolicy,
                     (false, _) => Change::InLoop,
@@ -176,7 +193,9 @@ impl Followed {
         }
         if let Some(board) = silent.filter(|_| self.asking.is_none() && !master.is_busy()) {
             self.asking = master.start(now_us, Request::Info { board }).ok();
-            self.boards.entry(board).or_default().asked_us = now_us;
+            if let Some(one) = self.boards.get_mut(&board) {
+                one.asked_us = now_us;
+            }
         }
         notices
     }
@@ -315,6 +334,30 @@ mod tests {
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         assert_eq!(receive(&mut master, &mut followed, 3_110_000, &["601#00000000"]), ["stopped-by-policy"]);
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
+    }
+
+    /// What starts or stops one board makes nobody forget what became of another one.
+    #[test]
+    fn d37_boards_that_come_and_go_leave_the_others_as_they_were() {
+        let (mut master, mut followed) = running();
+        assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
+        for act in [|all: &mut Followed| all.add(&[2], 25_000), |all: &mut Followed| all.remove(2)] {
+            act(&mut followed);
+            assert!(
+                receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(),
+                "reported once"
+            );
+            assert_eq!(stale(&master, &followed, 30_000), [true]);
+            assert!(followed.nobody_left().is_err());
+        }
+        // It is started anew: whatever was lost before, it leaves its loop by itself.
+        assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
+        receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
+        followed.add(&[1], 3_200_000);
+        assert_eq!(stale(&master, &followed, 3_210_000), [false]);
+        assert_eq!(receive(&mut master, &mut followed, 3_220_000, &["601#00000000"]), ["left-loop"]);
+        followed.remove(1);
+        assert!(receive(&mut master, &mut followed, 3_230_000, &["601#01000000"]).is_empty());
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
 //! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
+//! - [`Session`], [`Held`]: what has been started and is known, for who owns a bus for others.
 pub mod bus_off;
 mod cache;
 mod changes;
@@ -16,6 +17,7 @@ mod driver;
 mod error;
 mod examine;
 mod followed;
+mod held;
 mod history;
 mod known;
 mod link;
@@ -36,6 +38,7 @@ pub use driver::{Driver, Operator, event_text, nothing_shared};
 pub use error::{SessionError, ValuesError};
 pub use examine::Examination;
 pub use followed::{Change, Followed, Notice};
+pub use held::{Held, Session};
 pub use history::{History, Written};
 pub use known::Known;
 pub use link::{Link, from_wire, protocol_frame, recorded, replayed, to_wire};

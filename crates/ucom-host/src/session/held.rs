@@ -1,0 +1,294 @@
+//! What a session has started, and what it knows of its boards by it: the same for every program that owns a bus for others. In doubt
+//! a board counts as started: being stopped once more costs nothing.
+//!
+//! - [`Held`]: the state, which the session's [`Operator`](super::Operator) writes in the middle of procedures.
+//! - [`Session`]: a driver with that state; what starts or ends boards goes through it.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use ucom::Status;
+
+use super::cache::Cache;
+use super::driver::Driver;
+use super::error::SessionError;
+use super::followed::{Followed, Notice};
+use super::known::Known;
+use super::values::with_names;
+use crate::files::SignalTable;
+use crate::master::io::Snapshot;
+use crate::master::update::{UpdateOutcome, UpdateReport};
+use crate::master::{Event, InitReport};
+
+/// What a session has started, and what it knows of its boards by it.
+#[derive(Default)]
+pub struct Held {
+    started: BTreeSet<u8>,
+    running: BTreeSet<u8>,
+    /// Boards whose control loops it supervises.
+    pub followed: Followed,
+    /// The last outputs of boards.
+    pub snapshots: BTreeMap<u8, Snapshot>,
+    /// The names of boards.
+    pub known: BTreeMap<u8, Arc<Known>>,
+    has_started: Arc<AtomicBool>,
+}
+
+impl Held {
+    /// One that has started nothing; `has_started` shows other threads whether that is still so.
+    pub fn new(has_started: Arc<AtomicBool>) -> Self {
+        Self { has_started, ..Self::default() }
+    }
+
+    /// Boards whose applications the session has started.
+    pub fn started(&self) -> &BTreeSet<u8> {
+        &self.started
+    }
+
+    /// Boards whose control loops the session has started.
+    pub fn running(&self) -> &BTreeSet<u8> {
+        &self.running
+    }
+
+    /// An event of the bus: outputs are kept, and a change of a board that is supervised is returned.
+    pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
+        if let Event::Snapshot { board, snapshot } = event {
+            self.snapshots.insert(*board, snapshot.clone());
+        }
+        self.followed.see(event, now_us)
+    }
+
+    /// These boards count as started.
+    fn starts(&mut self, boards: &[u8]) {
+        self.started.extend(boards);
+        self.show();
+    }
+
+    fn runs(&mut self, boards: &[u8], now_us: u64) {
+        self.running.extend(boards);
+        self.followed.add(boards, now_us);
+        self.starts(boards);
+    }
+
+    fn runs_no_more(&mut self, board: Option<u8>) {
+        let boards: Vec<u8> = match board {
+            Some(board) => vec![board],
+            None => self.started.iter().chain(&self.running).chain(self.snapshots.keys()).copied().collect(),
+        };
+        for board in boards {
+            self.started.remove(&board);
+            self.running.remove(&board);
+            self.snapshots.remove(&board);
+            self.followed.remove(board);
+        }
+        self.show();
+    }
+
+    fn show(&self) {
+        self.has_started.store(!self.started.is_empty(), Ordering::Relaxed);
+    }
+}
+
+/// A session on a bus, and what it holds.
+pub struct Session {
+    /// Procedures and boards.
+    pub driver: Driver,
+    /// Where names are remembered.
+    pub cache: Cache,
+    /// What words mean.
+    pub signals: SignalTable,
+    /// What has been started and is known; the operator of the driver has the same.
+    pub held: Rc<RefCell<Held>>,
+}
+
+impl Session {
+    /// Lets the bus go on, waiting no longer than `patience`.
+    pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
+        self.driver.turn(patience)?;
+        while let Some(event) = self.driver.master.take_event() {
+            self.driver.note_event(&event, None);
+        }
+        Ok(())
+    }
+
+    /// Which boards have left their control loops, or are in them again, since the last time. Asks boards of which nothing is received.
+    pub fn look(&mut self) -> Vec<Notice> {
+        let now_us = self.driver.now_us();
+        self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
+    }
+
+    /// Asks nothing in the background any more: what comes now must not find a board busy.
+    pub fn quiet(&mut self) {
+        self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
+    }
+
+    /// Heartbeats go out for what this session has started, and while somebody `commands`: boards of another PC become safe without that
+    /// one (D-50).
+    pub fn rest(&mut self, commands: bool) {
+        if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
+            self.driver.master.end_session();
+        }
+    }
+
+    /// Names and meanings of a board's values; asks for them where they are not known.
+    pub fn known(&mut self, board: u8) -> Result<Arc<Known>, SessionError> {
+        let kept = self.held.borrow().known.get(&board).cloned();
+        let info = self.driver.master.boards().get(board).and_then(|board| board.info);
+        let same = |known: &Arc<Known>| {
+            info.is_some_and(|info| {
+                (info.flash_number, info.program_id, info.date)
+                    == (known.info.flash_number, known.info.program_id, known.info.date)
+            })
+        };
+        if let Some(known) = kept.filter(same)
+            && self.driver.master.description(board).is_some()
+        {
+            return Ok(known);
+        }
+        let started = info.is_some_and(|info| info.status.has(Status::MSTART));
+        let known = match started {
+            true => self.cache.described(&mut self.driver, &self.signals, board)?,
+            false => self.cache.known(&mut self.driver, &self.signals, board)?,
+        };
+        Ok(self.knows(known))
+    }
+
+    /// The names of a board are known from now on, and its outputs are put together.
+    pub fn knows(&mut self, known: Known) -> Arc<Known> {
+        let known = Arc::new(known);
+        self.driver.master.watch(known.board, Some(known.names.dimensions().so), true);
+        self.held.borrow_mut().known.insert(known.board, known.clone());
+        known
+    }
+
+    /// Does something by names; where a board turns out to have others than were kept, once more by those that it sends.
+    pub fn by_names<T>(
+        &mut self,
+        mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
+    ) -> Result<T, SessionError> {
+        let cache = self.cache.clone();
+        with_names(&cache, |cache| act(self, cache))
+    }
+
+    /// Does what starts these boards or moves them. They count before anything is sent: an end may be asked for at any time. When it
+    /// fails those count no more that it was not sent to, or that answer that they are stopped.
+    pub fn starting<T>(
+        &mut self,
+        boards: &[u8],
+        act: impl FnOnce(&mut Self) -> Result<T, SessionError>,
+    ) -> Result<T, SessionError> {
+        // Nothing is sent to any where one does not answer.
+        for board in boards {
+            self.driver.seen(*board)?;
+        }
+        let counted = self.started();
+        self.held.borrow_mut().starts(boards);
+        let done = act(self);
+        if done.is_err() {
+            for board in boards.iter().filter(|board| !counted.contains(board)) {
+                // Who is no master has only asked.
+                if !self.driver.master.is_master() || self.is_stopped(*board) {
+                    self.runs_no_more(Some(*board));
+                }
+            }
+        }
+        done
+    }
+
+    /// The board answers that its application does not run; it is asked also where what was begun was cancelled.
+    fn is_stopped(&mut self, board: u8) -> bool {
+        self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
+    }
+
+    /// The control loops of these boards run from now on.
+    pub fn runs(&mut self, boards: &[u8]) {
+        let now_us = self.driver.now_us();
+        self.held.borrow_mut().runs(boards, now_us);
+    }
+
+    /// This board does not run any more, or none does; what it sent is no more its state.
+    pub fn runs_no_more(&mut self, board: Option<u8>) {
+        self.held.borrow_mut().runs_no_more(board);
+    }
+
+    /// The control loop of this board has ended, its application goes on. One that this session has not started does not count by that:
+    /// its heartbeats are nobody's business here.
+    pub fn only_started(&mut self, board: u8) {
+        let mut held = self.held.borrow_mut();
+        let counted = held.started.contains(&board);
+        held.runs_no_more(Some(board));
+        if counted {
+            held.starts(&[board]);
+        }
+    }
+
+    /// The number or the application of this board is another one, or none.
+    pub fn forget(&mut self, board: u8) {
+        let mut held = self.held.borrow_mut();
+        held.runs_no_more(Some(board));
+        held.known.remove(&board);
+    }
+
+    /// The boards that count as started.
+    pub fn started(&self) -> Vec<u8> {
+        self.held.borrow().started.iter().copied().collect()
+    }
+
+    /// Stops what this session has started. Returns the boards whose end is not certain, which go on counting.
+    pub fn leave(&mut self) -> Vec<u8> {
+        self.quiet();
+        let started = self.started();
+        if started.is_empty() {
+            return Vec::new();
+        }
+        let not_stopped = self.driver.halt(&started, None);
+        for board in started.into_iter().filter(|board| !not_stopped.contains(board)) {
+            self.runs_no_more(Some(board));
+        }
+        not_stopped
+    }
+
+    /// What an update leaves of the boards: those that were written do not run any more, and may have been started anew.
+    pub fn updated(&mut self, report: &UpdateReport, start: bool) {
+        for result in report.boards.iter().filter(|_| !report.dry_run) {
+            match result.outcome {
+                // It runs on if it ran, or nobody knows.
+                UpdateOutcome::NotStarted
+                | UpdateOutcome::Cancelled
+                | UpdateOutcome::UpToDate
+                | UpdateOutcome::Unknown => {}
+                UpdateOutcome::Incomplete
+                | UpdateOutcome::Written
+                | UpdateOutcome::Verified
+                | UpdateOutcome::Running => self.forget(result.board),
+            }
+            let untouched = matches!(result.outcome, UpdateOutcome::NotStarted | UpdateOutcome::Cancelled);
+            if start && !untouched {
+                self.held.borrow_mut().starts(&[result.board]);
+            }
+        }
+    }
+
+    /// Boards have new numbers, and names are of others from now on. Where not all is well, who has none now may run under the one it
+    /// had, and who shows that it is started may have missed the reset.
+    pub fn renumbered(&mut self, report: Option<&InitReport>) {
+        let mut held = self.held.borrow_mut();
+        match report {
+            Some(report) if report.is_ok() => held.runs_no_more(None),
+            Some(report) => {
+                for board in &report.boards {
+                    held.runs_no_more(Some(board.number));
+                    if board.info.status.has(Status::MSTART) {
+                        held.starts(&[board.number]);
+                    }
+                }
+            }
+            None => {}
+        }
+        held.known.clear();
+    }
+}

@@ -2,7 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod api;
-mod bus;
 mod happening;
 mod jobs;
 mod owner;

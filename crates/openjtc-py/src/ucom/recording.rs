@@ -11,13 +11,11 @@ use host_kit::ErrorKind;
 use pyo3::prelude::*;
 use ucom::Profile;
 use ucom_host::files::recording::{RecordingError, RecordingFormat};
-use ucom_host::session::Recorder;
+use ucom_host::session::{Prompt, Recorder};
 
 use super::failure::BoardFailure;
 use crate::error::Failure;
 
-/// Longest wait for a frame: what is asked of the session is looked at so often.
-const WAIT: Duration = Duration::from_millis(5);
 /// So often what was recorded reaches the file.
 const FLUSH: Duration = Duration::from_secs(1);
 
@@ -40,7 +38,7 @@ impl Sink {
 
 /// A bus that is never waited for long, with an ear.
 pub struct Tap {
-    bus: Box<dyn CanBus + Send>,
+    bus: Prompt,
     sink: Sink,
     start: Instant,
     /// However the clock is set meanwhile, time does not run backwards in a file.
@@ -50,7 +48,7 @@ pub struct Tap {
 impl Tap {
     /// On a bus that is open.
     pub fn new(bus: Box<dyn CanBus + Send>, sink: Sink) -> Self {
-        Self { bus, sink, start: Instant::now(), began_at: host_kit::unix_time() }
+        Self { bus: Prompt(bus), sink, start: Instant::now(), began_at: host_kit::unix_time() }
     }
 
     fn take(&self, frame: &CanFrame) {
@@ -71,7 +69,7 @@ impl CanBus for Tap {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        let received = self.bus.receive(timeout.min(WAIT))?;
+        let received = self.bus.receive(timeout)?;
         if let Some(frame) = &received {
             self.take(frame);
         }

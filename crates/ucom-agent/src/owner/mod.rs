@@ -10,13 +10,11 @@ use std::thread::JoinHandle;
 
 use ucom::Profile;
 use ucom_host::files::SignalTable;
-use ucom_host::session::{Cache, CleanupList, Link, SessionError};
+use ucom_host::session::{Cache, CleanupList, Link, Prompt, SessionError};
 
 pub(crate) use ask::fault;
 pub(crate) use hands::Hands;
 pub(crate) use shared::Shared;
-
-use crate::bus::Prompt;
 
 /// What is known of the boards beforehand.
 #[derive(Clone, Debug, Default)]

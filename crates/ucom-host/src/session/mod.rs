@@ -1,6 +1,6 @@
 //! A session on a bus: a master with the frames that carry it, in wall-clock time, and what commands make of it.
 //!
-//! - [`Link`]: an open bus with its clock; [`pump`]: frames between it and the master, in the order that keeps times honest.
+//! - [`Link`]: an open bus with its clock; [`Prompt`]: one that is never waited for long; [`pump`]: frames between it and the master, in the order that keeps times honest.
 //! - [`Driver`]: procedures from start to end, with an [`Operator`] who may stop them and reads notes.
 //! - [`Examination`]: what is wrong with a bus; [`Watch`]: a bus as it is looked at live.
 //! - [`CleanupList`]: what would be left undone if the process ended now.
@@ -24,6 +24,7 @@ mod link;
 mod named;
 mod parameters;
 mod plans;
+mod prompt;
 pub mod pump;
 mod recorder;
 mod replay;
@@ -46,6 +47,7 @@ pub use parameters::{
     FileWords, ParameterFile, Parameters, arrived, become_master, inventory, name_of, write,
 };
 pub use plans::{plans, remember};
+pub use prompt::Prompt;
 pub use recorder::Recorder;
 pub use replay::{is_intrusive, replay};
 pub use selection::{Assignment, Boards, for_board, only};

@@ -1,4 +1,5 @@
-//! A bus whose owner looks up often: a Stop waits for no frame.
+//! A bus whose owner looks up often: a stop waits for no frame.
+
 use std::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, ControllerState};
@@ -6,7 +7,7 @@ use can_link::{CanBus, CanError, CanFrame, ControllerState};
 /// Longest wait for a frame.
 const WAIT: Duration = Duration::from_millis(5);
 
-/// A bus that is never waited for longer than that.
+/// A bus that is never waited for longer than 5 ms: what is asked of its owner by others is looked at so often.
 pub struct Prompt(pub Box<dyn CanBus + Send>);
 
 impl CanBus for Prompt {

@@ -159,12 +159,21 @@ pub fn status(
     let numbers = hands.driver.numbers(boards)?;
     let all = match set | clear {
         Status(0) => hands.driver.statuses(&numbers)?,
-        mask => hands.driver.change_each(&numbers, |board| Request::SetStatus {
-            board,
-            mask,
-            value: set,
-            force,
-        })?,
+        mask => {
+            let request = |board| Request::SetStatus { board, mask, value: set, force };
+            let all = match set.has(Status::MSTART) {
+                true => hands.starting(&numbers, |session| session.driver.change_each(&numbers, request))?,
+                false => hands.driver.change_each(&numbers, request)?,
+            };
+            for (board, info) in &all {
+                match (info.status.has(Status::INIT), info.status.has(Status::MSTART)) {
+                    (false, _) => hands.forget(*board),
+                    (true, false) => hands.runs_no_more(Some(*board)),
+                    (true, true) => {}
+                }
+            }
+            all
+        }
     };
     Ok(numbered(hands, &all))
 }

@@ -283,10 +283,7 @@ impl Chain {
                 None if !running.is_empty() => running,
                 boards => hands.driver.numbers(&boards.unwrap_or(Boards::All))?,
             };
-            for board in &numbers {
-                hands.known(*board)?;
-            }
-            let listener = Arc::new(Listener::new(numbers.into_iter().collect()));
+            let listener = Arc::new(Listener::new(values::with_names(hands, &numbers, of_all)?));
             hands.shared.listen(&listener);
             Ok(listener)
         })?;

@@ -1,5 +1,7 @@
 //! Inputs, outputs and parameters of boards by name.
 
+use std::collections::BTreeSet;
+
 use host_kit::ErrorKind;
 use serde_json::{Value, json};
 use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
@@ -77,11 +79,27 @@ pub fn set(
 /// Outputs with their age, inputs and parameters of boards; those whose names are not known are asked.
 pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
     let numbers = hands.driver.numbers(boards)?;
-    let mut all = Vec::new();
-    for board in numbers {
-        all.push(of_board(hands, board)?);
+    let numbers = with_names(hands, &numbers, *boards == Boards::All)?;
+    numbers.into_iter().map(|board| of_board(hands, board)).collect()
+}
+
+/// Those of the boards that have names, which are known from now on. Of `all` that are there those are passed over that cannot be asked,
+/// as their applications are not started, unless that is all of them.
+pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
+    let (mut named, mut idle) = (BTreeSet::new(), None);
+    for board in boards {
+        match hands.known(*board) {
+            Ok(_) => drop(named.insert(*board)),
+            Err(error @ SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) if all => {
+                idle = idle.or(Some(error));
+            }
+            Err(error) => return Err(error),
+        }
     }
-    Ok(all.into())
+    match idle {
+        Some(error) if named.is_empty() => Err(error),
+        _ => Ok(named),
+    }
 }
 
 /// The same of boards that run; outputs that are old are an error.

@@ -132,7 +132,10 @@ class ValuesByName(Session):
         return {f"{one.board}.{name}": value for one in boards for name, value in one.outputs.items()}
 
     def board_values(self, boards: Boards = "all") -> dict[int, BoardValues]:
-        """Outputs with their age, inputs and parameters of boards, also of those that another program runs."""
+        """Outputs with their age, inputs and parameters of boards, also of those that another program runs.
+
+        Of ``all`` those are left out that have no names yet, as their applications are not started.
+        """
         all_values = (BoardValues._of(value) for value in self._native.values(self._list(boards)))
         return {one.board: one for one in all_values}
 
@@ -142,7 +145,8 @@ class ValuesByName(Session):
         """Outputs of boards as they come, an iterator of `Sample`; ``.to_pandas()`` and ``.to_numpy()`` make tables of it.
 
         Args:
-            boards: Which, also such as another program runs; None: those that this chain runs, or all where it runs none.
+            boards: Which, also such as another program runs; None: those that this chain runs, or all where it runs none; of
+                all those are left out that have no names yet, as their applications are not started.
             seconds: End after so many seconds.
             count: End after so many samples.
         """

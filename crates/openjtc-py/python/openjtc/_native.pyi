@@ -55,6 +55,7 @@ class Chain:
         inventory: str | None = None,
         cache: str | None = None,
         remember: bool = True,
+        deadline_s: float | None = None,
     ) -> Chain: ...
     @property
     def url(self) -> str: ...

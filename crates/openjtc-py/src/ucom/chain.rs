@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use host_kit::user_folder;
 use pyo3::prelude::*;
@@ -68,7 +69,7 @@ fn plain(py: Python<'_>, value: Value) -> Object<'_> {
 #[pymethods]
 impl Chain {
     #[new]
-    #[pyo3(signature = (url, simulated=None, profile=None, on_lost=None, signals=None, inventory=None, cache=None, remember=true))]
+    #[pyo3(signature = (url, simulated=None, profile=None, on_lost=None, signals=None, inventory=None, cache=None, remember=true, deadline_s=None))]
     #[allow(clippy::too_many_arguments, reason = "they are named in Python")]
     fn new(
         py: Python<'_>,
@@ -80,7 +81,12 @@ impl Chain {
         inventory: Option<PathBuf>,
         cache: Option<PathBuf>,
         remember: bool,
+        deadline_s: Option<f64>,
     ) -> Result<Self, BoardFailure> {
+        let deadline = deadline_s.map(|s| match Duration::try_from_secs_f64(s) {
+            Ok(deadline) if !deadline.is_zero() => Ok(deadline),
+            _ => Err(BoardFailure::usage(format!("deadline_s: {s} s is no time"))),
+        });
         let profile = procedures::profile(profile.as_deref(), on_lost)?;
         let signals = signals.map(|path| SignalTable::read(&path)).transpose();
         let signals =
@@ -95,6 +101,7 @@ impl Chain {
             cache: Cache::new(cache, false),
             inventory: listed.map_err(|e| Failure::usage(e.to_string()))?,
             inventory_file: inventory.clone(),
+            deadline: deadline.transpose()?,
             simulated,
         };
         let sink = Sink::default();

@@ -32,6 +32,8 @@ pub struct Config {
     /// Who stands where, and the file that it is kept in.
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
+    /// With no call for so long what the session has started is stopped; `None`: it runs on.
+    pub deadline: Option<Duration>,
     /// The simulated chain that ends with the session.
     pub simulated: Option<Arc<Simulated>>,
 }
@@ -42,6 +44,7 @@ pub struct Hands {
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
     pub shared: Arc<Shared>,
+    deadline: Option<Duration>,
     /// Behind the session: it goes when the bus is closed.
     _simulated: Option<Arc<Simulated>>,
 }
@@ -63,13 +66,13 @@ impl DerefMut for Hands {
 impl Hands {
     /// Those of a session on this link.
     pub fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
-        let Config { profile, signals, cache, inventory, inventory_file, simulated } = config;
+        let Config { profile, signals, cache, inventory, inventory_file, deadline, simulated } = config;
         let held: Rc<RefCell<Held>> = Rc::default();
         let hand = Hand::new(shared.clone(), Rc::clone(&held));
         let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
         // Heartbeats and stops of this thread wait for no disk.
         let session = Session { driver, cache: cache.in_memory(), signals, held };
-        Self { session, inventory, inventory_file, shared, _simulated: simulated }
+        Self { session, inventory, inventory_file, shared, deadline, _simulated: simulated }
     }
 
     /// Does what is asked for until the bus is gone or the session ends.
@@ -81,9 +84,24 @@ impl Hands {
                 self.turn()?;
                 self.session.rest(false);
             }
+            self.keep_deadline();
             self.session.rest(false);
         }
         Ok(())
+    }
+
+    /// Heartbeats show that this computer lives, not that the program does which commands the boards: where that asks for nothing any
+    /// more its boards are stopped.
+    fn keep_deadline(&mut self) {
+        if let Some(deadline) = self.deadline
+            && self.shared.silence() >= deadline
+            && !self.started().is_empty()
+        {
+            let not_stopped = self.leave();
+            let time_s = self.driver.now_us() as f64 * 1e-6;
+            self.shared.deadline(time_s, deadline, &not_stopped);
+            self.shared.asked();
+        }
     }
 
     /// Lets the bus go on for a moment.

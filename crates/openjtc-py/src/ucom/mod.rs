@@ -1,10 +1,11 @@
 //! Chains of UCoM boards: a session on a bus that a thread of its own keeps, and calls of Python into it.
 //!
-//! - [`owner`], [`shared`]: the thread, what is asked of it, and how Python waits for it.
-//! - [`hands`]: the session in that thread, what it has started, and what is known of the boards by it.
+//! - [`owner`], [`shared`], [`alarms`]: the thread, what is asked of it, how Python waits for it, and what it raises.
+//! - [`hands`], [`operator`]: the session in that thread.
 //! - [`procedures`], [`running`], [`values`], [`update`]: what is done with it; results are JSON, which Python makes dataclasses of.
 //! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.
 
+mod alarms;
 mod chain;
 mod failure;
 mod hands;

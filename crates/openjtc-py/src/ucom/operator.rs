@@ -37,7 +37,7 @@ impl Hand {
         let text = notice.text().or_else(|| text.cloned());
         let text = text.unwrap_or_else(|| format!("board {board}: {}", change.name()));
         shared.event(time_s, change.name(), Some(board), text);
-        shared.alarm(change, board, (held.running().contains(&board), !held.started().is_empty()));
+        shared.alarms.changed(change, board, (held.running().contains(&board), !held.started().is_empty()));
     }
 }
 
@@ -77,7 +77,7 @@ impl Operator for Hand {
             Event::Foreign(_) => ("foreign", None),
             Event::NumberShared { board, found } => {
                 if held.running().contains(board) {
-                    self.shared.number_shared(*board, found);
+                    self.shared.alarms.number_shared(*board, found);
                 }
                 ("number-shared", Some(*board))
             }
@@ -106,6 +106,7 @@ impl Operator for Hand {
                 Halt::Started => master.stop_at_once(local.now_us, Some(&started)),
             }
         }
+        self.shared.has_started(started);
         self.shared.seen(json!({
             "load_percent": master.statistics().load_percent(local.now_us),
             "received": master.statistics().received,

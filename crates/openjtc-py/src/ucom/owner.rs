@@ -11,7 +11,7 @@ use ucom_host::session::Link;
 
 use super::failure::BoardFailure;
 use super::hands::{Config, Hands};
-use super::shared::{Halt, Kind, Shared, Work, failure, fault, lock};
+use super::shared::{Halt, Kind, Process, Shared, Work, failure, fault, lock};
 use crate::json;
 
 /// So often signals (Ctrl-C) are looked at while Python waits.
@@ -27,6 +27,7 @@ enum Message<T> {
 pub struct Owner {
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
+    process: Process,
 }
 
 impl Owner {
@@ -50,7 +51,7 @@ impl Owner {
             }
             drop(gone);
         });
-        Self { shared, thread: Mutex::new(Some(thread)) }
+        Self { shared, thread: Mutex::new(Some(thread)), process: Process::this() }
     }
 
     /// Has something done and waits for it without the GIL. Ctrl-C ends it, and stops what this session has started.
@@ -70,6 +71,7 @@ impl Owner {
         progress: Option<&Bound<'_, PyAny>>,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
     ) -> PyResult<T> {
+        self.is_here()?;
         let before = self.shared.last_event();
         let (id, answers) = self.ask(kind, act);
         loop {
@@ -120,6 +122,7 @@ impl Owner {
         halt: Halt,
         act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
     ) -> PyResult<T> {
+        self.is_here()?;
         let (_, answers) = self.ask(Kind::Stop, |hands, _| act(hands));
         self.shared.halt(halt);
         loop {
@@ -128,6 +131,19 @@ impl Owner {
                 // It is a stop already.
                 _ => py.check_signals()?,
             }
+        }
+    }
+
+    /// The thread is one of this process, not of the one that it was forked from.
+    fn is_here(&self) -> Result<(), BoardFailure> {
+        match self.process.is_this() {
+            true => Ok(()),
+            false => Err(failure(
+                ErrorKind::Usage,
+                "forked",
+                "the chain is that of the process that this one was forked from",
+                "connect in the process that uses it",
+            )),
         }
     }
 
@@ -167,6 +183,10 @@ impl Owner {
 
     /// Stops what this session has started, and lets the bus go. Returns the boards whose end is not certain.
     pub fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        if !self.process.is_this() {
+            // There is nobody to wait for, and what runs is not this process's.
+            return Ok(Vec::new());
+        }
         self.shared.end();
         loop {
             let over = py.detach(|| {
@@ -204,6 +224,9 @@ struct Gone<'a>(&'a Shared);
 
 impl Drop for Gone<'_> {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.all_left();
+        }
         self.0.close(fault());
     }
 }

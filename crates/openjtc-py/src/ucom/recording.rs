@@ -14,6 +14,7 @@ use ucom_host::files::recording::{RecordingError, RecordingFormat};
 use ucom_host::session::{Prompt, Recorder};
 
 use super::failure::BoardFailure;
+use super::shared::Process;
 use crate::error::Failure;
 
 /// So often what was recorded reaches the file.
@@ -93,6 +94,7 @@ type Written = Result<(u64, u64), RecordingError>;
 pub struct ChainRecording {
     sink: Sink,
     writer: Mutex<Option<JoinHandle<Written>>>,
+    process: Process,
 }
 
 impl ChainRecording {
@@ -131,13 +133,12 @@ impl ChainRecording {
             Err(_) => return Err(failed("its writer has a fault")),
         }
         sink.set(Some(sender));
-        Ok(Self { sink, writer: Mutex::new(Some(writer)) })
+        Ok(Self { sink, writer: Mutex::new(Some(writer)), process: Process::this() })
     }
 
     fn finish(&self) -> Result<Option<(u64, u64)>, BoardFailure> {
-        let Some(writer) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take() else {
-            return Ok(None);
-        };
+        let writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(writer) = writer.filter(|_| self.process.is_this()) else { return Ok(None) };
         self.sink.set(None);
         let written = writer.join().map_err(|_| failed("its writer has a fault"))?;
         written.map(Some).map_err(|e| failed(&e.to_string()))

@@ -33,6 +33,8 @@ impl ChainSamples {
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
+            // Who waits has not gone.
+            chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));
             if let Err(error) = py.check_signals() {

@@ -3,14 +3,14 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use host_kit::ErrorKind;
 use serde_json::{Value, json};
 use ucom_host::master::io::Snapshot;
-use ucom_host::master::{Error, IdentityError};
-use ucom_host::session::{Change, Known, SessionError};
+use ucom_host::session::Known;
 
+use super::alarms::Alarms;
 use super::failure::BoardFailure;
 use super::hands::Hands;
 use crate::error::Failure;
@@ -61,15 +61,6 @@ struct Queue {
     closed: Option<BoardFailure>,
 }
 
-/// Boards that were lost, have left their loops, or share their number, and were not reported as an error yet.
-#[derive(Default)]
-struct Alarms {
-    lost: Vec<u8>,
-    rebooted: Vec<u8>,
-    left: Vec<u8>,
-    shared: VecDeque<BoardFailure>,
-}
-
 /// All outputs of a board at one time.
 pub struct Sample {
     pub known: Arc<Known>,
@@ -111,8 +102,11 @@ pub struct Shared {
     ended: AtomicBool,
     next_id: AtomicU64,
     events: Mutex<(u64, VecDeque<Value>)>,
-    alarms: Mutex<Alarms>,
+    pub alarms: Alarms,
     listeners: Mutex<Vec<Weak<Listener>>>,
+    asked_at: Mutex<Option<Instant>>,
+    /// Boards that the session has started, also for who comes when its thread is gone.
+    started: Mutex<Vec<u8>>,
     /// Boards whose end is not certain.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
@@ -131,6 +125,21 @@ pub fn failure(kind: ErrorKind, code: &str, message: &str, next: &str) -> BoardF
 
 fn stopped() -> BoardFailure {
     failure(ErrorKind::Fault, "cancelled", "a stop came before its turn: it is not done", "")
+}
+
+/// The process in which something was begun: one that was forked from it has its memory, and none of its threads.
+pub struct Process(u32);
+
+impl Process {
+    /// This one.
+    pub fn this() -> Self {
+        Self(std::process::id())
+    }
+
+    /// It is this one.
+    pub fn is_this(&self) -> bool {
+        self.0 == std::process::id()
+    }
 }
 
 /// What should never happen has.
@@ -157,6 +166,16 @@ impl Shared {
     /// Control loops are to end before all else that is sent.
     pub fn halt(&self, halt: Halt) {
         lock(&self.halts).push(halt);
+    }
+
+    /// Boards that the session has started.
+    pub fn has_started(&self, boards: Vec<u8>) {
+        *lock(&self.started) = boards;
+    }
+
+    /// The thread has a fault: nobody has stopped what was started.
+    pub fn all_left(&self) {
+        self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
     /// Boards whose end is not certain, at the end of the session.
@@ -205,6 +224,7 @@ impl Shared {
 
     /// Events with higher numbers, oldest first.
     pub fn events(&self, after: u64) -> Value {
+        self.asked();
         let events = lock(&self.events);
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
     }
@@ -223,49 +243,39 @@ impl Shared {
 
     /// Load and frames of the bus.
     pub fn bus(&self) -> Value {
+        self.asked();
         lock(&self.seen).clone()
     }
 
-    /// A board changed. `runs`: this session has started its control loop; `master`: that or another board's application.
-    pub fn alarm(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
-        let mut alarms = lock(&self.alarms);
-        match change {
-            Change::Lost if master => alarms.lost.push(board),
-            Change::Rebooted if runs => alarms.rebooted.push(board),
-            Change::LeftLoop => alarms.left.push(board),
-            _ => {}
+    /// Nothing was asked for so long, while boards ran: they were stopped, but for those whose end is not certain.
+    pub fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
+        let mut text = format!(
+            "nothing was asked of the chain for {} s: its boards are stopped",
+            deadline.as_secs_f64()
+        );
+        if !not_stopped.is_empty() {
+            let numbers: Vec<String> = not_stopped.iter().map(u8::to_string).collect();
+            text += &format!(", not for certain: board {}", numbers.join(", "));
         }
+        self.event(time_s, "deadline", None, text.clone());
+        let next = "ask in time, or connect with a longer deadline_s";
+        self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 
-    /// Another board has the number of one that runs: what is commanded to one moves both.
-    pub fn number_shared(&self, board: u8, found: &[u16]) {
-        let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
-        let mut own = BoardFailure::from(SessionError::from(Error::from(error)));
-        // What was found while it runs is no refusal.
-        own.failure.kind = ErrorKind::Fault;
-        lock(&self.alarms).shared.push_back(own);
+    /// Somebody has asked for something, or what was asked for is done.
+    pub fn asked(&self) {
+        *lock(&self.asked_at) = Some(Instant::now());
     }
 
-    /// Reports, once, that boards were lost, have left their loops, or share a number.
+    /// How long nothing was asked for.
+    pub fn silence(&self) -> Duration {
+        lock(&self.asked_at).map_or(Duration::ZERO, |at| at.elapsed())
+    }
+
+    /// Reports what has to be an error, once.
     pub fn check(&self) -> Result<(), BoardFailure> {
-        let Alarms { lost, rebooted, left, .. } = {
-            let mut alarms = lock(&self.alarms);
-            let shared = std::mem::take(&mut alarms.shared);
-            let others = std::mem::take(&mut *alarms);
-            alarms.shared = shared;
-            others
-        };
-        let all = [lost.as_slice(), &rebooted].concat();
-        let error = match (all.is_empty(), left.is_empty()) {
-            (true, true) => return lock(&self.alarms).shared.pop_front().map_or(Ok(()), Err),
-            (true, false) => return Err(SessionError::LeftLoop { boards: left }.into()),
-            (false, _) => SessionError::Lost { lost: lost.len(), rebooted: rebooted.len() },
-        };
-        let list: Vec<String> = all.iter().map(u8::to_string).collect();
-        let mut own = BoardFailure::from(error);
-        own.failure.message += &format!(": board {}", list.join(", "));
-        own.board = all.first().copied().filter(|first| all.iter().all(|other| other == first));
-        Err(own)
+        self.asked();
+        self.alarms.check()
     }
 
     /// A snapshot for those who read it.
@@ -301,6 +311,7 @@ impl Shared {
         let Some(work) = work else { return false };
         hands.quiet();
         (work.act)(Ok(hands));
+        self.asked();
         lock(&self.queue).current = None;
         true
     }
@@ -322,6 +333,7 @@ impl Shared {
 
     /// Puts a thing to do in its place; a stop ends what goes on, what waits is not done.
     pub fn put(&self, work: Work) {
+        self.asked();
         let (refused, why) = {
             let mut queue = lock(&self.queue);
             match (&queue.closed, work.kind) {

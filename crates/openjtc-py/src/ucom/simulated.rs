@@ -12,6 +12,7 @@ use ucom::Profile;
 use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
 
 use super::failure::BoardFailure;
+use super::shared::Process;
 use crate::error::Failure;
 
 /// How long nothing that happens outside is waited for.
@@ -34,6 +35,7 @@ pub struct Simulated {
     faults: Mutex<Sender<String>>,
     ended: Arc<AtomicBool>,
     thread: Mutex<Option<JoinHandle<()>>>,
+    process: Process,
 }
 
 impl Simulated {
@@ -80,7 +82,8 @@ impl Simulated {
         });
         let url = url.recv().unwrap_or_else(|_| Err("the simulated chain has a fault".into()));
         let url = url.map_err(|e| Failure::usage(e).next("is a port of 127.0.0.1 free?"))?;
-        Ok(Self { url, boards, faults: Mutex::new(sender), ended, thread: Mutex::new(Some(thread)) })
+        let (faults, thread) = (Mutex::new(sender), Mutex::new(Some(thread)));
+        Ok(Self { url, boards, faults, ended, thread, process: Process::this() })
     }
 
     /// The URL of its bus.
@@ -91,7 +94,8 @@ impl Simulated {
     /// Ends it and waits for that.
     fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(thread) = thread.filter(|_| self.process.is_this()) {
             // A panic of that thread has been printed.
             drop(thread.join());
         }

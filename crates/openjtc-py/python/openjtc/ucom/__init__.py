@@ -113,6 +113,7 @@ def connect(
     profile: _Path | None = None,
     on_lost: Literal["report", "stop-board", "stop-all"] | None = None,
     cache: _Path | bool | None = None,
+    deadline_s: float | None = None,
 ) -> Chain:
     """A chain of boards on a bus; nothing is sent by this.
 
@@ -126,6 +127,8 @@ def connect(
         on_lost: What is done when a board is lost; None: by the profile, which stops all.
         cache: A folder where the names of signals are remembered; True or None: the user's, False (and for a simulated chain
             None): nowhere.
+        deadline_s: With no call for so many seconds while boards run, they are stopped, and the next `Chain.check` raises a
+            `FaultError` (``deadline``). None: they run on as long as this process lives, also where the program hangs.
 
     Raises:
         UsageError: The URL is none, or a file cannot be understood.
@@ -153,5 +156,6 @@ def connect(
         paths[1],
         folder,
         remember,
+        deadline_s,
     )
     return Chain(native, names or {}, simulated)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 import warnings
 import weakref
 from collections.abc import Iterable, Mapping
@@ -25,7 +27,16 @@ _Self = TypeVar("_Self", bound="Session")
 
 def _close(native: _native.Chain) -> None:
     """At the end of the program, or of the last reference to a chain that was not closed."""
-    native.close()
+    not_stopped = native.close()
+    if not_stopped and sys.stderr is not None:
+        # Nobody takes an exception any more.
+        with contextlib.suppress(OSError, ValueError):
+            print(f"openjtc: {_not_stopped(not_stopped)}", file=sys.stderr, flush=True)
+
+
+def _not_stopped(boards: Iterable[int]) -> str:
+    listed = ", ".join(map(str, boards))
+    return f"not stopped for certain: board {listed}; without heartbeats they become safe by themselves"
 
 
 class Session:
@@ -80,8 +91,7 @@ class Session:
             raise
 
     def _say_not_stopped(self, boards: list[int], warn: bool) -> None:
-        listed = ", ".join(map(str, boards))
-        text = f"not stopped for certain: board {listed}; without heartbeats they become safe by themselves"
+        text = _not_stopped(boards)
         if warn:
             warnings.warn(text, RuntimeWarning, stacklevel=4)
             return

@@ -260,7 +260,7 @@ class Chain(ValuesByName):
             expect_program_id: Program ID that the boards must show at the end.
             name_target: The header names the board: another one refuses the image.
             group: All boards with one transfer, by broadcast.
-            start: Start the application at the end.
+            start: Start the application at the end; like what `start` has started it is stopped when the chain is closed.
             dry_run: Only the checks; nothing is sent that changes a board.
             unverified: What cannot be read back is as good as what was.
             force: Also when boards run, another PC is on the bus, or the image is there already.

@@ -12,29 +12,38 @@ use super::LinkArgs;
 pub enum FirmwareCommand {
     /// The images that are installed, and the boards' drives that are mounted
     #[command(
-        after_help = "Images are listed by firmware.json in the folder that OPENJTC_FIRMWARE names, else in ../share/openjtc/firmware beside\n\
-                            this program, else in /usr/share/openjtc/firmware.\n\nExamples:\n  jtc firmware list\n  \
+        after_help = "Images are listed by firmware.json in the folder that OPENJTC_FIRMWARE names, else in\n\
+                            ../share/openjtc/firmware beside this program, else in /usr/share/openjtc/firmware.\n\n\
+                            Examples:\n  \
+                            jtc firmware list\n  \
                             jtc --json firmware list | jq -r .drives[].path"
     )]
     List,
     /// Put an image onto a Nucleo board by the drive of its ST-LINK, and prove that it runs
     #[command(
-        after_help = "The board is reset: an arm that it holds falls. The serial port of the drive's own USB device (known on Linux) is always\n\
-                            asked, and --port beside it; a port that cannot be asked, and a controller that reports torque, end the command with 4,\n\
-                            whatever options are given. Without a question a board is flashed only where its own port reports no torque, every joint\n\
-                            answers it and the gripper is off; else this is asked on a terminal, --yes answers. How the core is supplied is\n\
-                            known where that port reports the very board of the image; else a board that comes in both kinds needs --accept-supply.\n\
-                            What runs afterwards is asked over the same port, and compared with the image by the CRC-32 of what the program finds\n\
-                            in its own flash. --baud is the rate of what runs before; afterwards it is that of the image. The stored arm\n\
-                            may be lost: `jtc arm pull -o FILE` before.\n\nExamples:\n  jtc firmware flash\n  jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
+        after_help = "The board is reset: an arm that it holds falls. The serial port of the drive's own USB device\n\
+                            (known on Linux) is always asked, and --port beside it; a port that cannot be asked, and a\n\
+                            controller that reports torque, end the command with 4, whatever options are given. Without a\n\
+                            question a board is flashed only where its own port reports no torque, every joint answers it\n\
+                            and the gripper is off; else this is asked on a terminal, --yes answers. How the core is\n\
+                            supplied is known where that port reports the very board of the image; else a board that comes\n\
+                            in both kinds needs --accept-supply. What runs afterwards is asked over the same port, and\n\
+                            compared with the image by the CRC-32 of what the program finds in its own flash. --baud is the\n\
+                            rate of what runs before; afterwards it is that of the image. The stored arm may be lost:\n\
+                            `jtc arm pull -o FILE` before.\n\n\
+                            Examples:\n  \
+                            jtc firmware flash\n  \
+                            jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
                             jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2 --port /dev/ttyUSB0\n  \
                             jtc firmware flash --image openjtc.bin --no-read-back --yes"
     )]
     Flash(FlashArgs),
     /// Whether a board runs an image; nothing is written
     #[command(
-        after_help = "Without --image or --board the image is that of the board which the controller reports.\n\nExamples:\n  \
-                            jtc firmware verify\n  jtc firmware verify --image openjtc.bin --port /dev/ttyACM0"
+        after_help = "Without --image or --board the image is that of the board which the controller reports.\n\n\
+                            Examples:\n  \
+                            jtc firmware verify\n  \
+                            jtc firmware verify --image openjtc.bin --port /dev/ttyACM0"
     )]
     Verify {
         #[command(flatten)]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ucom_bus import Bus, bus, numbered, numbered_bus, sim  # noqa: F401  # fixtures
+from ucom_bus import ACTIVE, ADMIN_TO, SAFE, Bus, bus, numbered, numbered_bus, sim  # noqa: F401  # fixtures
 
 from openjtc import errors, ucom
 
@@ -155,11 +155,18 @@ def test_an_update_is_proved_by_the_board(numbered: ucom.SimulatedChain, numbere
         assert not kept.verified and "0x7777" in kept.boards[0].error
 
 
-def test_outputs_and_single_acts(sim: ucom.SimulatedChain) -> None:
+def test_outputs_and_single_acts(sim: ucom.SimulatedChain, bus: Bus) -> None:
     with ucom.connect(sim) as chain:
         chain.init()
         chain.run(1)
+        assert not bus.came(ADMIN_TO + 1, ACTIVE)
         chain.outputs(True)
+        enabled = bus.when(ADMIN_TO + 1, ACTIVE)
+        before = len(bus.frames)
+        chain.outputs(False)
+        assert bus.when(ADMIN_TO + 1, SAFE, before) > enabled
+        before = len(bus.frames)
+        bus.wait(lambda: len(chain.values()) == 5 and any(one == 0x381 for one, _ in bus.frames[before:]))
         assert chain.stop(1, application=False)[1].state == "started"
         assert chain.stop(1)[1].state == "exloader"
         assert "ASTART" in chain.status(2, set=["ASTART"])[2].status
@@ -203,6 +210,21 @@ def test_inventories_name_boards_and_are_compared_with(tmp_path: Path) -> None:
         chain.run("nod", active=True, inputs={"nod.set_position": 300})
         bus_value = chain["NOD.set_position"]
         assert bus_value == 300
+    # Names are known before it was asked who is there; "all" is no name, whatever an inventory has.
+    file.write_text(file.read_text().replace('name = "nod"', 'name = "all"'))
+    with ucom.connect(simulated, inventory=file) as chain:
+        assert set(chain.info("all")) == {1, 2} == set(chain.boards)
+    file.write_text(file.read_text().replace('name = "all"', 'name = "nod"'))
+    with ucom.connect(simulated, inventory=file) as chain:
+        assert chain.start("nod")[2].state == "started"
+        chain.stop()
+        # Another program has exchanged the names, and has one board more: the numbers are new all the same.
+        text = file.read_text().replace('name = "nod"\n', "")
+        text = text.replace("number = 1\n", 'number = 1\nname = "nod"\n')
+        file.write_text(text + "[[board]]\nnumber = 3\nflash_number = 0x77\n")
+        with pytest.raises(errors.DeviceError):
+            chain.init()
+        assert set(chain.start("nod")) == {1}
     simulated.end()
 
 
@@ -225,11 +247,23 @@ def test_recordings_have_every_frame(sim: ucom.SimulatedChain, bus: Bus, tmp_pat
     assert all(frame in seen for frame in frames), "the other client saw each, this chain's own among them"
 
 
-def test_probe_and_conformance(numbered: ucom.SimulatedChain) -> None:
+def test_probe_and_conformance(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:
     with ucom.connect(numbered) as chain:
         assert chain.probe().boards == (1, 2, 3)
         report = chain.conformance(1)
         assert report.tests and not report.failed and not report.left
+        # It reads the protocol as before, and its boards are as they were.
+        chain.run(1)
+        for asked in ({"alive": True}, {"init": True}):
+            with pytest.raises(errors.RefusedError) as runs:
+                chain.probe(**asked)
+            assert (runs.value.code, runs.value.board) == ("running", 1)
+        before = len(numbered_bus.frames)
+        numbered_bus.wait(lambda: any(identifier == 0x381 for identifier, _ in numbered_bus.frames[before:]))
+        chain.stop()
+        measured = {row.key: row.decision for row in chain.probe(alive=True).rows if row.measured}
+        assert measured["alive.mode"] == "broadcast" and chain.info(1)[1].state == "exloader"
+        assert chain.probe(init=True).boards == (1, 2, 3) and chain.boards[1].number == 1
 
 
 def test_the_example_runs(capfd: pytest.CaptureFixture[str]) -> None:

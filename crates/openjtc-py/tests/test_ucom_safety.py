@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import pytest
-from ucom_bus import ADMIN_TO, Bus, bus, numbered, numbered_bus, sim  # noqa: F401  # fixtures
+from ucom_bus import ACTIVE, ADMIN_TO, ALIVE, STOPPED, Bus, bus, numbered, numbered_bus, sim  # noqa: F401  # fixtures
 
 from openjtc import errors, ucom
 
@@ -28,8 +28,12 @@ def test_ctrl_c_and_a_progress_function_that_fails_end_an_update(
         raise KeyError("mine")
 
     with ucom.connect(numbered) as chain:
-        with pytest.raises(KeyError, match="mine"):
+        with pytest.raises(KeyError, match="mine") as ended:
             chain.update(image, 1, progress=fails)
+        outcomes = [event.text for event in chain.events() if event.kind == "updated"]
+        assert len(outcomes) == 1 and outcomes[0].startswith("board 1: ")
+        if sys.version_info >= (3, 11):
+            assert ended.value.__notes__ == outcomes
         timer = threading.Timer(0.9, _thread.interrupt_main)
         timer.start()
         with pytest.raises(KeyboardInterrupt):
@@ -54,6 +58,9 @@ def test_a_board_that_goes_silent_is_reported(sim: ucom.SimulatedChain, bus: Bus
             with pytest.raises(errors.NoLinkError) as stale:
                 chain["3.position"]
             assert stale.value.code == "stale" and stale.value.board == 3
+            with pytest.raises(errors.NoLinkError) as all_stale:
+                chain.values()
+            assert all_stale.value.code == "stale" and all_stale.value.board in (1, 2, 3)
             bus.wait(lambda: not bus.runs(1) and not bus.runs(2))
             assert not chain.doctor().healthy
     assert not_stopped.value.code == "not-stopped"
@@ -109,7 +116,12 @@ def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, 
     child.stdout.close()
     # Stopped by it, not by themselves for want of heartbeats: their applications have ended, too.
     assert not numbered_bus.started(1) and not numbered_bus.started(2)
-    assert [data for identifier, data in numbered_bus.frames[before:] if identifier == ADMIN_TO + 1 and not any(data)]
+    numbered_bus.wait(lambda: numbered_bus.came(ADMIN_TO + 1, ACTIVE, before))
+    ran = numbered_bus.frames.index((ADMIN_TO + 1, ACTIVE), before)
+    stopped = numbered_bus.when(ADMIN_TO + 1, STOPPED, ran)
+    frames, times = numbered_bus.frames[ran:], numbered_bus.times[ran:]
+    heartbeats = [at for frame, at in zip(frames, times) if frame == ALIVE and at <= stopped]
+    assert not heartbeats or stopped - heartbeats[-1] < 1.4, "a board does so itself after 1.5 s"
 
 
 def test_a_stop_from_another_thread_goes_first(numbered: ucom.SimulatedChain, numbered_bus: Bus) -> None:

@@ -14,7 +14,10 @@ from openjtc import ucom
 
 #: Identifier of MCA_ADMIN_DATA to and from board 0.
 ADMIN_TO = 0x600
-
+#: Its data: run, active, debug, global debug.
+STOPPED, SAFE, ACTIVE = bytes(4), bytes([1, 0, 0, 0]), bytes([1, 1, 0, 0])
+#: The heartbeat of a PC.
+ALIVE = (0x680, b"")
 
 
 class Bus:
@@ -24,6 +27,8 @@ class Bus:
         host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
         self.socket = socket.create_connection((host, int(port)))
         self.frames: list[tuple[int, bytes]] = []
+        #: When each was on the bus, s by its server.
+        self.times: list[float] = []
         self.text, self.ended = "", False
         self.thread = threading.Thread(target=self._read)
         self.thread.start()
@@ -39,8 +44,9 @@ class Bus:
                 self.text += self.socket.recv(65536).decode()
             except OSError:
                 return
-            for found in re.finditer(r"< frame ([0-9A-Fa-f]+) [\d.]+ ([0-9A-Fa-f ]*)>", self.text):
-                self.frames.append((int(found[1], 16), bytes.fromhex(found[2].replace(" ", ""))))
+            for found in re.finditer(r"< frame ([0-9A-Fa-f]+) ([\d.]+) ([0-9A-Fa-f ]*)>", self.text):
+                self.times.append(float(found[2]))
+                self.frames.append((int(found[1], 16), bytes.fromhex(found[3].replace(" ", ""))))
             self.text = re.sub(r"< frame [^>]*>", "", self.text)
 
     def wait(self, condition: Callable[[], object]) -> None:
@@ -52,6 +58,15 @@ class Bus:
     def send(self, identifier: int, data: bytes = b"") -> None:
         listed = " ".join(f"{byte:02X}" for byte in data)
         self.socket.sendall(f"< send {identifier:X} {len(data)} {listed} >".encode())
+
+    def came(self, identifier: int, data: bytes, after: int = 0) -> bool:
+        """This frame was on the bus since there were so many frames."""
+        return (identifier, data) in self.frames[after:]
+
+    def when(self, identifier: int, data: bytes, after: int = 0) -> float:
+        """When it first was since then, s by the server of the bus."""
+        self.wait(lambda: self.came(identifier, data, after))
+        return self.times[self.frames.index((identifier, data), after)]
 
     def status(self, board: int) -> int:
         """The status byte in the answer of a board to PC_INFO (0x200 + number), the first frame of DSP_INFO (0x140 + number)."""

@@ -54,8 +54,8 @@ class Wire:
 
     def __init__(self) -> None:
         self.simulator, self.sent, self.is_silent, self.is_over = Simulator(), b"", False, False
-        #: What somebody else sends.
-        self.to_send = b""
+        #: What somebody else sends, and who looks at what is sent here before the controller has it.
+        self.to_send, self.on_sent = b"", None
         self.master, self.slave = pty.openpty()
         tty.setraw(self.master)
         self.path = os.ttyname(self.slave)
@@ -68,6 +68,8 @@ class Wire:
             with contextlib.suppress(BlockingIOError):
                 data = os.read(self.master, 4096)
                 self.sent += data
+                if self.on_sent is not None:
+                    self.on_sent(data)
                 self.simulator.write(data)
             if self.to_send:
                 self.simulator.write(self.to_send)
@@ -292,6 +294,31 @@ def test_a_stop_is_written_first_of_all(wire: Wire):
         waiting.join()
         assert isinstance(stopping.error, openjtc.NoLinkError) and "stop was sent" in stopping.error.message
         wire.is_silent = False
+
+
+def test_what_a_stop_overtakes_on_its_way_is_not_sent(wire: Wire):
+    with openjtc.connect(wire.path) as robot:
+        robot.use_defaults()
+        robot.wait_ready()
+        motion = robot.start(openjtc.example("motion"), approach=True)
+        until(lambda: is_moving(robot))
+        robot.pause()
+        until(lambda: robot.status.trajectory == "Pause")
+        executed = wire.sent.count(encode.execute())
+
+        # A resume asks the controller for its settings before it sends Execute: that is when somebody stops the arm.
+        def stop(data: bytes) -> None:
+            if any(bytes([0x9B, kind]) in data for kind in range(0x40, 0x60)):
+                wire.on_sent = None
+                robot._link.halt()
+
+        wire.on_sent = stop
+        resuming = Aside(robot.resume)
+        resuming.join()
+        assert isinstance(resuming.error, openjtc.FaultError) and resuming.error.code == "cancelled", resuming.error
+        with pytest.raises(openjtc.StoppedError):
+            motion.wait(30)
+        assert wire.sent.count(encode.execute()) == executed and wire.stops() > 0 and stands(robot)
 
 
 def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):

@@ -13,7 +13,7 @@ class Error(Exception):
 
     Attributes:
         message: What was asked for, where, value and limit.
-        code: A short name for programs, as ``jtc explain CODE`` knows it.
+        code: A short name for programs, that of ``jtc`` where it has the error, too.
         joint: The joint, counted from 1; None where it is about none.
         point: The point of the trajectory, counted from 0; in motion the millisecond of its path.
         value: What was found, in the unit of the message.

@@ -107,7 +107,7 @@ class Motion:
         assert self._run is not None
         if self._run.outcome == "stopped" and not own:
             error = StoppedError(
-                f"the motion was stopped on its way, after {self._run.duration:.2f} s, and not by whoever waits for it",
+                "the motion was stopped on its way, and not by who waits for it",
                 "stopped",
                 next="find out who stopped it, and why; what is asked for from now on is done",
             )

@@ -622,7 +622,7 @@ def test_a_program_that_keeps_the_motion_alone_stops_it_at_its_end(port: str):
 
 def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
     program = (
-        "import os, openjtc\n"
+        "import os, time, openjtc\n"
         "with openjtc.connect('sim:', speed=5.0) as robot:\n"
         "    motion = robot.start(openjtc.example('motion'), approach=True)\n"
         "    while motion.progress[0] != 'motion': pass\n"
@@ -635,6 +635,11 @@ def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
         "            assert 'process' in error.next\n"
         "            raise SystemExit(7)\n"
         "    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"
+        "    child = os.fork()\n"
+        "    if child == 0:\n"
+        "        time.sleep(60)\n"
+        "    os.kill(child, 15)\n"
+        "    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -15\n"
         "    assert not robot.is_closed and not motion.is_done\n"
     )
     subprocess.run([sys.executable, "-W", "ignore", "-c", program], cwd=tmp_path, check=True, timeout=60)

@@ -22,6 +22,8 @@ from openjtc.robot import Robot
 __all__ = ["connect"]
 
 _open: weakref.WeakSet[Robot] = weakref.WeakSet()
+#: The process that connected last.
+_process = os.getpid()
 
 
 @atexit.register
@@ -39,11 +41,17 @@ def _close_all() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
+    if os.getpid() != _process:
+        # A child has no arm to stop, and ends as ever.
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
     raise SystemExit(128 + number)
 
 
 def _catch_signals() -> None:
     """A program that is told to end stops what it moves, too. Where somebody handles these signals already, that is left as it is."""
+    global _process
+    _process = os.getpid()
     if threading.current_thread() is not threading.main_thread():
         return
     for name in ("SIGTERM", "SIGHUP"):

@@ -191,7 +191,7 @@ class Simulator:
 
     @property
     def outputs(self) -> Outputs:
-        """What came out of it; where the tick did not come, nothing. Needs ``watch=True``."""
+        """What came out of it; where the tick did not come, nothing but the level of the safety output. Needs ``watch=True``."""
         return Outputs(*self._exchange()[1], self._native.telemetry)
 
     def _exchange(

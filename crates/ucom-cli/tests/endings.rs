@@ -121,6 +121,23 @@ fn d51_losses_during_the_start_count() {
     assert!(output.out.contains("\"stopped\"") && output.err.contains("a board was lost"), "{}", output.err);
 }
 
+/// D-37: the outputs of each board are made safe, whatever another one does.
+#[test]
+fn d37_outputs_are_made_safe_although_a_board_is_silent() {
+    let mut sim = Sim::numbered(&["--boards", "2"]);
+    let profile = sim.file("p.toml", b"alive.dsp_lost = 20000\n");
+    let mut peer = sim.peer();
+    let mut child = sim.spawn(&["--profile", &profile, "run", "1,2", "--active"]);
+    peer.wait("602#01010000");
+    sim.fault("silent board=1 for_s=2.5");
+    writeln!(child.stdin.as_mut().unwrap(), "active off").unwrap();
+    peer.wait("601#01000000");
+    peer.wait("602#01000000");
+    std::thread::sleep(Duration::from_millis(2_500));
+    let output = ended_by(child, "-INT").ends(0);
+    assert!(output.err.contains("board 1: "), "{}", output.err);
+}
+
 /// P-19: a refusal or a failure leaves applications as they were found.
 #[test]
 fn p19_a_refused_run_leaves_nothing_started() {

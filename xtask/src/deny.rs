@@ -86,9 +86,8 @@ pub fn with_cargo_deny() -> Result<()> {
         // It looks at the sources for every target, of which builds for this computer have fetched a part.
         run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
-        deny.args(["--offline", "--manifest-path", manifest, "check", "--config"])
-            .arg(root().join("deny.toml"));
-        run(deny.args(["licenses", "bans", "sources"]))?;
+        deny.args(["--offline", "--manifest-path", manifest, "--config"]).arg(root().join("deny.toml"));
+        run(deny.args(["check", "licenses", "bans", "sources"]))?;
     }
     Ok(())
 }

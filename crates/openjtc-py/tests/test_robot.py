@@ -380,21 +380,21 @@ def test_another_arm_than_the_one_that_was_named_is_not_moved(tmp_path: Path):
         assert robot.move(HOME).outcome == "finished"
 
 
-def test_a_robot_description_plans_and_runs():
-    """UR5 as its maker's community describes it, where the package of descriptions is installed."""
-    description = pytest.importorskip("example_robot_data")
-    folder = Path(description.__file__).parent
-    found = [p for root in (folder, Path(sys.prefix)) for p in root.rglob("ur5_robot.urdf")]
-    if not found:
-        pytest.skip("the description is not in the package")
-    arm = openjtc.Arm.import_urdf(found[0])
-    assert arm.warnings, "what a description lacks is said"
+@pytest.mark.skipif("OPENJTC_ROBOTS" not in os.environ, reason="OPENJTC_ROBOTS names no folder of robot descriptions")
+def test_a_robot_description_plans_and_runs(monkeypatch: pytest.MonkeyPatch):
+    """UR5 as others describe it: from the URDF to a motion that was followed."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / "references" / "arms")
+    import descriptions
+
+    arm = openjtc.Arm.import_urdf(descriptions.folder() / "ur_description/urdf/ur5_robot.urdf", tip="ee_link")
+    assert arm.warnings, "what a description lacks is reported"
     with openjtc.connect("sim:", arm=arm, speed=None) as robot:
         start = robot.position
         plan = robot.plan([start, start + [0.4, -0.3, 0.5, 0.2, 0.3, 0.6], start], blend=0.05)
         run = robot.run(plan)
         assert run.outcome == "finished"
         assert max(joint.max_error_mrad for joint in run.joints) < 50
+        assert np.abs(run.arrays()["position"][-1] - start).max() < 0.01
 
 
 def test_there_is_no_such_port_or_agent():

@@ -57,9 +57,14 @@ def states(metrics, name):
 
 def check_metrics(arm):
     """Every number of the page that something else shows, too."""
-    status = arm.json("GET", "/api/status")
-    metrics = arm.metrics()
-    again = arm.json("GET", "/api/status")
+    for _ in range(20):
+        status = arm.json("GET", "/api/status")
+        metrics = arm.metrics()
+        again = arm.json("GET", "/api/status")
+        # Not where a path ended and was given once more in between.
+        (before, point), (after, then) = [(s["controller"]["trajectory"], s["controller"]["point"]) for s in (status, again)]
+        if before == after and point <= then:
+            break
     for joint, then in zip(status["controller"]["joints"], again["controller"]["joints"], strict=True):
         label = ("joint", str(joint["joint"]))
         for name, key, within in [

@@ -99,11 +99,13 @@ impl Hands {
         self.session.rest(commands);
     }
 
-    /// What was done is in the picture, and what has happened is written down: before who asked for it knows that it is done.
+    /// What was done is in the picture, what has happened is written down, and it goes on no more: before who asked for it knows that it is
+    /// done.
     pub(super) fn settle(&mut self) {
         self.local.borrow_mut().published = None;
         // A bus that is gone is seen in the next turn.
         let _ = self.driver.turn(Duration::ZERO);
+        self.shared.queue.done();
     }
 
     fn work(&mut self, work: Work) {
@@ -111,10 +113,14 @@ impl Hands {
         self.quiet();
         self.local.borrow_mut().job = work.job;
         match work.asked.and_then(|asked| self.shared.too_late(asked)) {
-            Some(late) => (work.act)(Err(late)),
+            Some(late) => {
+                self.shared.queue.done();
+                (work.act)(Err(late));
+            }
             None => (work.act)(Ok(self)),
         }
         self.local.borrow_mut().job = None;
+        // Of what was a Stop's, or broke off.
         self.shared.queue.done();
     }
 

@@ -30,6 +30,7 @@ fn main() -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let out = out.canonicalize()?;
     // mdbook empties the folder first.
+    ensure!(!root.starts_with(&out), "{} holds the repository, and would be emptied", out.display());
     let is_empty = std::fs::read_dir(&out)?.next().is_none();
     ensure!(
         is_empty || out.join(MARK).exists(),

@@ -83,24 +83,13 @@ fn fresh(wheel: &Path) -> Result<()> {
     let environment = scratch.path().join("environment");
     run(shell::command("python3").args(["-m", "venv"]).arg(&environment))?;
     let python = environment.join("bin/python");
-    let mut install = shell::command(&python);
-    run(install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).arg(wheel))?;
+    run(python::pip_install(&python).arg(wheel))?;
     run(shell::command(&python).args(["-c", FIRST_LINES]).current_dir(scratch.path()))
 }
 
 fn tested(wheel: &Path) -> Result<Outcome> {
     let python = python::environment(REQUIREMENTS)?;
-    let mut install = shell::command(&python);
-    install.args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-        "--force-reinstall",
-        "--no-deps",
-    ]);
-    run(install.arg(wheel))?;
+    run(python::pip_install(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     python::commands()?;
     let scratch = Scratch::new("package")?;
     let mypy = |arguments: &[&str]| {

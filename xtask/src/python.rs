@@ -1,6 +1,7 @@
 //! Independent references in Python: a virtual environment made by itself, and the checks that run in it.
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -36,20 +37,18 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
         apt_install(&["python3", "python3-venv"])?;
         run(&mut make())?;
     }
-    let mut install = command(&python);
-    install.args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-        "--only-binary",
-        ":all:",
-        "-r",
-    ]);
+    let mut install = pip_install(&python);
+    install.args(["--only-binary", ":all:", "-r"]);
     run(install.arg(&list)).context("the packages could not be installed; is the network there?")?;
     std::fs::write(&stamp, "")?;
     Ok(python)
+}
+
+/// `pip install` of this interpreter's environment; what to install follows.
+pub fn pip_install(python: &Path) -> Command {
+    let mut install = command(python);
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    install
 }
 
 /// Where robot descriptions of other people are kept, for all environments.

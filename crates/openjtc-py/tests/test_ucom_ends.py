@@ -145,7 +145,7 @@ def test_a_number_that_two_boards_have_is_an_error_while_one_runs(sim: ucom.Simu
         assert shared.value.code == "number-shared" and shared.value.board == 1
         chain.check()
     finally:
-        # Both are commanded to stop; their answers cannot be told apart.
+        # Both are commanded to stop; their answers look alike.
         with contextlib.suppress(errors.Error):
             chain.close()
 

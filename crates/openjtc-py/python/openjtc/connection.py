@@ -49,7 +49,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _catch_signals() -> None:
-    """A program that is told to end stops what it moves, too. Where somebody handles these signals already, that is left as it is."""
+    """A program that a signal ends stops what it moves, too. Where somebody handles these signals already, that is left as it is."""
     global _process
     _process = os.getpid()
     if threading.current_thread() is not threading.main_thread():

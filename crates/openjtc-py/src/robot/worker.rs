@@ -291,6 +291,6 @@ fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
             return;
         }
     }
-    // Nobody is left to be told; the controller was sent what could be sent.
+    // Nobody is left to report to; the controller was sent what could be sent.
     let _ = machine.rest();
 }

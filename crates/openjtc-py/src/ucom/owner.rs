@@ -93,7 +93,7 @@ impl Owner {
         }
     }
 
-    /// What an update has made of each board goes with the exception that has ended it: nobody else is told.
+    /// What an update has made of each board goes with the exception that has ended it: nobody else gets it.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
             // Exceptions have notes since Python 3.11; the events have the same.

@@ -58,7 +58,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, BoardFailure> {
     hands.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
-        // The boards run, perhaps with their outputs enabled: who is told of a failure takes them for stopped.
+        // The boards run, perhaps with their outputs enabled: who receives a failure takes them for stopped.
         if let Err(error) = hands.driver.run(Request::Admin { board: *board, change, force: true }) {
             hands.driver.note(format!("board {board} may send no texts: {error}"));
         }

@@ -120,7 +120,7 @@ impl Hands {
             None => (work.act)(Ok(self)),
         }
         self.local.borrow_mut().job = None;
-        // Of what was a Stop's, or broke off.
+        // What nobody waits for any more, and what was not begun, has settled nothing.
         self.shared.queue.done();
     }
 

@@ -120,6 +120,8 @@ impl<P: Port> Session<P> {
     ///
     /// Those of [`Session::teach`]; [`Error::Cancelled`].
     pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
+        self.introduce()?;
+        self.read_host_timeout()?;
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
             // It does not teach, or for somebody else.
             Err(error) if !error.is_loss() => return Err(error.into()),
@@ -239,6 +241,7 @@ impl<P: Port> Session<P> {
         // Nothing comes before a Stop or a Pause.
         if !stopping {
             self.introduce()?;
+            self.read_host_timeout()?;
         }
         let retries = self.statistics.retries;
         let mut record = self

@@ -13,8 +13,8 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
-/// A device reports everything to a host that asked within the last 10 s (J-51): asked again in time.
-const ASK_AGAIN: Duration = Duration::from_secs(5);
+/// A device reports every reason to a host that sent an extension request within the last 2 s (J-51): it is repeated in time.
+pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Longest that a device may take to store an arm: erasing a sector of flash does.
 const STORING: Duration = Duration::from_secs(30);
 
@@ -50,6 +50,7 @@ impl<P: Port> Session<P> {
 
     /// Asks the device who it is where that was not done of late: only then it reports each reason of a refusal (J-51).
     pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
+        self.presence.commands();
         let due = match self.extensions {
             Extensions::Unknown => true,
             Extensions::None => false,
@@ -94,6 +95,7 @@ impl<P: Port> Session<P> {
         frame: &[u8],
         take: impl Fn(Answer<'_>) -> Option<T>,
     ) -> Result<T, LinkError> {
+        self.await_presence()?;
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;
@@ -190,7 +192,9 @@ impl<P: Port> Session<P> {
     pub fn set_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let mut frame = vec![0; 6 + jtc_wire::VALUE_LEN * values.len().min(SET_VALUES_MAX)];
         let n = set_settings(&mut frame, values.iter().copied())?;
-        Ok(self.extension(&frame[..n])?)
+        self.extension(&frame[..n])?;
+        self.set_presence(values);
+        Ok(())
     }
 
     /// The device has extensions, as far as it was asked.

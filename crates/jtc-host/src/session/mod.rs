@@ -13,6 +13,7 @@ mod jogging;
 mod log;
 mod params;
 mod payload;
+mod presence;
 mod ready;
 mod recover;
 mod reset;
@@ -38,6 +39,8 @@ pub use give::ArmPart;
 pub use jogging::JOG_AGAIN;
 pub use log::LogStatus;
 pub use params::PushReport;
+use presence::Presence;
+pub use presence::host_timeout_ms;
 pub use ready::BRING_UP;
 pub use recover::{ParameterSource, RecoverStep};
 pub use reset::reset_takes_torque;
@@ -80,6 +83,7 @@ pub struct Session<P> {
     /// What extension requests returned, as it arrived.
     answers: VecDeque<Vec<u8>>,
     extensions: Extensions,
+    presence: Presence,
     last: Option<Status>,
     statistics: LinkStatistics,
     start: Duration,
@@ -102,6 +106,7 @@ impl<P: Port> Session<P> {
             records: VecDeque::new(),
             answers: VecDeque::new(),
             extensions: Extensions::default(),
+            presence: Presence::default(),
             last: None,
             statistics: LinkStatistics::default(),
             start,
@@ -167,8 +172,8 @@ impl<P: Port> Session<P> {
             if let Some(status) = self.arrived.pop_front() {
                 return Ok(Some(status));
             }
-            let now = self.port.now();
-            if self.read(end.saturating_sub(now))? == 0 && self.port.now() >= end {
+            let wait = end.saturating_sub(self.port.now()).min(self.show_presence()?);
+            if self.read(wait)? == 0 && self.port.now() >= end {
                 return Ok(None);
             }
         }
@@ -232,6 +237,9 @@ impl<P: Port> Session<P> {
             match frame {
                 FromDevice::Status(status) => self.arrived.push_back(status),
                 FromDevice::Answer(answer) => {
+                    if let Some(at) = self.presence.take_answer(&answer) {
+                        self.extensions = Extensions::Asked(at);
+                    }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
                     // What was read is as short.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
@@ -257,6 +265,7 @@ impl<P: Port> Session<P> {
             if status.trajectory == TrajectoryState::Null {
                 self.uploaded = None;
             }
+            self.presence.take_status(status);
             self.last = Some(*status);
             self.last_received = now;
         }

@@ -4,6 +4,7 @@ mod checked;
 mod denied;
 mod imported;
 mod link;
+mod presence;
 mod recover;
 mod scripted;
 

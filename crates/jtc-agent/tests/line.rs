@@ -7,7 +7,8 @@ use board::Board;
 use jtc_agent::line::{ClientId, OWNER};
 use jtc_agent::{LineEvent, Policy, Role};
 use jtc_wire::{
-    ControllerState, DataStatus, ExecCommand, FrameType, RawPoint, TrajectoryState, fixed, trajectory,
+    ControllerState, DataStatus, ExecCommand, FrameType, RawPoint, SettingValue, TrajectoryState, fixed,
+    trajectory,
 };
 use proptest::prelude::*;
 
@@ -630,4 +631,70 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     // Who has got it waits no more.
     assert_eq!(board.line.lease().map(|lease| (lease.holder, lease.wanted_by)), Some((emil, None)));
     board.line.want_lease(anna, now).expect("nobody waits");
+}
+
+/// While the arm moves under host supervision, only the client that commands shows the controller that its host is there.
+#[test]
+fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
+    use ControllerState::{HoldPos, Operate, Teaching};
+    use TrajectoryState::{Execute, Finish, Pause, Stop};
+    // Timeout (ms), what the controller shows, whether the holder lapses, how often it sends a frame (ms; 0: never), whether the viewer's
+    // questions pass.
+    let cases = [
+        (0, (Operate, Execute), true, 0, true),
+        (1500, (Operate, Execute), true, 0, false),
+        (60_000, (Operate, Execute), true, 0, false),
+        (1500, (Operate, Pause), true, 0, false),
+        (1500, (Teaching, Stop), true, 0, false),
+        (1500, (HoldPos, Pause), true, 0, true),
+        (1500, (HoldPos, Finish), true, 0, true),
+        (1500, (Operate, Execute), false, 0, false),
+        (1500, (Operate, Execute), false, 500, true),
+        (1500, (Teaching, Finish), false, 500, true),
+        (300, (Operate, Execute), false, 2000, false),
+        (0, (Teaching, Finish), false, 0, true),
+    ];
+    for (timeout_ms, (state, trajectory), lapses, every_ms, pass) in cases {
+        let case =
+            format!("{timeout_ms} ms, {state:?}, {trajectory:?}, lapses: {lapses}, every {every_ms} ms");
+        let mut board = Board::new(115_200);
+        let anna = operator(&mut board, "anna");
+        let bob = board.join("bob", Role::Viewer, Policy::Continue);
+        let now = board.now();
+        board.line.take_lease(anna, lapses.then_some(Duration::from_secs(2)), now).expect("it is free");
+        let mut frame = [0; 16];
+        let setting = jtc_core::settings::named("host_timeout_ms").expect("it is a setting").number;
+        let value = SettingValue { setting, joint: 0, value: f64::from(timeout_ms) };
+        let n = jtc_wire::set_settings(&mut frame, [value].into_iter()).expect("it fits");
+        board.send(anna, &frame[..n]);
+        board.run_ms(500);
+        (board.status.state, board.status.trajectory) = (state.into(), trajectory.into());
+        board.run_ms(2500);
+        board.take(bob);
+        let before = board.arrived(FrameType::GetInfo);
+        let (mut asked, mut own) = (0, 0);
+        for ms in (0..3000).step_by(250) {
+            if every_ms > 0 && ms % every_ms == 0 {
+                board.send(anna, &fixed::get_settings(0));
+                own += 1;
+            }
+            // Just after a frame of the holder questions may pass.
+            if every_ms != 2000 || ms % 2000 >= 400 {
+                board.send(bob, &fixed::GET_INFO);
+                asked += 1;
+            }
+            board.run_ms(250);
+        }
+        // The board returns nothing, which is waited for each time.
+        board.run_ms(10_000);
+        let arrived = board.arrived(FrameType::GetInfo) - before;
+        let (_, denied) = board.take(bob);
+        assert_eq!(arrived, if pass { asked } else { 0 }, "{case}");
+        assert_eq!(denied.len(), asked - arrived, "{case}");
+        assert!(denied.iter().all(|why| why.contains("nothing is received from anna")), "{case}: {denied:?}");
+        assert_eq!(board.arrived(FrameType::GetSettings), own, "{case}: those of the holder pass");
+        board.send(bob, &STOP);
+        board.run_ms(500);
+        assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1, "{case}: a Stop passes always");
+    }
 }

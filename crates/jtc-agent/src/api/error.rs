@@ -73,6 +73,9 @@ impl From<Denied> for ErrorObject {
             Denied::Awaited { .. } => "ask again when that one has had the lease: GET /api/status shows it",
             Denied::Viewer => "use the operator's token",
             Denied::Stopped { .. } => "wait three seconds, and ask again when the arm may move",
+            Denied::Unattended { .. } => {
+                "ask again when the arm stands; a Stop or a Pause is always passed on"
+            }
             Denied::Gone => "take the lease with POST /api/lease",
             Denied::NotHolder => "take the lease with POST /api/lease",
         };

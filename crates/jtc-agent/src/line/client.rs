@@ -134,6 +134,8 @@ pub(super) struct Client {
     pub lasts: Option<Duration>,
     /// When it has shown last that it is there.
     pub shown_at: Duration,
+    /// When its last frame arrived.
+    pub heard_at: Duration,
     /// Its lease has lapsed, and it has not asked for another since.
     pub lapsed: bool,
     /// Frames that it may send at once, and when that was.
@@ -157,6 +159,7 @@ impl Client {
             lasts: None,
             lapsed: false,
             shown_at: Duration::ZERO,
+            heard_at: Duration::ZERO,
             allowance: FRAMES_AT_ONCE,
             allowed_at: Duration::ZERO,
         }

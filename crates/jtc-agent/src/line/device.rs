@@ -122,6 +122,7 @@ impl SharedLine {
                 self.halts.motion_written();
                 self.moving.begun(frame_type, at);
             }
+            _ if frame_type == FrameType::SetSettings && !abandoned => self.supervision.take_set(&bytes),
             _ if frame_type == FrameType::Trajectory && !abandoned => self.moving.uploaded(at),
             _ if frame_type == FrameType::TeachingModeDisable && !abandoned => self.moving.taught(),
             _ => {}
@@ -142,7 +143,8 @@ impl SharedLine {
                     let frame = self.receiver.frame_bytes().to_vec();
                     self.take_status(status, &frame, now);
                 }
-                Some(FromDevice::Answer(_)) => {
+                Some(FromDevice::Answer(answer)) => {
+                    self.supervision.take_answer(&answer);
                     let frame = self.receiver.frame_bytes().to_vec();
                     let kind = FrameRef::new_checked(&frame).map(|frame| frame.frame_type);
                     if let Some(Return { client, .. }) =

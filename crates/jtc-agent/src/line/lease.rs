@@ -55,6 +55,14 @@ pub enum Denied {
     /// The client was put out.
     #[error("this client is on the line no more: it was put out, or has gone")]
     Gone,
+    /// Nothing is received from the client that commands while the controller supervises its host: questions of others would hide that (J-59).
+    #[error(
+        "nothing is received from {who}, and the controller pauses the motion when its host is silent: questions of others wait until the arm stands"
+    )]
+    Unattended {
+        /// The client that commands, or has commanded.
+        who: String,
+    },
     /// The client has no lease that it could give.
     #[error("this client does not command the arm: it has no lease to give or to renew")]
     NotHolder,

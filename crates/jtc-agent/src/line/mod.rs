@@ -11,6 +11,7 @@ mod halts;
 mod lease;
 mod moving;
 mod outbox;
+mod supervision;
 mod will;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -32,6 +33,7 @@ use client::Client;
 use halts::Halts;
 use moving::Moving;
 use outbox::Outbox;
+use supervision::Supervision;
 
 /// Records that do not come within this time behind their frame do not come any more.
 const RECORD_TIME: Duration = Duration::from_secs(2);
@@ -81,6 +83,7 @@ pub struct SharedLine {
     will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
+    supervision: Supervision,
     events: VecDeque<LineEvent>,
     counts: Counts,
 }
@@ -109,6 +112,7 @@ impl SharedLine {
             will: None,
             receiver: StatusReceiver::new(),
             status: None,
+            supervision: Supervision::default(),
             events: VecDeque::new(),
             counts: Counts::default(),
         }
@@ -212,6 +216,7 @@ impl SharedLine {
                 Ok(None) => return,
                 Err(reason) => return self.put_out(id, reason, now),
             };
+            client.heard_at = now;
             let allowed = client.allow(now);
             // A Stop counts also of one who is put out for what else it has sent.
             if allowed.is_ok() || matches!(frame.class, Class::Halt(_)) {
@@ -237,6 +242,11 @@ impl SharedLine {
         }
         if frame.class.needs_lease()
             && let Err(denied) = self.may_send(id, &frame, now)
+        {
+            return self.refuse(id, &frame, denied);
+        }
+        if frame.class == Class::Ask
+            && let Err(denied) = self.may_ask(id, now)
         {
             return self.refuse(id, &frame, denied);
         }

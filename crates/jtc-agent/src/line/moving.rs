@@ -69,6 +69,13 @@ impl Moving {
         }
     }
 
+    /// The controller moves the arm, or lets it be led: what host supervision (J-59) ends. A paused arm does not move.
+    pub fn is_supervised(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
+        let moves = [ControllerState::Operate, ControllerState::Teaching];
+        self.begun_at.is_some_and(|at| now.saturating_sub(at) < SHOWS)
+            || status.is_some_and(|(_, status)| status.state.is_in(&moves))
+    }
+
     /// Teaching may be on, or begin.
     pub fn may_teach(&self, status: Option<&(Duration, Status)>) -> bool {
         self.teaches || status.is_some_and(|(_, status)| status.state == ControllerState::Teaching)

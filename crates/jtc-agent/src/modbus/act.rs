@@ -57,6 +57,7 @@ impl From<Denied> for Refusal {
             Denied::Held { .. }
             | Denied::Awaited { .. }
             | Denied::NotHolder
+            | Denied::Unattended { .. }
             | Denied::Viewer
             | Denied::Gone => Outcome::Held,
         };

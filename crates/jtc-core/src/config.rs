@@ -93,7 +93,7 @@ pub struct Config {
     pub teach_fade_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
-    /// Silence of all hosts after which the motion is ended, ms (J-59); 0: never.
+    /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.
     pub host_timeout_ms: u16,
     /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is no part of an arm.
     pub speed: f64,

@@ -175,7 +175,8 @@ pub fn fault_matrix() -> Result<String, MatrixError> {
          - *repeated*: the bus hardware repeats the frame within the tick.\n\
          - *refused*: damaged frames are answered with a record, and change nothing (J-06).\n\
          - *bounded*: a tick does a bounded part of the host's work, however much there is (J-07).\n\
-         - *no supervision*: a host that falls silent is no error.\n\
+         - *no supervision*: a host that falls silent is no error, and nothing ends for it unless `host_timeout_ms` is set (J-59).\n\
+         - *at rest*: host supervision pauses motions and ends teaching; here is neither.\n\
          - *late ticks*: fewer than ten late or missing ticks within a second are borne (J-12).\n\n\
          The last column shows what the host has to send, once the cause is gone, until the arm is held again: nothing,\n\
          ClearCurrentErrors, or all parameters. Start lasts a single tick.\n\n| fault |"
@@ -214,9 +215,19 @@ fn worse(back: Back) -> u8 {
     }
 }
 
-/// A world in which the controller is in `state`.
-fn world_in(state: ControllerState, support: Support) -> Result<Operator, OperatorError> {
+/// A frame that changes nothing.
+fn harmless() -> Vec<u8> {
+    host::frame(FrameType::GripperControl, &[0; 4])
+}
+
+/// A world in which the controller is in `state`. `host_timeout_ms`: its supervision of the host (J-59), 0 for none.
+fn world_in(
+    state: ControllerState,
+    support: Support,
+    host_timeout_ms: u16,
+) -> Result<Operator, OperatorError> {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
+    config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
         // Alignment takes seconds in which nothing else happens.
         drive.first_enable_ms = 60;
@@ -228,16 +239,25 @@ fn world_in(state: ControllerState, support: Support) -> Result<Operator, Operat
     }
     operator.bring_up()?;
     operator.run(200);
+    // A supervised host is there until the fault.
+    let run = |operator: &mut Operator, ms: u64| {
+        for _ in 0..ms / 50 {
+            operator.run(50);
+            if host_timeout_ms > 0 {
+                operator.world.host_write(&harmless());
+            }
+        }
+    };
     match state {
         ControllerState::Operate => {
             let to = START.map(|q| q + 0.8);
             operator.upload(&host::there_and_back(&START, &to, 2.0, 1, 10), 10)?;
             operator.ask(&host::exec(ExecCommand::Execute))?;
-            operator.run(800);
+            run(&mut operator, 800);
         }
         ControllerState::Teaching => {
             operator.teach()?;
-            operator.run(200);
+            run(&mut operator, 200);
         }
         ControllerState::Error => {
             operator.world.set_safety_input(false);
@@ -252,13 +272,13 @@ fn world_in(state: ControllerState, support: Support) -> Result<Operator, Operat
 }
 
 fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
-    let mut operator = world_in(state, Support::Brakes)?;
+    let mut operator = world_in(state, Support::Brakes, row.host_timeout_ms)?;
     let mut watch = Watch::new(&mut operator)?;
     let mut reaction = Reaction::None;
     for tick in 1..=WATCH_MS {
         if tick % 50 == 1 {
             // Something for faults of the line to meet; it changes nothing.
-            operator.world.host_write(&host::frame(FrameType::GripperControl, &[0; 4]));
+            operator.world.host_write(&harmless());
         }
         row.act.before(&mut operator, tick);
         let seen = watch.step(&mut operator)?;

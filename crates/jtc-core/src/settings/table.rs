@@ -102,7 +102,7 @@ settings! {
     Number 62 "teach_payload_velocity_rad_s" ["rad/s"] 0.001..=5.0 No "speed from which on the torque for it fades" (teach_payload_velocity);
     Whole 63 "teach_fade_ms" ["ms"] 1.0..=10000.0 No "time over which the rest of the missing torque fades" (teach_fade_ms: u16);
     Number 64 "friction_sign_width_rad_s" ["rad/s"] 0.0001..=1.0 No "speed around zero in which the sign of friction is smoothed" (friction_sign_width);
-    Whole 65 "host_timeout_ms" ["ms"] 0.0..=60000.0 No "silence of all hosts that ends the motion; 0: none does" (host_timeout_ms: u16);
+    Whole 65 "host_timeout_ms" ["ms"] 0.0..=60000.0 No "silence of all hosts that pauses a motion and ends teaching (J-59); 0: none does" (host_timeout_ms: u16);
     Whole 72 "delay_ticks" [""] 0.0..=7.0 No "age of a measurement when what is commanded because of it acts, in ticks" (delay_ticks: u8);
     Number 96 "kp_max" ["N·m/rad"] 0.0..=1e6 No "highest Kp that is taken" (parameter_bounds.kp_max);
     Number 97 "ki_max" ["N·m/(rad·s)"] 0.0..=1e6 No "highest Ki that is taken" (parameter_bounds.ki_max);

@@ -74,6 +74,8 @@ const NOISE: u8 = jtc_wire::HEADER;
 pub(super) struct Row {
     pub name: &'static str,
     pub act: Act,
+    /// Silence of the host that the controller acts upon, ms (J-59); 0: none.
+    pub host_timeout_ms: u16,
     /// Why there is no reaction while the arm is held or moves.
     held: Option<&'static str>,
     /// Why there is none in Init and Error.
@@ -94,22 +96,22 @@ impl Row {
 
 /// A fault that has an effect in every state.
 const fn seen(name: &'static str, act: Act) -> Row {
-    Row { name, act, held: None, parked: None }
+    Row { name, act, host_timeout_ms: 0, held: None, parked: None }
 }
 
 /// One that the error state has already, where it was caused by the safety input.
 const fn latched(name: &'static str, act: Act) -> Row {
-    Row { name, act, held: None, parked: Some("latched") }
+    Row { name, act, host_timeout_ms: 0, held: None, parked: Some("latched") }
 }
 
 /// One that matters to an arm with torque only.
 const fn powered(name: &'static str, act: Act) -> Row {
-    Row { name, act, held: None, parked: Some("no torque") }
+    Row { name, act, host_timeout_ms: 0, held: None, parked: Some("no torque") }
 }
 
 /// One that is borne in every state, and why.
 const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
-    Row { name, act, held: Some(why), parked: Some(why) }
+    Row { name, act, host_timeout_ms: 0, held: Some(why), parked: Some(why) }
 }
 
 const fn fault(kind: FaultKind) -> Act {
@@ -123,7 +125,7 @@ const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };
 const IGNORES: FaultKind = FaultKind::IgnoresState { joint: MEANT };
 const ALL_LOST: FaultKind = FaultKind::FramesLost { probability: 1.0 };
 
-pub(super) const ROWS: [Row; 39] = [
+pub(super) const ROWS: [Row; 40] = [
     latched("safety input low", fault(FaultKind::SafetyInput)),
     latched("safety input low for 1 ms", Act::Fault(FaultKind::SafetyInput, 1)),
     latched("safety input low for 1 ms, cleared in its tick", Act::Cleared(FaultKind::SafetyInput, 1, 1)),
@@ -174,6 +176,14 @@ pub(super) const ROWS: [Row; 39] = [
         fault(FaultKind::SerialLost { probability: 1.0 }),
         "no supervision",
     ),
+    Row {
+        host_timeout_ms: 250,
+        ..borne(
+            "every byte from the host lost, `host_timeout_ms` = 250",
+            fault(FaultKind::SerialLost { probability: 1.0 }),
+            "at rest",
+        )
+    },
     borne(
         "5 % of bytes from the host flipped",
         fault(FaultKind::SerialFlipped { probability: 0.05 }),

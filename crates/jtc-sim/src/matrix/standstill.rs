@@ -42,7 +42,7 @@ pub fn standstill_table() -> Result<String, MatrixError> {
          | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
     );
     for row in &ROWS {
-        out += &line(row.name, row.act)?;
+        out += &line(row.name, row.act, row.host_timeout_ms)?;
     }
     Ok(out)
 }
@@ -52,9 +52,9 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     let mut out = String::new();
     for (name, act) in STOPS {
         for support in [Support::Brakes, Support::Stand] {
-            stood_in_time(&motion(support, act)?.1)?;
+            stood_in_time(&motion(support, act, 0)?.1)?;
         }
-        out += &line(name, act)?;
+        out += &line(name, act, 0)?;
     }
     Ok(out)
 }
@@ -68,16 +68,16 @@ pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     }
 }
 
-fn line(name: &str, act: Act) -> Result<String, MatrixError> {
-    let (then, brakes) = motion(Support::Brakes, act)?;
-    let (also, stand) = motion(Support::Stand, act)?;
+fn line(name: &str, act: Act, host_timeout_ms: u16) -> Result<String, MatrixError> {
+    let (then, brakes) = motion(Support::Brakes, act, host_timeout_ms)?;
+    let (also, stand) = motion(Support::Stand, act, host_timeout_ms)?;
     let then = if then == also { then } else { format!("{then}; without brakes {also}") };
     Ok(format!("| {name} | {then} | {brakes} | {stand} |\n"))
 }
 
 /// State and motion after `act`.
-fn motion(support: Support, act: Act) -> Result<(String, Motion), MatrixError> {
-    let mut operator = world_in(ControllerState::Operate, support)?;
+fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, Motion), MatrixError> {
+    let mut operator = world_in(ControllerState::Operate, support, host_timeout_ms)?;
     let from = operator.world.truth().q;
     let (mut still, mut distance, mut speed) = (0, 0.0f64, 0.0f64);
     let mut motion = Motion::Moves;

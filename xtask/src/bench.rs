@@ -39,30 +39,33 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     // What builds does so now, so that nothing is built between the programs that are compared.
     let mut skipped = Vec::new();
     anchors(&work, &kernels, 0, &mut skipped)?;
-    for (package, example) in EXAMPLES {
-        run(&mut cargo(&["build", "--profile", "dist", "--package", package, "--example", example]))?;
+    for Example { package, name, .. } in EXAMPLES {
+        run(&mut cargo(&["build", "--profile", "dist", "--package", package, "--example", name]))?;
     }
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-plan", "--example", "plans"]))?;
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-client", "--example", "stops"]))?;
     python::environment("requirements.txt")?;
     let mut figures = Figures::new();
     let load = Load::now();
+    let mut failed = Failed::default();
     for round in 1..=rounds {
         println!("\nround {round} of {rounds}");
-        let mut samples = anchors(&work, &kernels, 2, &mut skipped)?;
-        samples.append(&mut own_figures(&frames)?);
-        samples.insert("cantools_frames_s".into(), cantools(&frames)?);
-        samples.append(&mut planned()?);
+        let mut samples = failed.attempt(ANCHORS, || anchors(&work, &kernels, 2, &mut skipped));
+        for example in EXAMPLES {
+            samples.append(&mut failed.attempt(example.figures, || example.measure(&frames)));
+        }
+        samples.append(&mut failed.attempt(&["cantools_"], || cantools(&frames)));
+        samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
     // Once: the worst of many is not the best of some worst.
-    figures.append(&mut stops(quick)?);
+    figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
         figures.insert("sim_times_real_time".into(), 1e6 / ns);
     }
     let quiet = others.is_none_or(|share| share <= OTHERS_MAX);
-    let missed = table::print(&figures, quiet);
+    let missed = table::print(&figures, &failed, quiet);
     if let Some(ns) = figures.get("pinocchio.inverse") {
         let factor = ns / PINOCCHIO_WHERE_TARGETS_WERE_SET;
         println!(
@@ -73,8 +76,13 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     for why in &skipped {
         println!("not measured: {why}");
     }
+    for why in failed.causes() {
+        println!("failed: {why}");
+    }
     if let Some(file) = json_file {
-        let text = serde_json::to_string_pretty(&json!({ "figures": figures, "not_measured": skipped }))?;
+        let text = serde_json::to_string_pretty(
+            &json!({ "figures": figures, "not_measured": skipped, "failed": failed.causes() }),
+        )?;
         std::fs::write(&file, text + "\n").with_context(|| file.clone())?;
         println!("wrote {file}");
     }
@@ -108,36 +116,89 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// The programs with which the crates measure themselves: package and example.
-const EXAMPLES: [(&str, &str); 4] =
-    [("xtask", "figures"), ("jtc-core", "tick"), ("jtc-wire", "throughput"), ("jtc-sim", "speed")];
+/// Measurements that failed: the beginnings of the names of their figures, and the cause.
+#[derive(Default)]
+pub struct Failed(Vec<(&'static [&'static str], String)>);
 
-/// What the crates measure of themselves. The UCoM frames that were read go to `frames`, too.
-fn own_figures(frames: &Path) -> Result<Figures> {
-    let [whole, tick, throughput, speed] = EXAMPLES;
-    let example = |(package, name): (&str, &str)| {
+impl Failed {
+    /// Measures; where that fails it notes the cause and returns no figure.
+    fn attempt(
+        &mut self,
+        figures: &'static [&'static str],
+        measure: impl FnOnce() -> Result<Figures>,
+    ) -> Figures {
+        measure().unwrap_or_else(|error| {
+            self.note(figures, format!("{error:#}"));
+            Figures::new()
+        })
+    }
+
+    fn note(&mut self, figures: &'static [&'static str], why: String) {
+        println!("failed: {why}");
+        self.0.push((figures, why));
+    }
+
+    /// Why there is no figure of this name: the cause in one line.
+    pub fn why(&self, figure: &str) -> Option<&str> {
+        let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
+        why.lines().map(str::trim).rfind(|line| !line.is_empty())
+    }
+
+    /// All causes, one line for each.
+    fn causes(&self) -> Vec<String> {
+        self.0.iter().map(|(figures, why)| format!("{}: {why}", figures.join(", "))).collect()
+    }
+}
+
+/// The figures of the anchors.
+const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
+
+/// A program with which a crate measures itself.
+struct Example {
+    package: &'static str,
+    name: &'static str,
+    /// How the names of its figures begin.
+    figures: &'static [&'static str],
+}
+
+const EXAMPLES: [Example; 4] = [
+    Example {
+        package: "xtask",
+        name: "figures",
+        figures: &["upload_", "ucom_", "recording.", "tracking", "controller_"],
+    },
+    Example { package: "jtc-core", name: "tick", figures: &["control_tick_", "tick_"] },
+    Example { package: "jtc-wire", name: "throughput", figures: &["crc16_", "crate_", "stream_parser_"] },
+    Example { package: "jtc-sim", name: "speed", figures: &["sim_"] },
+];
+
+impl Example {
+    /// Its figures. The UCoM frames that it read go to `frames`, too.
+    fn measure(&self, frames: &Path) -> Result<Figures> {
+        let Self { package, name, .. } = *self;
         let mut example =
             cargo(&["run", "--profile", "dist", "--quiet", "--package", package, "--example", name]);
-        shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))
-    };
-    let mut figures = lines(&example(whole)?);
-    figures.append(&mut lines(&example(tick)?));
-    if let Some(bytes) = figures.get("controller_bytes").copied() {
-        figures.insert("controller_kib".into(), bytes / 1024.0);
+        let text = shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))?;
+        // Some print an object, some a name and a number a line.
+        let mut figures = if text.trim_start().starts_with('{') { object(&text)? } else { lines(&text) };
+        if let Some(bytes) = figures.get("controller_bytes").copied() {
+            figures.insert("controller_kib".into(), bytes / 1024.0);
+        }
+        if let Some(ns) = figures.remove("ns") {
+            figures.insert("sim_ms_ns".into(), ns);
+        }
+        ensure!(!figures.is_empty(), "the example {name} of {package} printed no figure");
+        Ok(figures)
     }
-    figures.append(&mut object(&example(throughput)?)?);
-    let speed = object(&example(speed)?)?;
-    let ns = *speed.get("ns").context("the example `speed` of jtc-sim printed no ns")?;
-    figures.insert("sim_ms_ns".into(), ns);
-    Ok(figures)
 }
 
 /// Those frames of `frames` that python-can and cantools read in a second.
-fn cantools(frames: &Path) -> Result<f64> {
+fn cantools(frames: &Path) -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(frames);
     script.env("PYTHONDONTWRITEBYTECODE", "1");
-    shell::read(&mut script)?.trim().parse().context("read_frames.py printed no number")
+    let rate = shell::read(&mut script)?.trim().parse().context("read_frames.py printed no number")?;
+    Ok(Figures::from([("cantools_frames_s".to_owned(), rate)]))
 }
 
 /// Planned motions, and those of toppra and Ruckig.
@@ -148,11 +209,27 @@ fn planned() -> Result<Figures> {
     object(&shell::read(&mut script)?)
 }
 
-/// How soon a Stop is on the line of an agent.
-fn stops(quick: bool) -> Result<Figures> {
+/// How soon a Stop is on the line of an agent, under each load.
+fn stops(quick: bool, failed: &mut Failed) -> Figures {
+    const LOADS: [(&str, &[&str]); 3] = [
+        ("idle", &["stop.idle_", "bare.idle_"]),
+        ("viewers", &["stop.viewers_", "bare.viewers_"]),
+        ("upload", &["stop.upload_", "bare.upload_"]),
+    ];
     println!("\nStops of an agent");
     let count = if quick { "40" } else { "200" };
-    object(&shell::read(command(shell::target().join("dist/examples/stops")).arg(count))?)
+    let mut causes = Value::Null;
+    let figures = failed.attempt(&["stop.", "bare."], || {
+        let text = shell::read(command(shell::target().join("dist/examples/stops")).arg(count))?;
+        causes = serde_json::from_str::<Value>(text.trim())?["failed"].take();
+        object(&text)
+    });
+    for (load, names) in LOADS {
+        if let Some(why) = causes[load].as_str() {
+            failed.note(names, why.to_owned());
+        }
+    }
+    figures
 }
 
 /// The numbers of a JSON object.

@@ -7,7 +7,7 @@ use common::{Sim, agent::Agent, moving_while};
 
 /// An arm that is held by a controller that supervises its host.
 fn supervised() -> Sim {
-    let sim = Sim::start(&["--no-throttle"]);
+    let sim = Sim::start(&[]);
     let text = include_str!("../../../arms/avena.toml").to_owned() + "\n[settings]\nhost_timeout_ms = 1000\n";
     let arm = sim.file("supervised.toml", &text);
     sim.jtc(&["arm", "push", &arm]).ends(0);

@@ -1,5 +1,5 @@
 //! The table of `cargo xtask bench`: figures, their anchors and their targets.
-use super::Figures;
+use super::{Failed, Figures};
 use crate::size;
 
 /// Whether a figure should stay below its target or reach it.
@@ -262,8 +262,8 @@ pub fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row; returns how many targets were missed. What was measured on a machine that is not `quiet` is not judged.
-pub fn print(figures: &Figures, quiet: bool) -> usize {
+/// Prints every row, with the cause where its measurement failed; returns how many targets were missed. What was measured on a machine that is not `quiet` is not judged.
+pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     let mut missed = 0;
     let header = ["figure", "ours", "anchor", "ratio", "target", "met"];
     println!(
@@ -286,11 +286,14 @@ pub fn print(figures: &Figures, quiet: bool) -> usize {
             Target::None => ("–".to_owned(), None),
         };
         let verdict = match (row.target, met) {
-            (Target::None, _) => "–",
-            (_, Some(_)) if !quiet => "not judged",
-            (_, Some(true)) => "yes",
-            (_, Some(false)) => "NO",
-            (_, None) => "not measured",
+            _ if ours.is_none() && failed.why(row.ours).is_some() => {
+                format!("FAILED: {}", failed.why(row.ours).unwrap_or_default())
+            }
+            (Target::None, _) => "–".to_owned(),
+            (_, Some(_)) if !quiet => "not judged".to_owned(),
+            (_, Some(true)) => "yes".to_owned(),
+            (_, Some(false)) => "NO".to_owned(),
+            (_, None) => "not measured".to_owned(),
         };
         missed += usize::from(!matches!(row.target, Target::None) && met != Some(true));
         let without: Vec<&str> =

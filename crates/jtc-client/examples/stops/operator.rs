@@ -27,7 +27,8 @@ impl Operator {
     pub fn come(served: &Served, watch: &Watch) -> Self {
         let token = Some(served.tokens.operator.clone());
         let options = Options { name: "anna".into(), token, ..Options::default() };
-        let mut port = AgentPort::open(&served.url(), &options).expect("it is let in");
+        let url = served.url();
+        let mut port = AgentPort::open(&url, &options).expect("it is let in");
         port.write_all(&fixed::CLEAR_OCCURRED_ERRORS).expect("it is there");
         let mut segment = vec![0; FRAME_MAX];
         let n = trajectory(&mut segment, (0, 0, 9), 1, [RawPoint::default(); POINTS]).expect("it fits");
@@ -40,6 +41,9 @@ impl Operator {
                 port.read(&mut buffer, Duration::from_millis(5)).expect("it is there");
                 let due = wanted.load(Ordering::Relaxed) && sent_at.elapsed() > AGAIN;
                 if due && !watch.look().is_in_a_frame() {
+                    // After a Stop nothing is uploaded that was requested before it, so each upload is a new client's.
+                    drop(port);
+                    port = AgentPort::open(&url, &options).expect("it is let in");
                     port.write_all(&segment).expect("it is there");
                     sent_at = Instant::now();
                 }

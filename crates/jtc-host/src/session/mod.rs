@@ -10,6 +10,7 @@ mod extension;
 mod follow;
 mod give;
 mod jogging;
+mod limit;
 mod log;
 mod params;
 mod payload;
@@ -37,6 +38,7 @@ pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
 pub use give::ArmPart;
 pub use jogging::JOG_AGAIN;
+use limit::Limit;
 pub use log::LogStatus;
 pub use params::PushReport;
 use presence::Presence;
@@ -186,15 +188,20 @@ impl<P: Port> Session<P> {
     /// [`LinkError::NoLink`] when none comes within [`Timeouts::status`], [`LinkError::Port`] when the port is gone.
     pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
-        match self.poll(self.timeouts.status)? {
-            Some(status) => Ok(status),
-            None => Err(LinkError::NoLink {
-                port: self.port.name(),
-                baud: self.port.baud(),
-                waited_s: (self.port.now() - start).as_secs_f64(),
-                bytes: self.statistics.bytes_received - bytes,
-            }),
+        let mut limit = Limit::new(self.timeouts.status);
+        while let Some(wait) = limit.next_wait() {
+            let begun = self.port.now();
+            if let Some(status) = self.poll(wait)? {
+                return Ok(status);
+            }
+            limit.waited(wait, self.port.now() - begun);
         }
+        Err(LinkError::NoLink {
+            port: self.port.name(),
+            baud: self.port.baud(),
+            waited_s: (self.port.now() - start).as_secs_f64(),
+            bytes: self.statistics.bytes_received - bytes,
+        })
     }
 
     /// A status that was made after this call: what had arrived before is passed over.
@@ -315,7 +322,7 @@ impl<P: Port> Session<P> {
 
     /// The record of the frame just sent; `None` when none came in time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
-        let end = self.port.now() + self.confirmation_time(len);
+        let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
                 // A good record of another type belongs to a request whose time was over.
@@ -323,11 +330,10 @@ impl<P: Port> Session<P> {
                     return Ok(Some(record));
                 }
             }
-            let now = self.port.now();
-            if now >= end {
-                return Ok(None);
-            }
-            self.read(end - now)?;
+            let Some(wait) = limit.next_wait() else { return Ok(None) };
+            let begun = self.port.now();
+            self.read(wait)?;
+            limit.waited(wait, self.port.now() - begun);
         }
     }
 

@@ -1,0 +1,57 @@
+//! A time limit for an answer of the controller that a busy computer does not use up.
+
+use std::time::Duration;
+
+/// Longest single wait.
+const STEP: Duration = Duration::from_millis(50);
+
+/// Time that is left for an answer. Of each wait at most its planned length counts: a computer that wakes this program late may have kept the
+/// answer, or the simulator that sends it, waiting as well.
+#[derive(Debug)]
+pub(super) struct Limit {
+    left: Duration,
+}
+
+impl Limit {
+    /// A limit of this length.
+    pub fn new(time: Duration) -> Self {
+        Self { left: time }
+    }
+
+    /// Length of the next wait; `None` when no time is left.
+    pub fn next_wait(&self) -> Option<Duration> {
+        (!self.left.is_zero()).then(|| self.left.min(STEP))
+    }
+
+    /// Counts a wait that was planned for `planned` and took `took`.
+    pub fn waited(&mut self, planned: Duration, took: Duration) {
+        self.left = self.left.saturating_sub(took.min(planned));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waits that all take this share of what was planned, up to the end of the limit: how long they took.
+    fn waited(limit_ms: u64, share: f64) -> Duration {
+        let mut limit = Limit::new(Duration::from_millis(limit_ms));
+        let mut all = Duration::ZERO;
+        while let Some(wait) = limit.next_wait() {
+            let took = wait.mul_f64(share).max(Duration::from_micros(1));
+            limit.waited(wait, took);
+            all += took;
+        }
+        all
+    }
+
+    #[test]
+    fn a_late_computer_does_not_use_up_the_limit() {
+        for limit_ms in [1, 49, 50, 51, 300, 2000] {
+            let limit = Duration::from_millis(limit_ms);
+            assert_eq!(waited(limit_ms, 1.0), limit);
+            assert_eq!(waited(limit_ms, 8.0), limit * 8, "woken late");
+            assert!(waited(limit_ms, 0.3).abs_diff(limit) < Duration::from_millis(1), "woken early, by bytes");
+        }
+    }
+}

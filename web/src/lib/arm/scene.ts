@@ -32,6 +32,9 @@ export interface Shown {
   all: boolean;
 }
 
+/** What draws the scene: a test has no WebGL. */
+export type Renderer = Pick<WebGLRenderer, 'render' | 'setPixelRatio' | 'setSize' | 'dispose' | 'shadowMap'>;
+
 const TRAIL = 400;
 /** Commanded and measured farther apart than this are two arms to see, rad. */
 const APART_RAD = 0.004;
@@ -39,7 +42,7 @@ const APART_RAD = 0.004;
 const NEAR = 0.12;
 
 export class ArmScene {
-  readonly #renderer: WebGLRenderer;
+  readonly #renderer: Renderer;
   readonly #scene = new Scene();
   readonly #camera = new PerspectiveCamera(32, 1, 0.02, 40);
   readonly #controls: OrbitControls;
@@ -60,6 +63,9 @@ export class ArmScene {
   readonly #payload = new Mesh(new SphereGeometry(1, 32, 20), new MeshStandardMaterial({ transparent: true, opacity: 0.75, roughness: 0.5 }));
   #trailPoints: Vector[] = [];
   #q: number[] = [];
+  /** Joint positions of the ghost, and whether it is shown: a new body takes them over. */
+  #ghostQ: number[] = [];
+  #ghostShown = false;
   #palette: Palette;
   #shown: Shown = { limits: true, trail: true, path: true, all: false };
   #gravity: ArrowHelper | undefined;
@@ -69,8 +75,8 @@ export class ArmScene {
   /** Pictures that were drawn: for tests of idleness. */
   drawn = 0;
 
-  constructor(canvas: HTMLCanvasElement, palette: Palette) {
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' });
+  constructor(canvas: HTMLCanvasElement, palette: Palette, renderer: Renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' })) {
+    this.#renderer = renderer;
     this.#renderer.shadowMap.enabled = true;
     this.#renderer.shadowMap.type = PCFShadowMap;
     this.#palette = palette;
@@ -166,8 +172,8 @@ export class ArmScene {
     const ghost = { housing: this.#ghostMaterial, link: this.#ghostMaterial, metal: this.#ghostMaterial, cap: this.#ghostMaterial, ring: () => this.#ghostMaterial };
     this.#body = bodyOf(model, this.#materials);
     this.#ghost = bodyOf(model, ghost, true);
-    this.#ghost.root.visible = false;
     this.#ghost.root.renderOrder = 2;
+    this.#pose();
     this.#body.flange.add(this.#payload);
     this.#scene.add(this.#body.root, this.#ghost.root);
     this.#shadeLimits(model);
@@ -184,9 +190,16 @@ export class ArmScene {
     Object.assign(shadow, { left: -r * 1.1, right: r * 1.1, top: r * 1.1, bottom: -r * 1.1, near: r * 0.4, far: r * 4.5 });
     shadow.updateProjectionMatrix();
     if (!again) this.view('home');
-    if (this.#q.length > 0) this.setMeasured(this.#q);
     this.#dress();
     this.ask();
+  }
+
+  /** Turns the joints of both bodies to the positions that are known. */
+  #pose(): void {
+    this.#body?.joints.forEach((joint, i) => (joint.rotation.z = this.#q[i] ?? 0));
+    if (!this.#ghost) return;
+    this.#ghost.joints.forEach((joint, i) => (joint.rotation.z = this.#ghostQ[i] ?? 0));
+    this.#ghost.root.visible = this.#ghostShown;
   }
 
   /** Measured positions; undefined: not known, the arm is drawn faint where it was last. */
@@ -202,7 +215,7 @@ export class ArmScene {
     const same = this.#q.length === q.length && q.every((value, i) => Math.abs(value - (this.#q[i] ?? NaN)) < 2e-5);
     if (same && this.#trailPoints.length > 0) return;
     this.#q = [...q];
-    this.#body.joints.forEach((joint, i) => (joint.rotation.z = q[i] ?? 0));
+    this.#pose();
     const frames = forward(this.#model, q);
     const tip = frames.at(-1);
     if (tip) this.#leave(place(tip));
@@ -212,13 +225,12 @@ export class ArmScene {
 
   /** Where the arm is to be: drawn where it differs from where it is. */
   setGhost(q: readonly number[] | undefined, always = false): void {
-    const ghost = this.#ghost;
-    if (!ghost) return;
     const apart = q?.some((value, i) => Math.abs(value - (this.#q[i] ?? value)) > APART_RAD) ?? false;
     const visible = q !== undefined && (apart || always);
-    if (!visible && !ghost.root.visible) return;
-    ghost.root.visible = visible;
-    if (q) ghost.joints.forEach((joint, i) => (joint.rotation.z = q[i] ?? 0));
+    if (!visible && !this.#ghostShown) return;
+    this.#ghostShown = visible;
+    if (q) this.#ghostQ = [...q];
+    this.#pose();
     this.ask();
   }
 
@@ -261,6 +273,13 @@ export class ArmScene {
     this.#trailPoints = [];
     this.#leaveTrail();
     this.ask();
+  }
+
+  /** Joint angles of the bodies as drawn, rad, and the centre of the payload in the frame of the base, m: for tests. */
+  get posed(): { measured: number[]; ghost: number[]; ghostShown: boolean; lost: boolean; payload: Vector } {
+    const angles = (body: Body | undefined) => body?.joints.map((joint) => joint.rotation.z) ?? [];
+    const payload = this.#payload.getWorldPosition(new Vector3()).toArray() as Vector;
+    return { measured: angles(this.#body), ghost: angles(this.#ghost), ghostShown: this.#ghost?.root.visible ?? false, lost: this.#lost, payload };
   }
 
   dispose(): void {

@@ -96,6 +96,27 @@ export function rpy(frame: Frame): Vector {
   return [Math.atan2(r21, r22), pitch, Math.atan2(r10, r00)];
 }
 
+/** Orientation of a frame as a quaternion: x, y, z, w, with w not negative. */
+export function quaternion(frame: Frame): [number, number, number, number] {
+  const at = (r: number, c: number) => frame[4 * r + c] ?? 0;
+  const trace = at(0, 0) + at(1, 1) + at(2, 2);
+  // From the largest of its parts, so that no small one is divided by (Shepperd 1978).
+  const parts = [at(0, 0), at(1, 1), at(2, 2), trace];
+  const k = parts.indexOf(Math.max(...parts));
+  const q: [number, number, number, number] = [0, 0, 0, 0];
+  if (k === 3) {
+    [q[0], q[1], q[2], q[3]] = [at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1), 1 + trace];
+  } else {
+    const [i, j, l] = [k, (k + 1) % 3, (k + 2) % 3];
+    q[i] = 1 + at(i, i) - at(j, j) - at(l, l);
+    q[j] = at(i, j) + at(j, i);
+    q[l] = at(i, l) + at(l, i);
+    q[3] = at(l, j) - at(j, l);
+  }
+  const length = Math.hypot(...q) * (q[3] < 0 ? -1 : 1);
+  return q.map((value) => value / length) as [number, number, number, number];
+}
+
 /** How far the arm reaches at most, roughly, m: the sum of its links. */
 export function reach(model: ArmModel): number {
   const lengths = [...model.joints.map((joint) => joint.origin_xyz_m), model.flange.origin_xyz_m].map((xyz) => Math.hypot(...xyz));

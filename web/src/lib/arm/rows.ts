@@ -1,0 +1,123 @@
+// Rows of waypoint files: written in the columns, the units and the separator of the file's own header, as the agent reads them.
+import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
+
+/** A place that becomes a row. */
+export interface Stop {
+  /** Joint positions, rad. */
+  q: readonly number[];
+  /** Name of the pose, if it has one. */
+  pose?: string | undefined;
+}
+
+/** A row, or why the file takes none. */
+export type Row = { row: string } | { problem: string };
+/** The file with the row, or why it takes none. */
+export type Added = { text: string; row: string } | { problem: string };
+
+const JOINTS = ['q1', 'q2', 'q3', 'q4', 'q5', 'q6'];
+const XYZ = ['x', 'y', 'z'];
+const QUATERNION = ['qx', 'qy', 'qz', 'qw'];
+const RPY = ['roll', 'pitch', 'yaw'];
+const ANGLES = new Set([...JOINTS, ...RPY]);
+/** Other names of columns. */
+const ALSO = new Map([['t', 't'], ['t_s', 't'], ['time', 't'], ['time_s', 't'], ['pose', 'pose'], ['name', 'pose'], ['leg', 'leg']]);
+const LENGTHS = new Set([...XYZ, ...QUATERNION]);
+/** A number as a file has it, not the name of a column. */
+const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
+
+interface Column {
+  name: string;
+  unit: 'rad' | 'deg' | undefined;
+}
+
+/** The first line that is neither blank nor a comment. */
+function first(text: string): string | undefined {
+  return text
+    .replace(/^\uFEFF/, '')
+    .split(/\r?\n/)
+    .map((line) => line.trim())
+    .find((line) => line !== '' && !line.startsWith('#'));
+}
+
+function cells(line: string): string[] {
+  const separator = [';', ','].find((each) => line.includes(each));
+  return (separator ? line.split(separator) : line.split(/\s+/)).map((cell) => cell.trim().replace(/^"+|"+$/g, ''));
+}
+
+function column(cell: string): Column | undefined {
+  const lower = cell.toLowerCase();
+  const plain = ALSO.get(lower) ?? lower.replace(/_m$/, '');
+  if (ALSO.has(lower) || LENGTHS.has(plain)) return { name: plain, unit: undefined };
+  const [, name = lower, unit] = /^(.*)_(rad|deg)$/.exec(lower) ?? [];
+  return ANGLES.has(name) ? { name, unit: unit as Column['unit'] } : undefined;
+}
+
+/** The header names the unit of an angle: the switch for degrees says nothing about such a file. */
+export function namesUnits(text: string): boolean {
+  if (isJson(text)) return /"(q[1-6]|roll|pitch|yaw)_deg"/.test(text);
+  return cells(first(text) ?? '').some((cell) => column(cell)?.unit !== undefined);
+}
+
+function isJson(text: string): boolean {
+  return /^[\s\uFEFF]*[[{]/.test(text);
+}
+
+/** The waypoint as a row below the header of `text`. `degrees`: numbers whose unit the header does not name are degrees. `model`: for poses of the flange. */
+export function rowFor(text: string, stop: Stop, degrees: boolean, model?: ArmModel): Row {
+  if (isJson(text)) return { problem: 'These waypoints are JSON. Rows can be added to a table (CSV) only.' };
+  const header = first(text);
+  if (header === undefined) return rowFor(JOINTS.join(','), stop, degrees, model);
+  const names = cells(header);
+  if (names.every((cell) => NUMBER.test(cell))) return { problem: `The table has no header. Write ${JOINTS.join(',')} above the first row; add _deg to each name for degrees.` };
+  const columns: Column[] = [];
+  for (const name of names) {
+    const found = column(name);
+    if (!found) return { problem: `The header has a column "${name}", which a waypoint cannot fill.` };
+    if (columns.some((each) => each.name === found.name)) return { problem: `The header has the column ${found.name} twice.` };
+    columns.push(found);
+  }
+  // Cells of t and leg stay empty: no time of its own, and the leg as the switch for straight lines says.
+  const filled = valuesFor(new Set(columns.map((each) => each.name)), stop, model);
+  if ('problem' in filled) return filled;
+  const out = columns.map(({ name, unit }) => {
+    const value = filled.values[name];
+    if (value === undefined || typeof value === 'string') return value ?? '';
+    const inDegrees = ANGLES.has(name) && (unit === undefined ? degrees : unit === 'deg');
+    return (inDegrees ? (value * 180) / Math.PI : value).toFixed(6);
+  });
+  // Cells between spaces cannot be empty.
+  const separator = /[;,]\s*/.exec(header)?.[0].replace(/\s+/, ' ') ?? (out.includes('') ? ',' : ' ');
+  return { row: out.join(separator).trim() };
+}
+
+/** Numbers for the columns: joint positions, else the pose by its name, else the pose of the flange. */
+function valuesFor(has: Set<string>, stop: Stop, model: ArmModel | undefined): { values: Record<string, number | string> } | { problem: string } {
+  const lacks = (names: readonly string[]) => names.filter((name) => !has.has(name));
+  const any = (names: readonly string[]) => lacks(names).length < names.length;
+  const missing = (names: readonly string[]) => ({ problem: `The header lacks ${names.join(', ')}: a waypoint cannot be written without ${names.length === 1 ? 'it' : 'them'}.` });
+  if (any(JOINTS)) {
+    if (lacks(JOINTS).length > 0) return missing(lacks(JOINTS));
+    return { values: Object.fromEntries(JOINTS.map((name, i) => [name, stop.q[i] ?? NaN])) };
+  }
+  if (has.has('pose') && stop.pose !== undefined) return { values: { pose: stop.pose } };
+  if (!any([...XYZ, ...QUATERNION, ...RPY])) {
+    return has.has('pose')
+      ? { problem: 'This file has poses by their names only. Save the current position as a pose first, then add it here.' }
+      : missing(JOINTS);
+  }
+  const orientation = lacks(QUATERNION).length === 0 ? QUATERNION : any(RPY) || !any(QUATERNION) ? RPY : QUATERNION;
+  const without = lacks([...XYZ, ...orientation]);
+  if (without.length > 0) return missing(without);
+  if (!model) return { problem: 'The arm model is not known yet, so the pose of the flange is not. Try again when the 3D view shows the arm.' };
+  const frame = flange(model, stop.q);
+  const numbers = [...place(frame), ...(orientation === RPY ? rpy(frame) : quaternion(frame))];
+  return { values: Object.fromEntries([...XYZ, ...orientation].map((name, i) => [name, numbers[i] ?? NaN])) };
+}
+
+/** The file with a row for the waypoint as its last. A file without a header gets one. */
+export function withRow(text: string, stop: Stop, degrees: boolean, model?: ArmModel): Added {
+  const made = rowFor(text, stop, degrees, model);
+  if ('problem' in made) return made;
+  const before = [text.trimEnd(), first(text) === undefined ? JOINTS.join(',') : ''].filter((part) => part !== '');
+  return { text: [...before, made.row, ''].join('\n'), row: made.row };
+}

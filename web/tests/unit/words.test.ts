@@ -3,7 +3,7 @@ import { test } from 'node:test';
 
 import { explained } from '../../src/lib/arm/explain.ts';
 import type { Controller } from '../../src/lib/arm/types.ts';
-import { causesOf, eventWords, isHeld, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
+import { causesOf, eventWords, isHeld, noJog, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
 import { angle, duration, number, parse } from '../../src/lib/format.ts';
 import { deviceKind, takesText } from '../../src/lib/keys.ts';
 
@@ -37,6 +37,30 @@ test('held is held only when every drive is enabled', () => {
   assert.ok(!isHeld(late));
   assert.match(stateWords(late, undefined, []).detail, /joints 3, 4 are being enabled/);
   assert.ok(isHeld(controller()));
+});
+
+test('jogging that is not possible has a reason', () => {
+  const late = controller();
+  late.joints[2]!.state = 'in transition';
+  const job = (stage: 'begun' | 'uploading' | 'executing') => ({ what: 'run mine', stage });
+  const cases: [Controller | undefined, ReturnType<typeof job> | undefined, RegExp][] = [
+    [controller(), job('uploading'), /^A motion is being uploaded\./],
+    [controller({ trajectory: 'Finish' }), job('uploading'), /^A motion is being uploaded\./],
+    [controller({ trajectory: 'TransNullToStop' }), undefined, /^A motion is being uploaded\./],
+    [controller(), job('begun'), /^Run mine is being prepared\./],
+    [controller(), job('executing'), /^Run mine is running\./],
+    [controller({ state: 'Operate', trajectory: 'Execute' }), job('executing'), /^Run mine is running\./],
+    [controller({ state: 'Operate', trajectory: 'Execute' }), undefined, /^A motion is running\./],
+    [controller({ state: 'HoldPos', trajectory: 'Pause' }), undefined, /^A motion is paused\./],
+    [controller({ state: 'Operate', trajectory: 'Pause' }), job('executing'), /^A motion is paused\./],
+    [controller({ state: 'Teaching' }), undefined, /needs the arm to hold position\. Teaching: End teaching/],
+    [controller({ state: 'Init' }), undefined, /needs the arm to hold position\. No torque: Recover/],
+    [controller({ state: 'Error', causes: ['joint 3: torque'] }), job('uploading'), /needs the arm to hold position\. Error: /],
+    [late, undefined, /needs the arm to hold position\. Enabling: /],
+    [undefined, undefined, /not known/],
+  ];
+  for (const [now, course, reason] of cases) assert.match(noJog(now, course), reason);
+  for (const trajectory of ['Null', 'Stop', 'Finish']) assert.equal(noJog(controller({ trajectory })), '');
 });
 
 test('the first cause is the detail, and each goes to explain as it is', () => {

@@ -55,6 +55,22 @@ export function isPaused(controller: Controller | null | undefined): boolean {
   return controller != null && controller.trajectory === 'Pause';
 }
 
+/** Why no joint can be jogged now; empty: jogging is possible. `job` is what runs, and how far it is. */
+export function noJog(controller: Controller | undefined, job?: { what: string; stage: 'begun' | 'uploading' | 'executing' }): string {
+  if (!controller) return 'The state of the arm is not known.';
+  if ((controller.state === 'HoldPos' || controller.state === 'Operate') && controller.errors.length === 0) {
+    const stop = 'or press Stop';
+    if (isPaused(controller)) return `A motion is paused. Resume it and wait until it has ended, ${stop}.`;
+    // TransNullToStop: only older controllers report it.
+    if (job?.stage === 'uploading' || controller.trajectory === 'TransNullToStop') return `A motion is being uploaded. Wait until it has ended, ${stop}.`;
+    if (job) return `${jobWords(job.what)} is ${job.stage === 'begun' ? 'being prepared' : 'running'}. Wait until it has ended, ${stop}.`;
+    if (isMoving(controller)) return `A motion is running. Wait until it has ended, ${stop}.`;
+  }
+  if (isHeld(controller)) return '';
+  const { word, detail, next } = stateWords(controller, undefined, []);
+  return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
+}
+
 /** Fastest joint, rad/s. */
 export function fastest(controller: Controller): number {
   return Math.max(...controller.joints.map((joint) => Math.abs(joint.velocity_rad_s ?? 0)));

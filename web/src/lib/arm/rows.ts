@@ -2,7 +2,7 @@
 import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
 
 /** A place that becomes a row. */
-export interface Stop {
+export interface Waypoint {
   /** Joint positions, rad. */
   q: readonly number[];
   /** Name of the pose, if it has one. */
@@ -63,10 +63,10 @@ function isJson(text: string): boolean {
 }
 
 /** The waypoint as a row below the header of `text`. `degrees`: numbers whose unit the header does not name are degrees. `model`: for poses of the flange. */
-export function rowFor(text: string, stop: Stop, degrees: boolean, model?: ArmModel): Row {
+export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Row {
   if (isJson(text)) return { problem: 'These waypoints are JSON. Rows can be added to a table (CSV) only.' };
   const header = first(text);
-  if (header === undefined) return rowFor(JOINTS.join(','), stop, degrees, model);
+  if (header === undefined) return rowFor(JOINTS.join(','), waypoint, degrees, model);
   const names = cells(header);
   if (names.every((cell) => NUMBER.test(cell))) return { problem: `The table has no header. Write ${JOINTS.join(',')} above the first row; add _deg to each name for degrees.` };
   const columns: Column[] = [];
@@ -77,7 +77,7 @@ export function rowFor(text: string, stop: Stop, degrees: boolean, model?: ArmMo
     columns.push(found);
   }
   // Cells of t and leg stay empty: no time of its own, and the leg as the switch for straight lines says.
-  const filled = valuesFor(new Set(columns.map((each) => each.name)), stop, model);
+  const filled = valuesFor(new Set(columns.map((each) => each.name)), waypoint, model);
   if ('problem' in filled) return filled;
   const out = columns.map(({ name, unit }) => {
     const value = filled.values[name];
@@ -91,15 +91,15 @@ export function rowFor(text: string, stop: Stop, degrees: boolean, model?: ArmMo
 }
 
 /** Numbers for the columns: joint positions, else the pose by its name, else the pose of the flange. */
-function valuesFor(has: Set<string>, stop: Stop, model: ArmModel | undefined): { values: Record<string, number | string> } | { problem: string } {
+function valuesFor(has: Set<string>, waypoint: Waypoint, model: ArmModel | undefined): { values: Record<string, number | string> } | { problem: string } {
   const lacks = (names: readonly string[]) => names.filter((name) => !has.has(name));
   const any = (names: readonly string[]) => lacks(names).length < names.length;
   const missing = (names: readonly string[]) => ({ problem: `The header lacks ${names.join(', ')}: a waypoint cannot be written without ${names.length === 1 ? 'it' : 'them'}.` });
   if (any(JOINTS)) {
     if (lacks(JOINTS).length > 0) return missing(lacks(JOINTS));
-    return { values: Object.fromEntries(JOINTS.map((name, i) => [name, stop.q[i] ?? NaN])) };
+    return { values: Object.fromEntries(JOINTS.map((name, i) => [name, waypoint.q[i] ?? NaN])) };
   }
-  if (has.has('pose') && stop.pose !== undefined) return { values: { pose: stop.pose } };
+  if (has.has('pose') && waypoint.pose !== undefined) return { values: { pose: waypoint.pose } };
   if (!any([...XYZ, ...QUATERNION, ...RPY])) {
     return has.has('pose')
       ? { problem: 'This file has poses by their names only. Save the current position as a pose first, then add it here.' }
@@ -109,14 +109,14 @@ function valuesFor(has: Set<string>, stop: Stop, model: ArmModel | undefined): {
   const without = lacks([...XYZ, ...orientation]);
   if (without.length > 0) return missing(without);
   if (!model) return { problem: 'The arm model is not known yet, so the pose of the flange is not. Try again when the 3D view shows the arm.' };
-  const frame = flange(model, stop.q);
+  const frame = flange(model, waypoint.q);
   const numbers = [...place(frame), ...(orientation === RPY ? rpy(frame) : quaternion(frame))];
   return { values: Object.fromEntries([...XYZ, ...orientation].map((name, i) => [name, numbers[i] ?? NaN])) };
 }
 
 /** The file with a row for the waypoint as its last. A file without a header gets one. */
-export function withRow(text: string, stop: Stop, degrees: boolean, model?: ArmModel): Added {
-  const made = rowFor(text, stop, degrees, model);
+export function withRow(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Added {
+  const made = rowFor(text, waypoint, degrees, model);
   if ('problem' in made) return made;
   const before = [text.trimEnd(), first(text) === undefined ? JOINTS.join(',') : ''].filter((part) => part !== '');
   return { text: [...before, made.row, ''].join('\n'), row: made.row };

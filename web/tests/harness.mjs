@@ -1,4 +1,5 @@
 // What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
+import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -166,6 +167,22 @@ export function staged(browser, start = startAgent) {
 /** What the page says of the state. */
 export function state(page) {
   return page.locator('section[aria-label="State"]');
+}
+
+/** Waits until the page says that the arm is held. */
+export function held(page) {
+  return state(page).getByText('Holding', { exact: true }).waitFor();
+}
+
+/** The browser has complained of nothing but refused requests. */
+export function fine(page) {
+  assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);
+}
+
+/** Recovers a controller without parameters, and answers which arm it is. */
+export async function recoverAs(page, arm = 'avena') {
+  await state(page).getByRole('button', { name: 'Recover …' }).click();
+  await page.getByRole('dialog').getByRole('button', { name: `Recover as ${arm}` }).click();
 }
 
 /** A page that collects what a browser complains of. With `clock` the test may stop its time, and let it go on as it says (`passes`). */

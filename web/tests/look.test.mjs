@@ -102,6 +102,21 @@ on('dialogs, errors and a lost connection can be read by everyone', {}, async ({
   report();
 });
 
+on('the question which arm this is can be read by everyone', { faults: 'format = 2\n' }, async ({ look }) => {
+  for (const colorScheme of ['light', 'dark']) {
+    for (const [width, height] of SIZES) {
+      const page = await look({ viewport: { width, height }, colorScheme });
+      await state(page).getByRole('button', { name: 'Recover …' }).click();
+      await page.getByRole('dialog').getByText('Is this an avena?').waitFor();
+      await reads(page, `which arm at ${width} px, ${colorScheme}`);
+      await fits(page, `which arm at ${width} px, ${colorScheme}`);
+      await picture(page, `which-arm-${width}-${colorScheme}`);
+      await page.context().close();
+    }
+  }
+  report();
+});
+
 on('a motion and its preview', {}, async ({ agent, look }) => {
   await furnish(agent);
   await jtc(['example', 'motion', '-o', agent.dir]);

@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before } from 'node:test';
 
-import { commanding, ended, jtc, open, recover, staged, startBrowser, startMortal, state, until } from './harness.mjs';
+import { commanding, ended, fine, held, jtc, open, recover, recoverAs, staged, startBrowser, startMortal, state, until } from './harness.mjs';
 
 let browser;
 before(async () => (browser = await startBrowser()));
@@ -17,8 +17,6 @@ const JUDGED = process.env.FIGURES !== undefined;
 const status = async (agent) => (await agent.ask('GET', '/api/status')).body;
 const joints = async (agent) => (await status(agent)).controller.joints.map((joint) => joint.position_rad);
 const moves = async (agent) => (await status(agent)).controller.joints.some((joint) => Math.abs(joint.velocity_rad_s) > 0.01);
-const held = (page) => state(page).getByText('Holding', { exact: true }).waitFor();
-const fine = (page) => assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);
 
 async function letGo(page) {
   await page.getByRole('button', { name: 'You command' }).click();
@@ -26,12 +24,12 @@ async function letGo(page) {
   await page.getByRole('button', { name: 'Close' }).click();
 }
 
-on('from no torque to a held arm by one button, and what was wrong in words', {}, async ({ look }) => {
+on('from no torque to a held arm, and what was wrong in words', {}, async ({ look }) => {
   const page = await look();
   await state(page).getByText('No torque').waitFor();
   await state(page).getByText(/has not been given: friction, PID, arm model/).waitFor();
   await page.getByText('SIMULATED', { exact: true }).waitFor();
-  await page.getByRole('button', { name: 'Recover with defaults' }).click();
+  await recoverAs(page);
   await held(page);
   await page.getByRole('button', { name: 'You command' }).waitFor();
   fine(page);
@@ -384,7 +382,7 @@ on('an agent that was started again is a new one: its events, its jobs, its Stop
   await page.getByTestId('stop-words').getByText(/Nothing was moving/).waitFor();
   await agent.again();
   await state(page).getByText('No torque').waitFor();
-  await page.getByRole('button', { name: 'Recover with defaults' }).click();
+  await recoverAs(page);
   await held(page);
   await page.click('#tab-log');
   await page.locator('#panel').getByText(/Recover/i).first().waitFor();

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 
 import { explained } from '../../src/lib/arm/explain.ts';
 import type { Controller } from '../../src/lib/arm/types.ts';
-import { causesOf, eventWords, isHeld, noJog, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
+import { causesOf, defaultsWords, eventWords, isHeld, noJog, stateWords, whatStopDid } from '../../src/lib/arm/words.ts';
 import { angle, duration, number, parse } from '../../src/lib/format.ts';
 import { deviceKind, takesText } from '../../src/lib/keys.ts';
 
@@ -27,7 +27,7 @@ test('each state has a word, and says what leads on', () => {
     assert.deepEqual([words.word, words.tone], [word, tone]);
     assert.ok(words.detail !== '');
   }
-  assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'defaults');
+  assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'which-arm');
   assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);
 });
 
@@ -37,6 +37,26 @@ test('held is held only when every drive is enabled', () => {
   assert.ok(!isHeld(late));
   assert.match(stateWords(late, undefined, []).detail, /joints 3, 4 are being enabled/);
   assert.ok(isHeld(controller()));
+});
+
+test('the question before defaults are used names the arm', () => {
+  const cases: [Parameters<typeof defaultsWords>[0], boolean, RegExp, RegExp, RegExp, boolean][] = [
+    [{ arm: 'avena', defaults_stored: false }, false, /^Is this an avena\?$/, /built-in masses, friction and gains/, /^Recover as avena$/, true],
+    [{ arm: 'avena', defaults_stored: false }, true, /^Is this an avena\?$/, /simulated/, /^Recover as avena$/, false],
+    [{ arm: 'Orion', defaults_stored: false }, false, /an Orion/, /built-in/, /as Orion/, true],
+    [{ arm: 'six', defaults_stored: false }, false, /a six/, /built-in/, /as six/, true],
+    [{ arm: 'line-2', defaults_stored: true }, false, /^Is this line-2\?$/, /stored in it/, /as line-2/, true],
+    [{ arm: 'avena', defaults_stored: true }, true, /^Is this avena\?$/, /simulated.*stored in it/, /as avena/, false],
+    [{ arm: '', defaults_stored: false }, false, /the built-in arm/, /built-in/, /as the built-in arm/, true],
+    [undefined, false, /the built-in arm/, /built-in/, /as the built-in arm/, true],
+  ];
+  for (const [info, simulated, question, used, button, risk] of cases) {
+    const words = defaultsWords(info, simulated);
+    assert.match(words.question, question);
+    assert.match(words.used, used);
+    assert.match(words.button, button);
+    assert.equal(words.risk !== '', risk);
+  }
 });
 
 test('jogging that is not possible has a reason', () => {

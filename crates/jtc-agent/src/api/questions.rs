@@ -27,6 +27,8 @@ pub struct InfoObject {
     pub hash: String,
     /// Parameters that it has not been given.
     pub missing: Vec<String>,
+    /// Its defaults are those of an arm that is stored in it, not those of the built-in arm.
+    pub defaults_stored: bool,
     /// How often it has started.
     pub boots: u32,
     /// Why it started last.
@@ -64,6 +66,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
         arm: info.arm.as_str().to_owned(),
         hash: format!("{:016x}", info.hash),
         missing: words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect(),
+        defaults_stored: info.defaults_stored,
         boots: info.boots,
         boot_cause: info.boot_cause.name().to_owned(),
         uptime_s: info.uptime_ms as f64 / 1000.0,

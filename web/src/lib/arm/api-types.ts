@@ -1129,6 +1129,8 @@ export interface components {
              * @description How often it has started.
              */
             boots: number;
+            /** @description Its defaults are those of an arm that is stored in it, not those of the built-in arm. */
+            defaults_stored: boolean;
             /**
              * Format: u-int8
              * @description Version of the extensions of its protocol; 0: it has none, and nothing else is known.

@@ -84,6 +84,10 @@ export class ArmPage {
   /** The joint that somebody points at, from 1. */
   pointed = $state<number | undefined>(undefined);
   explained = $state<string | undefined>(undefined);
+  /** The page asks which arm this is, before it recovers. */
+  asksArm = $state(false);
+  /** An arm file that was opened, to be compared and given. */
+  armFile = $state.raw<{ name: string; text: string } | undefined>(undefined);
   /** What the last Stop that was sent did. */
   #did = $state('');
   readonly stopWords = $derived.by(() => {
@@ -102,6 +106,8 @@ export class ArmPage {
     return stateWords(this.controller, course, this.info?.missing ?? []);
   });
   readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);
+  /** The controller has not been given friction, gains or model. */
+  readonly lacksArm = $derived((this.info?.missing.length ?? 0) > 0);
   readonly isRunning = $derived(this.course !== undefined && this.course.stage !== 'ended');
 
   constructor() {
@@ -123,6 +129,12 @@ export class ArmPage {
   setUnit(unit: AngleUnit): void {
     this.unit = unit;
     device.setItem('openjtc-unit', unit);
+  }
+
+  /** Recovers the arm. Which arm's parameters a controller without any gets is asked first. */
+  recover(): void {
+    if (this.lacksArm) this.asksArm = true;
+    else void this.session.command('Recover', 'POST', '/api/recover', { body: {}, moves: true });
   }
 
   /** Measured positions, or undefined where one is not known. */

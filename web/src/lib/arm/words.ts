@@ -1,9 +1,9 @@
 // What the controller reports, in words: what is, why, and what leads on.
-import type { Controller, Happening } from './types.ts';
+import type { Controller, Happening, InfoObject } from './types.ts';
 import { count, duration } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
 
-export type Step = 'recover' | 'defaults' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
+export type Step = 'recover' | 'which-arm' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
 
 export interface Cause {
   words: string;
@@ -71,6 +71,22 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
   return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
 }
 
+/** The question before a controller that lacks parameters uses its defaults: whose they are, and what is at risk if the arm is another. */
+export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
+  const name = info?.arm || 'the built-in arm';
+  const [stored, known] = [info?.defaults_stored ?? false, name === info?.arm];
+  const which = stored || !known ? name : `${/^[aeiou]/i.test(name) ? 'an' : 'a'} ${name}`;
+  const button = `Recover as ${name}`;
+  const kept = stored ? 'the masses, friction and gains that are stored in it' : 'its built-in masses, friction and gains';
+  if (simulated) return { question: `Is this ${which}?`, used: `The controller is simulated. It uses ${kept}.`, risk: '', button };
+  return {
+    question: `Is this ${which}?`,
+    used: `The controller uses ${kept} under torque.`,
+    risk: 'On another arm, gravity compensation and gains are wrong: the arm can fall or swing.',
+    button,
+  };
+}
+
 /** Fastest joint, rad/s. */
 export function fastest(controller: Controller): number {
   return Math.max(...controller.joints.map((joint) => Math.abs(joint.velocity_rad_s ?? 0)));
@@ -97,8 +113,8 @@ export function stateWords(controller: Controller, job: string | undefined, miss
       return {
         ...base, tone: 'off', word: 'No torque',
         detail: lacks ? `The controller has not been given: ${missing.join(', ')}.` : 'The controller brings up its drives, or waits for them.',
-        next: lacks ? 'Recover with the stored arm or the defaults; or give it an arm file.' : 'Recover enables the drives and holds the arm.',
-        step: lacks ? 'defaults' : 'recover',
+        next: lacks ? 'Recover asks first which arm this is.' : 'Recover enables the drives and holds the arm.',
+        step: lacks ? 'which-arm' : 'recover',
       };
     }
     case 'Teaching':

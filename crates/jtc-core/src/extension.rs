@@ -163,8 +163,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let mut wanted = [0.0; JOINTS];
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
-            // Written so that NaN is refused.
-            let taken = velocity.abs() <= joint.velocity_max;
+            // The wire has f32: the limit itself may come as the next number above it. Written so that NaN is refused.
+            let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
             if velocity != 0.0 && self.config.absent.get(j) == Some(&true) {
                 // J-53: there is no such joint.

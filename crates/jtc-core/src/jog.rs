@@ -75,10 +75,11 @@ impl JointJog {
         let most = ACCELERATION * limits.acceleration_max;
         let wanted = self.wanted.max(-limits.velocity_max).min(limits.velocity_max);
         // As wanted, as long as the joint could still stop inside its range from there.
-        let onward = self.toward(wanted, most);
+        let onward = self.toward(wanted, most, limits.velocity_max);
         let way = self.way(&onward) + onward.stopping_way(most);
         let room = if way < 0.0 { low - *position } else { high - *position };
-        let next = if way.abs() < room.abs() && way * room >= 0.0 { onward } else { self.toward(0.0, most) };
+        let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
+        let next = if onward_fits { onward } else { self.toward(0.0, most, limits.velocity_max) };
         // Never out of the range; from outside only back into it.
         let reached = *position + self.way(&next);
         let within = reached.max(low.min(*position)).min(high.max(*position));
@@ -91,8 +92,9 @@ impl JointJog {
         0.5 * (self.velocity + next.velocity) * DT
     }
 
-    /// A tick later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²).
-    fn toward(&self, target: f64, most: f64) -> Self {
+    /// A tick later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²), and never faster than
+    /// `fastest` (rad/s).
+    fn toward(&self, target: f64, most: f64, fastest: f64) -> Self {
         let round = most / RISE_S * DT;
         let left = target - self.velocity;
         // The acceleration from which the rest of the way to that velocity just suffices to take it back.
@@ -103,7 +105,12 @@ impl JointJog {
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
-            Self { velocity: self.velocity + next * DT, acceleration: next, ..*self }
+            // A joint that accelerates when its jog ends gets faster until its acceleration is back at zero. It arrives at the
+            // velocity that was commanded before; whole ticks can add a few µrad/s, which the limit does not allow.
+            let reached = self.velocity + next * DT;
+            let velocity = reached.max(-fastest).min(fastest);
+            let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / DT };
+            Self { velocity, acceleration, ..*self }
         }
     }
 
@@ -131,6 +138,7 @@ impl JointJog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::limits::check_set;
     use proptest::prelude::*;
 
     fn config() -> Config {
@@ -183,6 +191,96 @@ mod tests {
                 check(&mut jog);
                 ticks += 1;
                 assert!(ticks < 1_200, "{jog:?}");
+            }
+        }
+    }
+
+    /// Limits as they are imported from UR5 and Z1, in wide ranges.
+    fn arms() -> [Config; 3] {
+        let avena = config();
+        let with = |velocity: [f64; JOINTS], acceleration: f64| {
+            let mut config = config();
+            for (joint, velocity_max) in config.joints.iter_mut().zip(velocity) {
+                *joint = JointConfig {
+                    velocity_max,
+                    acceleration_max: acceleration,
+                    position_min: -2.9,
+                    position_max: 2.9,
+                    ..*joint
+                };
+            }
+            config
+        };
+        [avena, with([3.15, 3.15, 3.15, 3.2, 3.2, 3.2], 20.0), with([3.1415; JOINTS], 15.0)]
+    }
+
+    /// What ends a jog, or changes it.
+    #[derive(Clone, Copy, Debug)]
+    enum End {
+        /// No further Jog comes.
+        Silence,
+        /// A Stop or a Pause.
+        Stop,
+        /// A Jog of another rate, as a share of the velocity limit.
+        Rate(f64),
+    }
+
+    /// Ticks after the end of a jog: silence counts from [`LASTS_MS`] on, and then the acceleration takes [`RISE_S`] to get to zero.
+    const AFTER: u16 = LASTS_MS + 120;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// A joint that is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when that ends: the set
+        /// velocity keeps to the limit, and no limit of J-43 is found, whichever tick it ends in.
+        #[test]
+        fn j58_the_set_velocity_never_exceeds_its_limit_whenever_a_jog_ends(
+            arm in 0..3usize,
+            joint in 0..JOINTS,
+            below in prop_oneof![Just(0.0), 0.0..1e-3f64],
+            up in any::<bool>(),
+            before in prop_oneof![Just(0.0), -0.5..0.5f64],
+            end in prop_oneof![
+                Just(End::Silence),
+                Just(End::Stop),
+                Just(End::Rate(1.0)),
+                Just(End::Rate(-1.0)),
+                (-1.0..1.0f64).prop_map(End::Rate),
+            ],
+        ) {
+            let config = arms()[arm].clone();
+            let limits = config.joints[joint];
+            let (low, high) = config.position_range(joint);
+            let fastest = limits.velocity_max.copysign(if up { 1.0 } else { -1.0 });
+            let at = |share: f64| {
+                let mut wanted = [0.0; JOINTS];
+                wanted[joint] = share * fastest;
+                wanted
+            };
+            let step = |jog: &mut Jog, position: &mut [f64; JOINTS]| {
+                let (v, a) = jog.step(position, &config);
+                let inside = v[joint].abs() <= limits.velocity_max;
+                let found = check_set((position[joint], v[joint], a[joint]), 0.0, &limits, true);
+                if inside && found == 0 { Ok(()) } else { Err((v[joint], a[joint], found)) }
+            };
+            let (mut jog, mut position) = (Jog::default(), [0.0; JOINTS]);
+            position[joint] = if up { 0.9 * low + 0.1 * high } else { 0.1 * low + 0.9 * high };
+            jog.command(&at(before));
+            for tick in 0..60 {
+                prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms before", 60 - tick);
+            }
+            for ends_ms in 1..1_300 {
+                jog.command(&at(1.0 - below));
+                prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms", ends_ms);
+                let (mut ended, mut there) = (jog, position);
+                match end {
+                    End::Silence => {}
+                    End::Stop => ended.end(),
+                    End::Rate(share) => ended.command(&at(share)),
+                }
+                for tick in 0..AFTER {
+                    prop_assert_eq!(step(&mut ended, &mut there), Ok(()), "{} ms after {} ms", tick, ends_ms);
+                }
             }
         }
     }

@@ -49,7 +49,7 @@ impl FlightFrame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// 0 nothing, 1 a good frame, 2 a bad one, 3 noise; bit 7: an urgent command has overtaken it.
+    /// 0 nothing, 1 a good frame, 2 a bad one, 3 noise; bit 6: it came on a plain line; bit 7: an urgent command has overtaken it.
     pub kind: u8,
     /// Its line: 0 RS422, 1 USB.
     pub line: u8,
@@ -157,7 +157,7 @@ impl Flight {
     /// First word of a record: "JTCF".
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
     /// Version of the layout.
-    pub const LAYOUT: u16 = 2;
+    pub const LAYOUT: u16 = 3;
     /// No line has a record.
     pub const NO_LINE: u8 = 0xFF;
     /// No tick yet.
@@ -268,7 +268,7 @@ fn event(received: &HostEvent<'_>) -> FlightEvent {
         LinkEvent::Noise(response) => (3, response.frame_type, response.length, 0),
     };
     FlightEvent {
-        kind: kind | u8::from(received.overtaken) << 7,
+        kind: kind | u8::from(received.plain) << 6 | u8::from(received.overtaken) << 7,
         line: received.line as u8,
         frame_type,
         status: received.event.status() as u8,
@@ -294,7 +294,7 @@ mod tests {
                 frame_type: FrameType::PidParamUseDefault,
                 bytes: &fixed::PID_PARAM_USE_DEFAULT,
             });
-            let host = [HostEvent { line: 1, overtaken: tick % 2 == 0, event }; 2];
+            let host = [HostEvent { line: 1, overtaken: tick % 2 == 0, plain: tick % 3 == 0, event }; 2];
             let mut urgent = [UrgentCommands::NONE; HOST_LINES];
             urgent[tick % 2].add(UrgentCommand::Pause, (tick % 3) as u8);
             urgent[tick % 2].push(UrgentCommand::Stop);

@@ -158,14 +158,11 @@ impl Link {
 
     /// Adds the event of the parser to the batch if there is room.
     fn hand_over(&mut self, slot: &mut SlotIn) -> bool {
-        let (Some(event), Some(position)) = (self.parser.event(), self.parser.event_position()) else {
-            return false;
-        };
-        if !slot.push(&ReceivedEvent { line: self.line, position, event }) {
-            return false;
+        let moved = self.parser.received(self.line).is_some_and(|received| slot.push(&received));
+        if moved {
+            self.parser.release();
         }
-        self.parser.release();
-        true
+        moved
     }
 }
 

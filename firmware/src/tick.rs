@@ -12,7 +12,8 @@ use embassy_time::Instant;
 use jtc_core::recorder::{Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, Outputs};
 use jtc_wire::{
-    BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, StoreState, UrgentWatch,
+    BootCause, EVENTS_MAX, EventBatch, LinkEvent, RawPoint, ReceivedEvent, Response, STATUS_LEN, StoreState,
+    UrgentWatch,
 };
 use openjtc_firmware::clock;
 use openjtc_firmware::flight::Flight;
@@ -311,8 +312,12 @@ fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inp
 }
 
 /// Fills the places that hold no event.
-const NO_EVENT: HostEvent<'_> =
-    HostEvent { line: lines::RS422, overtaken: false, event: LinkEvent::Noise(Response::NONE) };
+const NO_EVENT: HostEvent<'_> = HostEvent {
+    line: lines::RS422,
+    overtaken: false,
+    plain: false,
+    event: LinkEvent::Noise(Response::NONE),
+};
 
 /// The events of the batch, as the controller gets them; returns how many.
 fn collect<'a>(
@@ -323,7 +328,8 @@ fn collect<'a>(
     let mut count = 0;
     while let (Some(slot), Some(received)) = (host.get_mut(count), batch.get(count)) {
         let overtaken = watch.overtaken(received.line, received.position);
-        *slot = HostEvent { line: received.line, overtaken, event: received.event };
+        let ReceivedEvent { line, plain, event, .. } = received;
+        *slot = HostEvent { line, overtaken, plain, event };
         count += 1;
     }
     count

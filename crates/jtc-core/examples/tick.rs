@@ -96,7 +96,7 @@ fn main() {
             .front()
             .filter(|_| ready)
             .map(|(t, bytes)| LinkEvent::Frame(FrameRef { frame_type: *t, bytes }))
-            .map(|event| HostEvent { line: 0, overtaken: false, event });
+            .map(|event| HostEvent { line: 0, overtaken: false, plain: false, event });
         if controller.telemetry().point == 1000 && start.is_none() {
             start = Some(controller.clone());
         }

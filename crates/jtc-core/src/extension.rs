@@ -147,7 +147,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-58: joint velocities in HoldPos, and neither beside a path that is paused nor during an upload.
+    /// J-58: joint velocities in HoldPos, and not beside a path that is paused.
     fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
         let set = &self.motion.set;
         let free = self.state == ControllerState::HoldPos
@@ -155,7 +155,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && self.trajectory != TrajectoryState::Pause
             && self.trajectory != TrajectoryState::Execute
             && self.parameters.blend_left_ms() == 0
-            && !self.store.receiving()
             && (set.jogging() || set.all_holding());
         if !free {
             return Err(DataStatus::NotAllowed);
@@ -335,7 +334,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-59: hosts that send nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
-        self.extensions.answers.tick();
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));
         let silent = &mut self.extensions.hosts_silent_ms;

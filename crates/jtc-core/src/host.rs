@@ -1,13 +1,14 @@
 //! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
 pub(crate) mod overtaking;
 pub(crate) mod slices;
+mod upload;
 
 use jtc_wire::{
     Command, DataStatus, EVENTS_MAX, ExecCommand, FrameType, FrictionImage, LinkEvent, RawPoint, Response,
-    Segment, UrgentCommand,
+    UrgentCommand,
 };
 
-use crate::check::{self, TrajectoryCheck, Violation};
+use crate::check;
 use crate::controller::Controller;
 use crate::defaults;
 use crate::friction::celsius;
@@ -17,16 +18,17 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 use overtaking::Overtaking;
 use slices::{SliceOutcome, SliceProgress};
 
-/// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
-const CHECK_TICKS: usize = 28;
-const COPY_TICKS: usize = 10;
-/// Points of a short segment checked and copied in one tick.
-const CHECKED_PER_TICK: usize = 16;
-const COPIED_PER_TICK: usize = 64;
-
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
+
+/// J-51: existing hosts know no data status above 6.
+pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
+    match data {
+        DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
+        known => known,
+    }
+}
 
 /// How an event was served.
 enum Served {
@@ -60,6 +62,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-04: Stop and Pause act at once. Their records come when their frames have their turn.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
+        let stops = command == UrgentCommand::Stop;
+        self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
         if self.execute(command.into()).is_ok()
             && let Some(overtaking) = self.overtaking.get_mut(line)
         {
@@ -77,9 +81,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             LinkEvent::Bad(response) => (response, false, Served::Quickly),
             LinkEvent::Noise(response) => (response, true, Served::Quickly),
             LinkEvent::Frame(frame) => {
-                if frame.frame_type.is_extension() {
-                    self.extensions.answers.asked(received.line);
-                }
                 let (data, served) = match Command::parse(frame) {
                     Err(status) => (status, Served::Quickly),
                     Ok(command) => {
@@ -94,7 +95,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             command => {
                                 let quick = self.is_quick(&command);
                                 (
-                                    self.carry_out(received.line, command),
+                                    self.carry_out(received, command),
                                     if quick { Served::Quickly } else { Served::Fully },
                                 )
                             }
@@ -113,6 +114,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         }
                     }
                 };
+                let data = if received.plain { in_plain_words(data) } else { data };
                 (Response::good(frame.frame_type, data, frame.bytes.len() as u16), false, served)
             }
         };
@@ -133,7 +135,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    pub(crate) fn carry_out(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
+    pub(crate) fn carry_out(&mut self, received: &HostEvent<'_>, command: Command<'_>) -> SliceOutcome {
         // Parameters would change the torque under a moving arm.
         let jogging = self.motion.set.jogging();
         let settable =
@@ -151,7 +153,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.errors.clear_occurred();
                 SliceOutcome::Done
             }
-            Command::Trajectory(segment) => self.take_segment(&segment),
+            Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             // J-53: a drive on a bench does not bear the load that the model has.
             Command::TeachingModeEnable
@@ -186,7 +188,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
-            command if command.frame_type().is_extension() => self.carry_out_extension(line, command),
+            command if command.frame_type().is_extension() => {
+                self.carry_out_extension(received.line, command)
+            }
             command if settable => self.take_parameters(&command),
             _ => SliceOutcome::Refused(DataStatus::NotAllowed),
         }
@@ -251,78 +255,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
-    fn take_segment(&mut self, segment: &Segment<'_>) -> SliceOutcome {
-        if self.state != ControllerState::HoldPos {
-            // Also in the middle of a segment: the change of state has cleared the trajectory.
-            return SliceOutcome::Refused(DataStatus::NotAllowed);
-        }
-        match self.slice_progress {
-            SliceProgress::PointCopy(from) => self.copy_points(segment, from),
-            SliceProgress::PointCheck(from) => self.check_points(segment, from),
-            _ => match self.store.check(segment) {
-                Err(status) => SliceOutcome::Refused(status),
-                Ok(()) => {
-                    self.begin_check(segment);
-                    self.check_points(segment, 0)
-                }
-            },
-        }
-    }
-
-    /// Segment 0 begins a trajectory, others go on behind what was received.
-    fn begin_check(&mut self, segment: &Segment<'_>) {
-        let tables = self.parameters.tables_in_use();
-        let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
-        self.check = match self.store.tail() {
-            Some((points, last, speeds)) if segment.segment > 0 => check.behind(points, last, speeds),
-            _ => check,
-        };
-        self.violation = None;
-    }
-
-    fn check_points(&mut self, segment: &Segment<'_>, from: usize) -> SliceOutcome {
-        let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
-        for point in segment.points_from(from).take(slice) {
-            if let Err(violation) = self.check.take(&point) {
-                return self.refuse_path(violation);
-            }
-        }
-        if from + slice < segment.len() {
-            return SliceOutcome::Unfinished(SliceProgress::PointCheck(from + slice));
-        }
-        if segment.segment + 1 == segment.segments
-            && let Err(violation) = self.check.end()
-        {
-            return self.refuse_path(violation);
-        }
-        self.store.begin(segment);
-        if segment.segment == 0 {
-            self.set_trajectory(TrajectoryState::Null);
-            self.parameters.friction_is_new = false;
-        }
-        SliceOutcome::Unfinished(SliceProgress::PointCopy(0))
-    }
-
-    fn copy_points(&mut self, segment: &Segment<'_>, from: usize) -> SliceOutcome {
-        let slice = segment.len().div_ceil(COPY_TICKS).max(COPIED_PER_TICK);
-        let to = (from + slice).min(segment.len());
-        self.store.copy(segment, from, to);
-        if to < segment.len() {
-            return SliceOutcome::Unfinished(SliceProgress::PointCopy(to));
-        }
-        self.store.commit(segment, self.check.speeds());
-        if self.store.complete() {
-            self.set_trajectory(TrajectoryState::Stop);
-        }
-        SliceOutcome::Done
-    }
-
-    fn refuse_path(&mut self, violation: Violation) -> SliceOutcome {
-        self.violation = Some(violation);
-        SliceOutcome::Refused(DataStatus::IncorrectValue)
-    }
-
     /// J-53: joints are set absent.
     fn joints_absent(&self) -> bool {
         self.config.absent.contains(&true)
@@ -330,6 +262,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
+        // J-30: also while joints are jogged.
+        let dropped = command == ExecCommand::Stop && self.store.drop_upload();
         match (self.trajectory, command) {
             (_, ExecCommand::Stop | ExecCommand::Pause) if self.motion.set.jogging() => {
                 self.motion.set.end_jog();
@@ -357,6 +291,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.set_trajectory(TrajectoryState::Stop);
                 Ok(())
             }
+            _ if dropped => Ok(()),
             _ => Err(DataStatus::NotAllowed),
         }
     }

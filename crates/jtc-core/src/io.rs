@@ -21,6 +21,9 @@ pub struct HostEvent<'a> {
     /// It was received before an urgent command that the controller was given in this tick or an earlier one: an Execute
     /// is not carried out any more, and a Stop or a Pause has acted already (J-04).
     pub overtaken: bool,
+    /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51). Its record has no data
+    /// status above 6, and segment 0 acts as a Stop in Operate (J-30).
+    pub plain: bool,
     /// What was received.
     pub event: LinkEvent<'a>,
 }

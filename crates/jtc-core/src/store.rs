@@ -19,6 +19,10 @@ pub(crate) struct Store<M> {
     next_segment: u16,
     segments: u16,
     number: u16,
+    /// Segment 0 came on a plain line.
+    plain: bool,
+    /// A Stop has dropped the upload: its other segments are refused until a segment 0 comes.
+    dropped: bool,
     step: Step,
     /// Velocities of the accepted segments.
     speeds: [SpeedRange; JOINTS],
@@ -34,6 +38,8 @@ pub(crate) struct StoreState {
     next_segment: u16,
     segments: u16,
     number: u16,
+    plain: bool,
+    dropped: bool,
     step_ms: u16,
     speeds: [SpeedRange; JOINTS],
     held: usize,
@@ -47,7 +53,18 @@ impl StoreState {
     }
 }
 
-remembered!(StoreState { received, next_segment, segments, number, step_ms, speeds, held, hash });
+remembered!(StoreState {
+    received,
+    next_segment,
+    segments,
+    number,
+    plain,
+    dropped,
+    step_ms,
+    speeds,
+    held,
+    hash
+});
 
 /// Begins a hash of points, and mixes a word into it: a multiplication for each, so that copying a segment stays cheap.
 const HASH_BEGIN: u32 = 0x811C_9DC5;
@@ -76,6 +93,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             next_segment: 0,
             segments: 0,
             number: 0,
+            plain: false,
+            dropped: false,
             step: Step::new(1),
             speeds,
             held: 0,
@@ -100,8 +119,29 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Segments are here, and others are still to come.
-    pub fn receiving(&self) -> bool {
+    fn receiving(&self) -> bool {
         self.segments > 0 && self.next_segment < self.segments
+    }
+
+    /// J-30: a Stop drops an upload that is not complete, unless it was begun on a plain line, whose host would wait for ever.
+    /// Returns whether there was one.
+    pub fn drop_upload(&mut self) -> bool {
+        let drops = self.receiving() && !self.plain;
+        if drops {
+            self.clear();
+            self.dropped = true;
+        }
+        drops
+    }
+
+    /// Segment 0 of an upload was refused because of a Stop: the other segments of the upload are refused, too.
+    pub fn refuse_rest(&mut self) {
+        self.dropped = true;
+    }
+
+    /// The upload was dropped, and no other has been begun since.
+    pub fn dropped(&self) -> bool {
+        self.dropped
     }
 
     /// Time of the last point, ms.
@@ -138,11 +178,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy a segment that was accepted; segment 0 replaces what was there.
-    pub fn begin(&mut self, segment: &Segment<'_>) {
+    /// Begins to copy a segment that was accepted; segment 0 replaces what was there, and says whether its line is `plain`.
+    pub fn begin(&mut self, segment: &Segment<'_>, plain: bool) {
         if segment.segment == 0 {
             self.clear();
             (self.held, self.hash) = (0, HASH_BEGIN);
+            (self.plain, self.dropped) = (plain, false);
             self.segments = segment.segments;
             self.number = segment.trajectory;
             self.step = Step::new(segment.step_time);
@@ -178,14 +219,38 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
 
     /// What is remembered, without the points.
     pub fn state(&self) -> StoreState {
-        let Self { points: _, received, next_segment, segments, number, ref step, speeds, held, hash } =
-            *self;
-        StoreState { received, next_segment, segments, number, step_ms: step.ms, speeds, held, hash }
+        let Self {
+            points: _,
+            received,
+            next_segment,
+            segments,
+            number,
+            plain,
+            dropped,
+            ref step,
+            speeds,
+            held,
+            hash,
+        } = *self;
+        let step_ms = step.ms;
+        StoreState { received, next_segment, segments, number, plain, dropped, step_ms, speeds, held, hash }
     }
 
     /// The same again; the points are put apart.
     pub fn restore(&mut self, state: &StoreState) {
-        let StoreState { received, next_segment, segments, number, step_ms, speeds, held, hash } = *state;
+        let StoreState {
+            received,
+            next_segment,
+            segments,
+            number,
+            plain,
+            dropped,
+            step_ms,
+            speeds,
+            held,
+            hash,
+        } = *state;
+        (self.plain, self.dropped) = (plain, dropped);
         (self.received, self.next_segment, self.segments) =
             (received.min(self.capacity()), next_segment, segments);
         (self.number, self.step, self.speeds) = (number, Step::new(step_ms), speeds);

@@ -177,8 +177,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Puts the oldest record into a status; returns the line that it is for.
     fn prepare_status(&mut self) -> Option<usize> {
-        let record =
-            self.records.pop().map(|(line, record)| (line, self.extensions.answers.record_for(line, record)));
+        let record = self.records.pop();
         self.status_frame = self.status(record.map_or(Response::NONE, |(_, record)| record)).emit();
         record.map(|(line, _)| line)
     }

@@ -247,10 +247,7 @@ impl Board {
 
     /// Gives the event of the parser to the controller; false when there is no room for it.
     fn hand_over(&mut self) -> bool {
-        let (Some(event), Some(position)) = (self.receiver.event(), self.receiver.event_position()) else {
-            return false;
-        };
-        let moved = self.batch.push(&ReceivedEvent { line: LINE, position, event });
+        let moved = self.receiver.received(LINE).is_some_and(|received| self.batch.push(&received));
         if moved {
             self.receiver.release();
         }
@@ -277,9 +274,10 @@ impl Board {
         let urgent = self.watch.take();
         let host: Vec<HostEvent<'_>> = (0..EVENTS_MAX)
             .map_while(|n| self.batch.get(n))
-            .map(|ReceivedEvent { line, position, event }| HostEvent {
+            .map(|ReceivedEvent { line, position, plain, event }| HostEvent {
                 line,
                 overtaken: self.watch.overtaken(line, position),
+                plain,
                 event,
             })
             .collect();

@@ -14,6 +14,8 @@ pub struct ReceivedEvent<'a> {
     pub line: usize,
     /// Where in the stream of that line it began.
     pub position: u64,
+    /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51).
+    pub plain: bool,
     /// What was received.
     pub event: LinkEvent<'a>,
 }
@@ -36,6 +38,7 @@ struct Entry {
     start: u16,
     length: u16,
     line: u8,
+    plain: u8,
     sort: u8,
     frame_type: u8,
     status: u8,
@@ -48,7 +51,8 @@ const NOISE: u8 = 2;
 impl EventBatch {
     /// Empty.
     pub const fn new() -> Self {
-        let entry = Entry { position: 0, start: 0, length: 0, line: 0, sort: 0, frame_type: 0, status: 0 };
+        let entry =
+            Entry { position: 0, start: 0, length: 0, line: 0, plain: 0, sort: 0, frame_type: 0, status: 0 };
         Self { len: 0, done: 0, used: 0, entries: [entry; EVENTS_MAX], bytes: [0; FRAME_MAX] }
     }
 
@@ -72,6 +76,7 @@ impl EventBatch {
             start: start as u16,
             length,
             line: received.line as u8,
+            plain: received.plain.into(),
             sort,
             frame_type,
             status: status as u8,
@@ -99,7 +104,12 @@ impl EventBatch {
                 LinkEvent::Frame(FrameRef { frame_type: FrameType::from_byte(entry.frame_type)?, bytes })
             }
         };
-        Some(ReceivedEvent { line: entry.line.into(), position: entry.position, event })
+        Some(ReceivedEvent {
+            line: entry.line.into(),
+            position: entry.position,
+            plain: entry.plain != 0,
+            event,
+        })
     }
 
     /// The oldest `count` events are done. When all are, there is room for as many again.
@@ -142,11 +152,13 @@ mod tests {
             [frame(&fixed::STOP), LinkEvent::Bad(bad), LinkEvent::Noise(noise), frame(&fixed::PUMP_ON)];
         for round in 0..3u64 {
             for (n, event) in events.into_iter().enumerate() {
-                assert!(batch.push(&ReceivedEvent { line: n % 2, position: round + n as u64, event }));
+                let (line, position) = (n % 2, round + n as u64);
+                assert!(batch.push(&ReceivedEvent { line, position, plain: n % 3 == 0, event }));
             }
             for (n, event) in events.into_iter().enumerate() {
                 let received = batch.get(0).expect("one is left");
-                assert_eq!(received, ReceivedEvent { line: n % 2, position: round + n as u64, event });
+                let (line, position) = (n % 2, round + n as u64);
+                assert_eq!(received, ReceivedEvent { line, position, plain: n % 3 == 0, event });
                 assert_eq!(batch.get(1).is_none(), n == 3);
                 batch.done(1);
             }
@@ -159,7 +171,12 @@ mod tests {
         let mut batch = Box::new(EventBatch::new());
         for done in 0..4 {
             for position in 0..3 {
-                assert!(batch.push(&ReceivedEvent { line: 0, position, event: frame(&fixed::STOP) }));
+                assert!(batch.push(&ReceivedEvent {
+                    line: 0,
+                    position,
+                    plain: true,
+                    event: frame(&fixed::STOP)
+                }));
                 assert!(!batch.is_empty());
             }
             batch.done(done);
@@ -172,13 +189,13 @@ mod tests {
     #[test]
     fn j07_a_full_batch_takes_nothing_more() {
         let mut batch = Box::new(EventBatch::new());
-        let stop = ReceivedEvent { line: 0, position: 0, event: frame(&fixed::STOP) };
+        let stop = ReceivedEvent { line: 0, position: 0, plain: true, event: frame(&fixed::STOP) };
         assert_eq!((0..100).filter(|_| batch.push(&stop)).count(), EVENTS_MAX);
         batch.done(EVENTS_MAX + 5);
         let mut long = std::vec![0; FRAME_MAX];
         let n =
             crate::trajectory(&mut long, (0, 0, 1), 10, [crate::RawPoint::default(); 1666]).expect("it fits");
-        let segment = ReceivedEvent { line: 0, position: 7, event: frame(&long[..n]) };
+        let segment = ReceivedEvent { line: 0, position: 7, plain: false, event: frame(&long[..n]) };
         assert!(batch.push(&segment) && !batch.push(&segment), "there is room for one of that length");
         assert_eq!(batch.get(0), Some(segment));
     }

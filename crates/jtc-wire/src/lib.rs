@@ -57,7 +57,7 @@ pub use state::{ControllerState, TrajectoryState};
 pub use status::{
     GripperStatus, JointStatus, STATUS_LEN, STATUS_LEN_NO_GRIPPER, STATUS_LEN_SHORT_INDEX, Status,
 };
-pub use stream::{LinkEvent, Receiver};
+pub use stream::{KNOWN_US, LinkEvent, Receiver};
 pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 
 /// Where each part of a frame is: byte ranges, named once.

@@ -11,6 +11,7 @@
 //! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
 //! any candidate is checked with two registers and some arithmetic, however long it is. Hostile bytes full of false
 //! headers cost a constant each, and [`Receiver::poll`] scans a bounded number of them per call.
+use crate::batch::ReceivedEvent;
 use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
 use crate::response::{FrameStatus, Response};
@@ -39,6 +40,10 @@ impl LinkEvent<'_> {
         }
     }
 }
+
+/// Time after an extension request for which its line counts as one whose client knows the extensions, µs (J-51). Later the line is
+/// *plain*.
+pub const KNOWN_US: u64 = 2_000_000;
 
 /// Most gaps among the held bytes that are stored.
 const GAPS: usize = 64;
@@ -81,6 +86,12 @@ pub struct Receiver<B> {
     event: Option<Found>,
     gaps: Gaps,
     registers: Registers,
+    /// Where in the stream the frame begins that is not complete yet, and when its first byte was seen, µs.
+    began: (u64, u64),
+    /// When the last extension request was complete, µs.
+    asked_us: Option<u64>,
+    /// The frame of the event came on a plain line.
+    plain: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -123,6 +134,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
             event: None,
             gaps: Gaps::new(),
             registers: Registers::new(),
+            began: (u64::MAX, 0),
+            asked_us: None,
+            plain: true,
         }
     }
 
@@ -189,9 +203,15 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
                 return false;
             };
             match self.scan() {
-                ScanResult::Wait => return false,
+                ScanResult::Wait => {
+                    if self.began.0 != self.base + self.start as u64 {
+                        self.began = (self.base + self.start as u64, now_us);
+                    }
+                    return false;
+                }
                 ScanResult::Frame(kind, n) => {
                     self.in_run = false;
+                    self.judge(kind, now_us);
                     self.event = Some(Found::Frame(kind, n));
                 }
                 ScanResult::Run(sort, response) => {
@@ -225,6 +245,23 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
             Found::Frame(..) => self.base + self.start as u64,
             Found::Run(_, _, position) => position,
         })
+    }
+
+    /// The event as a controller gets it, of the line with this number.
+    pub fn received(&self, line: usize) -> Option<ReceivedEvent<'_>> {
+        let (event, position) = (self.event()?, self.event_position()?);
+        Some(ReceivedEvent { line, position, plain: self.plain, event })
+    }
+
+    /// A frame is complete: whether its line was plain when it began, which an extension request ends.
+    fn judge(&mut self, kind: FrameType, now_us: u64) {
+        let (position, seen_us) = self.began;
+        let began_us = if position == self.base + self.start as u64 { seen_us } else { now_us };
+        let known = |asked_us: u64| began_us.saturating_sub(asked_us) <= KNOWN_US;
+        self.plain = !kind.is_extension() && !self.asked_us.is_some_and(known);
+        if kind.is_extension() {
+            self.asked_us = Some(now_us);
+        }
     }
 
     /// Discards all held bytes and the event: bytes were lost in front of the next one, which is byte `position` of the

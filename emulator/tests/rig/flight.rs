@@ -43,6 +43,8 @@ pub struct Event {
     pub kind: u8,
     /// An urgent command was received after it.
     pub overtaken: bool,
+    /// It came on a plain line.
+    pub plain: bool,
     pub line: u8,
     pub frame_type: u8,
     pub status: u8,
@@ -106,8 +108,8 @@ impl Flight {
         let mut events: Vec<_> = (0..16)
             .map(|_| {
                 let [kind, line, frame_type, status] = b.take();
-                let (kind, overtaken) = (kind & 0x7F, kind & 0x80 != 0);
-                Event { kind, overtaken, line, frame_type, status, len: b.u16(), crc: b.u16() }
+                let (kind, plain, overtaken) = (kind & 0x3F, kind & 0x40 != 0, kind & 0x80 != 0);
+                Event { kind, overtaken, plain, line, frame_type, status, len: b.u16(), crc: b.u16() }
             })
             .collect();
         events.truncate(event_count.into());

@@ -172,7 +172,7 @@ fn host_event<'a>(event: &Event, bytes: &'a [u8]) -> HostEvent<'a> {
         2 => LinkEvent::Bad(response()),
         _ => LinkEvent::Noise(response()),
     };
-    HostEvent { line: event.line.into(), overtaken: event.overtaken, event: what }
+    HostEvent { line: event.line.into(), overtaken: event.overtaken, plain: event.plain, event: what }
 }
 
 /// J-04: the record goes to the line of its frame, the other gets the same status without one.

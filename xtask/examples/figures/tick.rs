@@ -54,7 +54,7 @@ fn controller() -> Controller<Vec<RawPoint>> {
 
 fn event(bytes: &[u8]) -> Option<HostEvent<'_>> {
     let event = LinkEvent::Frame(FrameRef::new_checked(bytes)?);
-    Some(HostEvent { line: 0, overtaken: false, event })
+    Some(HostEvent { line: 0, overtaken: false, plain: false, event })
 }
 
 fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {

@@ -51,8 +51,13 @@ impl Bench {
 
     /// Sends a frame on a line and runs until its record; returns its data status.
     fn send(&mut self, line: usize, bytes: &[u8]) -> DataStatus {
+        self.send_as(false, line, bytes)
+    }
+
+    /// On a line that is plain or not.
+    fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
-        let host = [HostEvent { line, overtaken: false, event: LinkEvent::Frame(frame) }];
+        let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];
         let before = self.records.len();
         for _ in 0..100 {
             if self.tick(&host).host_done > 0 {
@@ -155,17 +160,20 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
 }
 
 #[test]
-fn j51_a_line_that_asked_receives_what_others_do_not() {
+fn j51_on_a_plain_line_no_data_status_is_above_6() {
     let mut bench = Bench::new();
-    bench.info(1);
-    assert_eq!(bench.send(0, &fixed::EXECUTE), DataStatus::IncorrectValue);
-    assert_eq!(bench.send(1, &fixed::EXECUTE), DataStatus::NotAllowed);
-    bench.run(10_000);
-    assert_eq!(bench.send(1, &fixed::EXECUTE), DataStatus::IncorrectValue);
-    // Any extension request is enough, also one that is refused.
-    bench.force(ControllerState::Init);
-    assert_eq!(bench.send(1, &fixed::DISABLE), DataStatus::NotAllowed);
-    assert_eq!(bench.send(1, &fixed::EXECUTE), DataStatus::NotAllowed);
+    for line in [0, 1] {
+        // Execute without a trajectory, and in Init a request that needs another state.
+        for frame in [&fixed::EXECUTE[..], &fixed::TEACHING_MODE_ENABLE] {
+            assert_eq!(bench.send_as(true, line, frame), DataStatus::IncorrectValue);
+            assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
+        }
+    }
+    // The others are the same on each line.
+    for data in DataStatus::ALL {
+        let plain = crate::host::in_plain_words(data);
+        assert!(plain as u8 <= 6 && (plain == data || data as u8 > 6), "{data:?}: {plain:?}");
+    }
 }
 
 #[test]

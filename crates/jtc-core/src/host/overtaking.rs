@@ -12,9 +12,11 @@ pub(crate) struct Overtaking {
     pub(super) pauses: u8,
     /// An Execute was cancelled by them.
     pub(super) cancelled: bool,
+    /// A Stop has arrived, accepted or not: an upload that was begun before it is dropped (J-30).
+    pub(super) stopped: bool,
 }
 
-remembered!(Overtaking { stops, pauses, cancelled });
+remembered!(Overtaking { stops, pauses, cancelled, stopped });
 
 impl Overtaking {
     /// So many urgent commands were accepted.
@@ -38,6 +40,8 @@ impl Overtaking {
         let accepted = self.accepted(command);
         let acted = *accepted > 0;
         *accepted = accepted.saturating_sub(1);
+        // What this line sends behind the last of its Stops is newer.
+        self.stopped &= command != UrgentCommand::Stop || self.stops > 0;
         if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
     }
 

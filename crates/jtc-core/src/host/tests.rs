@@ -2,13 +2,18 @@
 extern crate std;
 use std::vec::Vec;
 
-use jtc_wire::{FrameRef, FrameStatus, FrameType, missing_parameter};
+use jtc_wire::{FrameRef, FrameStatus, FrameType, Segment, missing_parameter};
 
 use super::*;
+use crate::check::TrajectoryCheck;
 use crate::nodes::Nodes;
 use crate::{Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;
+
+/// Where a command comes from that is carried out at once.
+const ON_LINE_0: HostEvent<'_> =
+    HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Noise(Response::NONE) };
 
 fn holding() -> Bench {
     let mut controller = Bench::new(Config::avena(), [RawPoint::default(); 64]);
@@ -20,7 +25,7 @@ fn holding() -> Bench {
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
-    let host = [HostEvent { line: 0, overtaken: false, event }; 3];
+    let host = [HostEvent { line: 0, overtaken: false, plain: false, event }; 3];
     controller.serve_host(&Inputs { host: &host, ..Inputs::QUIET })
 }
 
@@ -52,12 +57,12 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
 /// A Stop whose frame never came is not reported as accepted to a later one.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
-    let before = Overtaking { stops: 2, pauses: 1, cancelled: true };
+    let before = Overtaking { stops: 2, pauses: 1, cancelled: true, stopped: true };
     for (overtaken, left) in [(true, before), (false, Overtaking::default())] {
         let mut controller = holding();
         controller.overtaking = [before; HOST_LINES];
         let event = LinkEvent::Bad(Response::bad(0, FrameStatus::IncorrectHeader, 0));
-        controller.serve(&HostEvent { line: 1, overtaken, event });
+        controller.serve(&HostEvent { line: 1, overtaken, plain: false, event });
         assert_eq!(controller.overtaking, [before, left]);
     }
 }
@@ -67,7 +72,7 @@ fn j21_a_clear_of_nodes_alone_leaves_the_controller_its_own_errors() {
     for (jtc, left) in [(true, false), (false, true)] {
         let mut controller = holding();
         controller.errors.raise_device();
-        controller.carry_out(0, Command::ClearCurrentErrors { jtc, nodes: 0x7F });
+        controller.carry_out(&ON_LINE_0, Command::ClearCurrentErrors { jtc, nodes: 0x7F });
         assert_eq!(controller.errors.any(), left, "{jtc}");
     }
 }
@@ -77,7 +82,10 @@ fn j23_a_reset_switches_the_pump_off_with_its_gripper_only() {
     for (nodes, pump) in [(0x00, true), (0x3F, true), (0x40, false), (0x7F, false)] {
         let mut controller = holding();
         controller.pump = true;
-        assert!(matches!(controller.carry_out(0, Command::ResetCanDevices { nodes }), SliceOutcome::Done));
+        assert!(matches!(
+            controller.carry_out(&ON_LINE_0, Command::ResetCanDevices { nodes }),
+            SliceOutcome::Done
+        ));
         assert_eq!(controller.pump, pump, "{nodes:#x}");
     }
 }
@@ -95,7 +103,7 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
     ] {
         let mut controller = holding();
         (controller.config.gripper, controller.state, controller.pump) = (gripper, state, !pump);
-        let progress = controller.carry_out(0, Command::GripperControl { pump });
+        let progress = controller.carry_out(&ON_LINE_0, Command::GripperControl { pump });
         assert_eq!(matches!(progress, SliceOutcome::Done), done, "{gripper} {state:?} {pump}");
         assert_eq!(controller.pump == pump, done, "{gripper} {state:?} {pump}");
     }
@@ -115,7 +123,7 @@ fn load(controller: &mut Bench, segment: u8, points: usize) -> usize {
     controller.slice_progress = SliceProgress::Begin;
     loop {
         checks += usize::from(!matches!(controller.slice_progress, SliceProgress::PointCopy(_)));
-        match controller.take_segment(&segment) {
+        match controller.take_segment(&segment, &ON_LINE_0) {
             SliceOutcome::Unfinished(next) => controller.slice_progress = next,
             SliceOutcome::Done => return checks,
             SliceOutcome::Refused(status) => panic!("{status:?}"),
@@ -177,7 +185,7 @@ fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
         if known {
             controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         }
-        let outcome = controller.carry_out(0, Command::ArmModelUseDefault);
+        let outcome = controller.carry_out(&ON_LINE_0, Command::ArmModelUseDefault);
         assert_eq!(matches!(outcome, SliceOutcome::Done), taken, "{known} {torque_max}");
         let missing = controller.parameters.missing() & missing_parameter::MODEL;
         assert_eq!(missing == 0, taken, "{known} {torque_max}");

@@ -3,7 +3,7 @@
 //!
 //! Writer and reader keep the same [`Reference`]; a snapshot begins it anew on both sides.
 use jtc_bus::{Frame, MAX_LEN, id};
-use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, UrgentCommand, UrgentCommands};
+use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentCommand, UrgentCommands};
 
 use super::Block;
 use super::memory::Writer;
@@ -301,6 +301,7 @@ impl Reference {
     fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);
+        to.put(event.plain.into(), 1);
         let (kind, response) = match event.event {
             LinkEvent::Frame(frame) => {
                 to.put(frame.frame_type as u32, 8);
@@ -311,6 +312,9 @@ impl Reference {
                     for byte in frame.bytes {
                         to.put((*byte).into(), 8);
                     }
+                } else {
+                    // In Operate all that counts of a segment is whether it begins an upload (J-30).
+                    to.put(begins_upload(frame).into(), 1);
                 }
                 return fits;
             }
@@ -322,6 +326,12 @@ impl Reference {
         to.put(response.status as u32, 3);
         true
     }
+}
+
+/// Segment 0 of a trajectory.
+fn begins_upload(frame: FrameRef<'_>) -> bool {
+    frame.frame_type == FrameType::Trajectory
+        && Segment::parse(frame.body()).is_some_and(|segment| segment.segment == 0)
 }
 
 /// The frame is recorded with its bytes. Parameters change the arm, whatever their length: a snapshot after them says which it is.

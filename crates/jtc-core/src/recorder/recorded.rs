@@ -19,13 +19,20 @@ pub struct RecordedEvent {
     pub line: usize,
     /// An urgent command has overtaken it (J-04).
     pub overtaken: bool,
+    /// It came on a plain line (J-51).
+    pub plain: bool,
     /// Type byte, 0 where unknown.
     pub frame_type: u8,
     /// What it was.
     pub kind: RecordedKind,
+    /// It was segment 0 of a trajectory, whose bytes are not in the log.
+    begins_upload: bool,
     bytes: [u8; HOST_BYTES],
     len: usize,
 }
+
+/// A Trajectory frame of segment 0 without points.
+const EMPTY_SEGMENT: &[u8] = &[0; 14];
 
 /// Kinds of [`RecordedEvent`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,8 +51,10 @@ impl RecordedEvent {
     const NONE: Self = Self {
         line: 0,
         overtaken: false,
+        plain: false,
         frame_type: 0,
         kind: RecordedKind::Unrecorded,
+        begins_upload: false,
         bytes: [0; HOST_BYTES],
         len: 0,
     };
@@ -55,19 +64,24 @@ impl RecordedEvent {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// As the controller gets it. In place of a frame that was not recorded: one that changes nothing.
+    /// As the controller gets it. In place of a frame that was not recorded: one that changes nothing; of segment 0 of a trajectory, one
+    /// without points, which does in Operate what any segment 0 does (J-30).
     pub fn event(&self) -> HostEvent<'_> {
         let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
             (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
             (RecordedKind::Noise(status), _) => LinkEvent::Noise(Response::bad(self.frame_type, status, 0)),
-            (_, Some(frame_type)) => LinkEvent::Frame(FrameRef { frame_type, bytes: self.bytes() }),
+            (_, Some(frame_type)) => {
+                let bytes = if self.begins_upload { EMPTY_SEGMENT } else { self.bytes() };
+                LinkEvent::Frame(FrameRef { frame_type, bytes })
+            }
             (_, None) => LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0)),
         };
-        HostEvent { line: self.line, overtaken: self.overtaken, event }
+        HostEvent { line: self.line, overtaken: self.overtaken, plain: self.plain, event }
     }
 
     fn read<S: BitSource>(from: &mut S) -> Self {
-        let mut event = Self { line: from.take(2) as usize, overtaken: from.take(1) != 0, ..Self::NONE };
+        let mut event = Self { line: from.take(2) as usize, ..Self::NONE };
+        (event.overtaken, event.plain) = (from.take(1) != 0, from.take(1) != 0);
         event.frame_type = from.take(8) as u8;
         let kind = from.take(2);
         event.kind = match kind {
@@ -80,6 +94,7 @@ impl RecordedEvent {
             }
             1 => {
                 event.bytes = [0; HOST_BYTES];
+                event.begins_upload = from.take(1) != 0;
                 RecordedKind::Unrecorded
             }
             kind => {

@@ -303,8 +303,12 @@ const NO_FRAME: Frame = match Frame::new(0, &[]) {
 };
 
 /// Fills the places that hold no event.
-const NO_EVENT: HostEvent<'_> =
-    HostEvent { line: 0, overtaken: false, event: jtc_wire::LinkEvent::Noise(jtc_wire::Response::NONE) };
+const NO_EVENT: HostEvent<'_> = HostEvent {
+    line: 0,
+    overtaken: false,
+    plain: false,
+    event: jtc_wire::LinkEvent::Noise(jtc_wire::Response::NONE),
+};
 
 /// Bits compared by what they come to.
 #[derive(Default, PartialEq)]

@@ -50,14 +50,14 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     controller.state = ControllerState::HoldPos;
     let points = [0, 1, 0, 0, 0, 1, 0, 10].into_iter().chain([0; 4 * 36]).collect::<Vec<u8>>();
     let segment = Segment::parse(&points).expect("four points at standstill");
-    controller.store.begin(&segment);
+    controller.store.begin(&segment, false);
     controller.store.copy(&segment, 0, 4);
     controller.store.commit(&segment, *controller.store.speeds());
     controller.set_trajectory(TrajectoryState::Stop);
     controller.enter(state);
     let bytes = [&[0; 4], &body[..], &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
-    let host = [HostEvent { line: 0, overtaken: false, event }];
+    let host = [HostEvent { line: 0, overtaken: false, plain: false, event }];
     controller.serve_host(&Inputs { host: &host, ..Inputs::QUIET });
     let (teaching, execute) = (controller.teaching, controller.trajectory == TrajectoryState::Execute);
     Conditions { teaching, execute, ..Conditions::default() }

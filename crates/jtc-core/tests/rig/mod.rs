@@ -50,14 +50,15 @@ pub struct Rig {
     host: std::collections::VecDeque<Sent>,
     /// The flight recorder, in sessions that have one.
     pub recorder: Option<Recorder<Vec<Block>, 2>>,
-    /// Tick in which the hosts last asked for an extension: they receive each data status (J-51).
-    known: Option<u64>,
+    /// What hosts send from now on comes on plain lines (J-51).
+    pub plain: bool,
 }
 
 /// What a host has sent, not done yet.
 struct Sent {
     line: usize,
     overtaken: bool,
+    plain: bool,
     what: What,
 }
 
@@ -74,7 +75,7 @@ impl Sent {
             What::Bad(response) => LinkEvent::Bad(*response),
             What::Noise(response) => LinkEvent::Noise(*response),
         };
-        HostEvent { line: self.line, overtaken: self.overtaken, event }
+        HostEvent { line: self.line, overtaken: self.overtaken, plain: self.plain, event }
     }
 }
 
@@ -109,7 +110,7 @@ impl Rig {
             urgent: [UrgentCommands::NONE; HOST_LINES],
             host: std::collections::VecDeque::new(),
             recorder: None,
-            known: None,
+            plain: false,
         }
     }
 
@@ -139,18 +140,9 @@ impl Rig {
 
     pub fn defaults(&mut self) {
         use FrameType::*;
-        self.introduce();
         for t in [FrictionPolynomialUseDefault, PidParamUseDefault, ArmModelUseDefault] {
             self.send(t, &[]);
         }
-    }
-
-    /// Both hosts ask for an extension.
-    pub fn introduce(&mut self) {
-        for line in 0..HOST_LINES {
-            self.send_on(line, FrameType::GetSettings, &[0, 0]);
-        }
-        self.known = Some(self.controller.telemetry().tick);
     }
 
     pub fn state(&self) -> ControllerState {
@@ -181,15 +173,20 @@ impl Rig {
     /// On a line of its own.
     pub fn send_on(&mut self, line: usize, frame_type: FrameType, body: &[u8]) {
         let what = What::Frame(frame_type, frame(frame_type, body));
-        self.host.push_back(Sent { line, overtaken: false, what });
+        self.host.push_back(Sent { line, overtaken: false, plain: self.plain, what });
     }
 
     pub fn send_bad(&mut self, response: Response) {
-        self.host.push_back(Sent { line: 0, overtaken: false, what: What::Bad(response) });
+        self.host.push_back(Sent { line: 0, overtaken: false, plain: self.plain, what: What::Bad(response) });
     }
 
     pub fn send_noise(&mut self, response: Response) {
-        self.host.push_back(Sent { line: 0, overtaken: false, what: What::Noise(response) });
+        self.host.push_back(Sent {
+            line: 0,
+            overtaken: false,
+            plain: self.plain,
+            what: What::Noise(response),
+        });
     }
 
     /// Stop or Pause as it arrives on a line: it acts in the next tick, and its frame waits behind the others.
@@ -213,9 +210,6 @@ impl Rig {
 
     /// Sends, runs until it is done, and returns how its data were taken.
     pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
-        if self.known.is_none_or(|tick| self.controller.telemetry().tick > tick + 9_000) {
-            self.introduce();
-        }
         self.send(frame_type, body);
         for _ in 0..1000 {
             self.tick();

@@ -1,7 +1,7 @@
 //! The stream parser of the device, story by story.
 use jtc_wire::{
-    Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, Receiver, crc16,
-    fixed,
+    Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, KNOWN_US, LinkEvent, Receiver,
+    crc16, fixed,
 };
 
 use crate::{ON, receiver, segment};
@@ -248,4 +248,66 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(line.send(&default), [Good(FrameType::FrictionPolynomial, 6)]);
     let command = Command::parse(FrameRef::new_checked(&default).expect("a good frame"));
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
+}
+
+/// A line is plain 2 s after an extension request, counted to the first byte of a frame, however long that is.
+#[test]
+fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
+    // Whether the line was plain for each frame that is complete.
+    let plain = |line: &mut Line, bytes: &[u8]| -> Vec<bool> {
+        assert_eq!(line.receiver.push(line.now, bytes), bytes.len());
+        let mut all = Vec::new();
+        while line.receiver.poll(line.now) {
+            let received = line.receiver.received(5).expect("an event");
+            assert_eq!((received.line, Some(received.event)), (5, line.receiver.event()));
+            if matches!(received.event, LinkEvent::Frame(_)) {
+                all.push(received.plain);
+            }
+            line.receiver.release();
+        }
+        all
+    };
+    let mut line = Line::new();
+    assert_eq!(plain(&mut line, &fixed::STOP), [true], "nothing was asked yet");
+    for (after_us, is_plain) in
+        [(0, false), (1_000, false), (KNOWN_US, false), (KNOWN_US + 1, true), (60_000_000, true)]
+    {
+        // The request itself shows that its client knows the extensions.
+        assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
+        line.now += after_us;
+        assert_eq!(plain(&mut line, &fixed::STOP), [is_plain], "{after_us} \u{b5}s");
+        // The first byte decides: a frame of 4.7 s at 115 200 Bd ends far later.
+        assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
+        line.now += after_us;
+        let long = segment(1_500);
+        let pieces = long.chunks(46);
+        let all: Vec<bool> = pieces
+            .flat_map(|piece| {
+                line.now += 4_000;
+                plain(&mut line, piece)
+            })
+            .collect();
+        assert_eq!(all, [after_us + 4_000 > KNOWN_US]);
+    }
+    // Requests that are damaged, cut or only look like one show nothing; others do.
+    for (bytes, shows) in [
+        (&fixed::GET_INFO[..], true),
+        (&fixed::DISABLE, true),
+        (&fixed::STORE_ARM, true),
+        (&fixed::EXECUTE, false),
+        (&fixed::CLEAR_OCCURRED_ERRORS, false),
+        (&[0x9B, 0x40, 0, 6, 0xA5, 0xEA], false),
+        (&[0x9B, 0x40, 0, 6, 0xA5], false),
+        (&[0x40; 50], false),
+    ] {
+        let mut line = Line::new();
+        plain(&mut line, bytes);
+        line.now += 10_000;
+        assert_eq!(plain(&mut line, &fixed::STOP), [!shows], "{bytes:x?}");
+    }
+    // Behind noise, and behind other frames in the same piece.
+    let mut line = Line::new();
+    let bytes =
+        [&[7, 7, 0x9B][..], &fixed::STOP, &fixed::GET_INFO, &fixed::STOP, &segment(500), &ON].concat();
+    assert_eq!(plain(&mut line, &bytes), [true, false, false, false, false]);
 }

@@ -54,7 +54,7 @@ fn j59_hosts_that_are_silent_end_teaching_and_pause_the_path() {
     for (event, left) in [(LinkEvent::Frame(frame), 0), (noise, 78)] {
         let mut bench = Bench::new();
         bench.controller.extensions.hosts_silent_ms = 77;
-        let host = [HostEvent { line: 1, overtaken: false, event }];
+        let host = [HostEvent { line: 1, overtaken: false, plain: false, event }];
         bench.controller.watch_hosts(&Inputs { host: &host, ..Inputs::QUIET }, 1);
         assert_eq!(bench.controller.extensions.hosts_silent_ms, left);
     }
@@ -92,7 +92,8 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         let mut frame = [0; 30];
         jtc_wire::floats(&mut frame, jtc_wire::FrameType::Jog, [0.3; JOINTS]).expect("it fits");
         let jog = FrameRef::new_checked(&frame).expect("a good frame");
-        let host = |overtaken| [HostEvent { line: 0, overtaken, event: LinkEvent::Frame(jog) }];
+        let event = LinkEvent::Frame(jog);
+        let host = |overtaken| [HostEvent { line: 0, overtaken, plain: false, event }];
         bench.controller.serve_host(&Inputs { host: &host(false), ..Inputs::QUIET });
         assert!(bench.controller.motion.set.jogging());
         let mut position = [0.0; JOINTS];
@@ -128,7 +129,9 @@ fn j58_parameters_and_resets_wait_for_the_end_of_a_jog() {
         Command::ResetCanDevices { nodes: 1 },
         Command::TrajSetExecStatus(jtc_wire::ExecCommand::Execute),
     ] {
-        let outcome = bench.controller.carry_out(0, command);
+        let event =
+            HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Noise(Response::NONE) };
+        let outcome = bench.controller.carry_out(&event, command);
         assert!(matches!(outcome, SliceOutcome::Refused(DataStatus::NotAllowed)), "{command}");
     }
 }

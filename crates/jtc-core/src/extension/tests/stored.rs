@@ -53,7 +53,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     assert_eq!(bench.at_once(Command::StoreArm), DataStatus::NotAllowed, "no memory");
     bench.controller.set_store_state(StoreState::Failed, 3);
     let frame = FrameRef::new_checked(&fixed::STORE_ARM).expect("a good frame");
-    let host = [HostEvent { line: 0, overtaken: false, event: LinkEvent::Frame(frame) }];
+    let host = [HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Frame(frame) }];
     let (mut asked, mut ticks) = (0, 0);
     loop {
         let outputs = bench.tick(&host);

@@ -43,6 +43,7 @@ proptest! {
             let host: Vec<_> = lines.iter().zip(&frames).map(|(line, bytes)| HostEvent {
                 line: *line,
                 overtaken: false,
+                plain: false,
                 event: LinkEvent::Frame(FrameRef::new_checked(bytes).expect("a good frame")),
             }).collect();
             let mut rest = &host[..];

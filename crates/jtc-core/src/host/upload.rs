@@ -1,0 +1,105 @@
+//! Segments of a trajectory: which are taken (J-30), checked and copied in slices (J-36).
+use jtc_wire::{DataStatus, ExecCommand, RawPoint, Segment};
+
+use super::slices::{SliceOutcome, SliceProgress};
+use crate::check::{TrajectoryCheck, Violation};
+use crate::controller::Controller;
+use crate::io::HostEvent;
+use crate::{ControllerState, TrajectoryState};
+
+/// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
+const CHECK_TICKS: usize = 28;
+const COPY_TICKS: usize = 10;
+/// Points of a short segment checked and copied in one tick.
+const CHECKED_PER_TICK: usize = 16;
+const COPIED_PER_TICK: usize = 64;
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
+    pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
+        let first = segment.segment == 0;
+        if self.state == ControllerState::Operate && first && received.plain {
+            // Its host repeats it until it is taken, and forwards no Stop meanwhile. Refused where it has stopped in this tick.
+            self.execute(ExecCommand::Stop).ok();
+        }
+        if self.state != ControllerState::HoldPos {
+            // Also in the middle of a segment: the change of state has cleared the trajectory.
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
+        }
+        let stopped = self.overtaking.get(received.line).is_some_and(|overtaking| overtaking.stopped);
+        if first && !received.plain && received.overtaken && stopped {
+            // It is older than a Stop that has acted.
+            self.store.refuse_rest();
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
+        }
+        // Also in the middle of a segment.
+        let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
+        if begun && self.store.dropped() {
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
+        }
+        match self.slice_progress {
+            SliceProgress::PointCopy(from) => self.copy_points(segment, from),
+            SliceProgress::PointCheck(from) => self.check_points(segment, from, received.plain),
+            _ => match self.store.check(segment) {
+                Err(status) => SliceOutcome::Refused(status),
+                Ok(()) => {
+                    self.begin_check(segment);
+                    self.check_points(segment, 0, received.plain)
+                }
+            },
+        }
+    }
+
+    /// Segment 0 begins a trajectory, others go on behind what was received.
+    fn begin_check(&mut self, segment: &Segment<'_>) {
+        let tables = self.parameters.tables_in_use();
+        let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
+        self.check = match self.store.tail() {
+            Some((points, last, speeds)) if segment.segment > 0 => check.behind(points, last, speeds),
+            _ => check,
+        };
+        self.violation = None;
+    }
+
+    fn check_points(&mut self, segment: &Segment<'_>, from: usize, plain: bool) -> SliceOutcome {
+        let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
+        for point in segment.points_from(from).take(slice) {
+            if let Err(violation) = self.check.take(&point) {
+                return self.refuse_path(violation);
+            }
+        }
+        if from + slice < segment.len() {
+            return SliceOutcome::Unfinished(SliceProgress::PointCheck(from + slice));
+        }
+        if segment.segment + 1 == segment.segments
+            && let Err(violation) = self.check.end()
+        {
+            return self.refuse_path(violation);
+        }
+        self.store.begin(segment, plain);
+        if segment.segment == 0 {
+            self.set_trajectory(TrajectoryState::Null);
+            self.parameters.friction_is_new = false;
+        }
+        SliceOutcome::Unfinished(SliceProgress::PointCopy(0))
+    }
+
+    fn copy_points(&mut self, segment: &Segment<'_>, from: usize) -> SliceOutcome {
+        let slice = segment.len().div_ceil(COPY_TICKS).max(COPIED_PER_TICK);
+        let to = (from + slice).min(segment.len());
+        self.store.copy(segment, from, to);
+        if to < segment.len() {
+            return SliceOutcome::Unfinished(SliceProgress::PointCopy(to));
+        }
+        self.store.commit(segment, self.check.speeds());
+        if self.store.complete() {
+            self.set_trajectory(TrajectoryState::Stop);
+        }
+        SliceOutcome::Done
+    }
+
+    fn refuse_path(&mut self, violation: Violation) -> SliceOutcome {
+        self.violation = Some(violation);
+        SliceOutcome::Refused(DataStatus::IncorrectValue)
+    }
+}

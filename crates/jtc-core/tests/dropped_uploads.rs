@@ -1,0 +1,215 @@
+//! A Stop during an upload drops it: nothing of it is executed, and jogging, teaching and the next upload are free (J-30, J-58).
+mod rig;
+
+use jtc_core::{ControllerState, TrajectoryState};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, Response, UrgentCommand};
+use rig::{Rig, floats, rest, segment_body};
+
+use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed};
+
+/// Segments of the upload that a Stop drops.
+const SEGMENTS: u16 = 4;
+
+fn segment(number: u16, segment: u16, points: usize) -> Vec<u8> {
+    segment_body(number, segment, SEGMENTS, 10, &vec![rest(0); points])
+}
+
+fn jog(rig: &mut Rig) -> DataStatus {
+    rig.ask(FrameType::Jog, &floats([0.1f32, 0.0, 0.0, 0.0, 0.0, 0.0]))
+}
+
+/// The records of Stop frames.
+fn stops(rig: &Rig) -> Vec<DataStatus> {
+    let stop = |record: &&Response| record.frame_type == FrameType::TrajSetExecStatus as u8;
+    rig.records().iter().filter(stop).map(|record| record.data).collect()
+}
+
+/// What can be done after the Stop, each on its own.
+fn all_is_free(rig: &mut Rig, upload: bool) {
+    assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "nothing to execute");
+    if upload {
+        // With other points: none of the upload before is left in it.
+        let points: Vec<RawPoint> = vec![rest(0); 60];
+        rig.upload(&points, 10);
+        assert_eq!(rig.exec(ExecCommand::Execute), NoError);
+        rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
+        rig.tick();
+        assert_eq!(rig.controller.telemetry().point, 590, "59 steps of 10 ms");
+    }
+    assert_eq!(jog(rig), NoError);
+    rig.run(700);
+    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), NoError);
+    rig.until(1_000, |rig| rig.state() == ControllerState::Teaching);
+    assert_eq!(rig.errors(), 0);
+}
+
+#[test]
+fn j30_a_stop_between_two_segments_drops_the_upload() {
+    for line in [0, 1] {
+        for received in 1..SEGMENTS {
+            for (urgent, upload) in [(true, true), (true, false), (false, true)] {
+                let mut rig = Rig::holding();
+                for n in 0..received {
+                    assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NoError);
+                }
+                rig.statuses.clear();
+                if urgent {
+                    rig.urgent(line, UrgentCommand::Stop);
+                } else {
+                    rig.send_on(line, FrameType::TrajSetExecStatus, &[1]);
+                }
+                rig.run(5);
+                assert_eq!(stops(&rig), [NoError], "it has done something");
+                assert_eq!(
+                    (rig.state(), rig.trajectory()),
+                    (ControllerState::HoldPos, TrajectoryState::Null)
+                );
+                // A client that goes on learns of it with each segment, and nothing of it is ever executed.
+                for n in received..SEGMENTS {
+                    assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NotAllowed, "segment {n}");
+                    assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed);
+                }
+                all_is_free(&mut rig, upload);
+            }
+        }
+    }
+}
+
+/// The segments that wait, or are being executed, in whichever tick the Stop comes.
+#[test]
+fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
+    for begun in 0..3 {
+        for ticks in 0..45 {
+            let mut rig = Rig::holding();
+            for n in 0..begun {
+                assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 10)), NoError);
+            }
+            rig.statuses.clear();
+            for n in begun..SEGMENTS {
+                rig.send(FrameType::Trajectory, &segment(7, n, 1_000));
+            }
+            rig.run(ticks);
+            rig.urgent(1, UrgentCommand::Stop);
+            rig.run(250);
+            let records: Vec<_> =
+                rig.records().into_iter().filter(|r| r.frame_type == FrameType::Trajectory as u8).collect();
+            let taken = records.iter().take_while(|record| record.data == NoError).count();
+            assert_eq!(records.len(), usize::from(SEGMENTS - begun));
+            assert!(
+                taken < records.len() && records[taken..].iter().all(|r| r.data == NotAllowed),
+                "{records:?}"
+            );
+            assert_eq!(rig.trajectory(), TrajectoryState::Null, "{begun} segments, {ticks} ms");
+            all_is_free(&mut rig, ticks % 2 == 0);
+        }
+    }
+}
+
+/// An upload whose segment 0 has been received before the Stop, and has had no turn: the trajectory before it stays.
+#[test]
+fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
+    let mut rig = Rig::holding();
+    rig.upload(&[rest(0); 60], 10);
+    rig.send(FrameType::FrictionTableUseDefault, &[]);
+    for n in 0..SEGMENTS {
+        rig.send(FrameType::Trajectory, &segment(8, n, 10));
+    }
+    rig.statuses.clear();
+    rig.urgent(1, UrgentCommand::Stop);
+    rig.run(60);
+    let segments: Vec<_> = rig.records().iter().filter(|r| r.frame_type == 0x04).map(|r| r.data).collect();
+    assert_eq!(segments, [NotAllowed; SEGMENTS as usize]);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
+    assert_eq!(
+        rig.ask(FrameType::Trajectory, &segment(8, 2, 10)),
+        NotAllowed,
+        "a segment of it that comes late"
+    );
+    assert_eq!(rig.exec(ExecCommand::Execute), NoError);
+    rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
+    rig.tick();
+    assert_eq!(rig.controller.telemetry().point, 590);
+    // The next upload is free, and its order is checked as ever.
+    assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 0, 10)), NoError);
+    assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 2, 10)), IncorrectSegmentOrder);
+}
+
+#[test]
+fn j30_an_upload_that_follows_a_stop_is_free_of_it() {
+    for number in [7, 8] {
+        let mut rig = Rig::holding();
+        assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 0, 10)), NoError);
+        rig.urgent(0, UrgentCommand::Stop);
+        for n in 0..SEGMENTS {
+            rig.send(FrameType::Trajectory, &segment(number, n, 10));
+        }
+        rig.run(200);
+        assert_eq!(rig.trajectory(), TrajectoryState::Stop);
+    }
+}
+
+#[test]
+fn j30_a_pause_drops_no_upload() {
+    let mut rig = Rig::holding();
+    for n in 0..SEGMENTS {
+        rig.send(FrameType::Trajectory, &segment(7, n, 200));
+        rig.run(7);
+        rig.urgent(1, UrgentCommand::Pause);
+        rig.run(40);
+    }
+    assert_eq!(stops(&rig), [NotAllowed; SEGMENTS as usize]);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
+}
+
+/// Existing hosts survive no refused segment. So their uploads are completed, and a Stop says that it has stopped nothing.
+#[test]
+fn j30_an_upload_on_a_plain_line_outlasts_a_stop() {
+    for line in [0, 1] {
+        let mut rig = Rig::holding();
+        for n in 0..SEGMENTS {
+            rig.plain = n == 0;
+            rig.send(FrameType::Trajectory, &segment(7, n, 300));
+            rig.run(usize::from(n) * 5);
+            rig.plain = false;
+            rig.urgent(line, UrgentCommand::Stop);
+            rig.run(60);
+        }
+        assert_eq!(stops(&rig), [NotAllowed; SEGMENTS as usize], "the last found it complete");
+        let refused = rig.records().iter().any(|r| r.frame_type == 0x04 && !r.accepted());
+        assert!(!refused, "{:?}", rig.records());
+        assert_eq!(rig.trajectory(), TrajectoryState::Stop);
+        rig.plain = true;
+        assert_eq!(rig.exec(ExecCommand::Execute), NoError);
+    }
+    // One that was begun by a client that knows the extensions is dropped, though its line has become plain.
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 0, 10)), NoError);
+    rig.plain = true;
+    rig.urgent(0, UrgentCommand::Stop);
+    rig.run(5);
+    assert_eq!(stops(&rig), [NoError]);
+    assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 1, 10)), IncorrectValue);
+}
+
+/// An upload that nobody completes does not keep the arm from being jogged, and one that is completed is whole.
+#[test]
+fn j58_joints_are_jogged_during_an_upload() {
+    for plain in [true, false] {
+        let mut rig = Rig::holding();
+        for n in 0..SEGMENTS {
+            rig.plain = plain;
+            assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 100)), NoError);
+            rig.plain = false;
+            assert_eq!(jog(&mut rig), NoError, "after segment {n}");
+            rig.run(100);
+        }
+        assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "not while joints are jogged");
+        // A Stop ends the jog and drops the upload.
+        assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 0, 100)), NoError);
+        assert_eq!(jog(&mut rig), NoError);
+        rig.urgent(0, UrgentCommand::Stop);
+        rig.run(800);
+        assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 1, 100)), NotAllowed);
+        assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Null));
+    }
+}

@@ -11,6 +11,7 @@ use jtc_wire::{
 use crate::check;
 use crate::controller::Controller;
 use crate::defaults;
+use crate::errors::Errors;
 use crate::friction::celsius;
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
@@ -143,16 +144,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !jogging;
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
-                if jtc {
+                let ordered = self.nodes.clear(nodes, !self.powered());
+                if ordered && jtc {
                     self.errors.clear_current();
+                } else if jtc {
+                    return self.clear_errors(Errors::clear_current).into();
                 }
-                self.nodes.clear(nodes, !self.powered());
                 SliceOutcome::Done
             }
-            Command::ClearOccurredErrors => {
-                self.errors.clear_occurred();
-                SliceOutcome::Done
-            }
+            Command::ClearOccurredErrors => self.clear_errors(Errors::clear_occurred).into(),
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             // J-53: a drive on a bench does not bear the load that the model has.
@@ -194,6 +194,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             command if settable => self.take_parameters(&command),
             _ => SliceOutcome::Refused(DataStatus::NotAllowed),
         }
+    }
+
+    /// J-21: a fault that a joint still reports is raised again in this tick. A `clear` after which all is as before is refused: it is
+    /// not carried out later either, when the joint has been cleared.
+    fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
+        let mut after = self.errors;
+        clear(&mut after);
+        let cleared = after;
+        after.raise_external_joints();
+        if self.nodes.fault_stays() && after == self.errors {
+            return Err(DataStatus::NotAllowed);
+        }
+        self.errors = cleared;
+        Ok(())
     }
 
     /// Friction, gains or model.

@@ -116,6 +116,79 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     );
 }
 
+/// Existing hosts show the answer: a clear that has cleared nothing says so, and is not carried out later, unasked.
+#[test]
+fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
+    type Fault = fn(&mut Rig);
+    let faults: [(&str, Fault); 4] = [
+        ("fault state", |rig| rig.nodes[4].report.state = NodeState::FAULT),
+        ("fault reaction", |rig| rig.nodes[4].report.state = NodeState::new(254)),
+        ("error bit", |rig| {
+            (rig.nodes[4].report.errors, rig.nodes[4].report.state) = (8, NodeState::FAULT);
+        }),
+        ("motor control", |rig| {
+            (rig.nodes[4].report.mc_current, rig.nodes[4].report.state) = (4, NodeState::FAULT);
+        }),
+    ];
+    for (name, fault) in faults {
+        for plain in [false, true] {
+            let mut rig = Rig::holding();
+            fault(&mut rig);
+            rig.run(100);
+            assert_eq!(rig.state(), ControllerState::Error, "{name}");
+            rig.plain = plain;
+            let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
+            // The controller alone; it with a joint that has nothing to clear; the occurred ones, of which none is old.
+            assert_eq!(rig.clear(true, 0), refused, "{name}");
+            assert_eq!(rig.clear(true, 0x01), refused, "{name}");
+            assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
+            // Clears of nodes say nothing of the controller.
+            assert_eq!(rig.clear(false, 0x01), DataStatus::NoError, "{name}");
+            rig.nodes[4].report.state = NodeState::FAULT;
+            assert_eq!(rig.clear(false, 0x10), DataStatus::NoError, "{name}");
+            rig.run(300);
+            assert_eq!(
+                rig.state(),
+                ControllerState::Error,
+                "{name}: the controller's own is still to be cleared"
+            );
+            assert!(rig.nodes[4].report.errors == 0 && !rig.nodes[4].report.state.is_fault());
+            assert_eq!(rig.clear(true, 0), DataStatus::NoError, "{name}");
+            rig.run(300);
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
+        }
+    }
+    // Together with the joint, or while that is on its way, the clear is taken.
+    for joint_first in [false, true] {
+        let mut rig = Rig::holding();
+        rig.nodes[4].report.state = NodeState::FAULT;
+        rig.run(100);
+        if joint_first {
+            rig.send(FrameType::ClearCurrentErrors, &[0, 0x10, 0, 0]);
+            assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+        } else {
+            assert_eq!(rig.clear(true, 0x7F), DataStatus::NoError);
+        }
+        rig.run(300);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+    }
+    // One that clears something else is taken, and the fault stays.
+    let mut rig = Rig::holding();
+    rig.press_stop(1);
+    rig.nodes[4].report.state = NodeState::FAULT;
+    rig.run(100);
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+    assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
+    // What has occurred, too: it is gone from its word once, and no more.
+    assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
+    assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
+    // A controller without errors has nothing to refuse.
+    let mut rig = Rig::holding();
+    assert_eq!(rig.clear(true, 0x7F), DataStatus::NoError);
+    assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
+}
+
 #[test]
 fn j21_healthy_nodes_are_left_alone_by_a_clear() {
     let mut rig = Rig::holding();

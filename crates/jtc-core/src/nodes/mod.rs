@@ -351,14 +351,19 @@ impl Nodes {
     }
 
     /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
-    /// An error that has merely occurred is cleared only while the torque is off: it is no reason to drop the arm.
-    pub fn clear(&mut self, mask: u8, torque_off: bool) {
+    /// An error that has merely occurred is cleared only while the torque is off: it is no reason to drop the arm. Returns whether any
+    /// has something to clear.
+    pub fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
+        let mut any = false;
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             let joint = n < JOINTS;
             let to_clear = node.faulty() || (torque_off && joint && node.report.mc_occurred != 0);
-            node.clear |= mask & (1 << n) != 0 && to_clear;
+            let ordered = mask & (1 << n) != 0 && to_clear;
+            node.clear |= ordered;
+            any |= ordered;
         }
+        any
     }
 
     /// ResetCanDevices for the nodes in `mask` (J-23).

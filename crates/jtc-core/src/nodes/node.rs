@@ -112,10 +112,15 @@ impl Node {
 
     /// Reports an error. A gripper has no warnings.
     pub fn faulty(&self) -> bool {
-        let r = &self.report;
         // Drives set this warning also before they are configured, whatever the line is.
-        let safety_line = if self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
-        self.seen && (r.state.is_fault() || (r.errors | r.mc_current | safety_line) != 0)
+        let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
+        self.in_fault() || (self.seen && safety_line)
+    }
+
+    /// Reports a fault of its own.
+    pub fn in_fault(&self) -> bool {
+        let r = &self.report;
+        self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
     }
 
     /// The node has restarted: nothing of what was known of it holds.

@@ -94,6 +94,11 @@ impl Nodes {
         self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
+    /// A joint reports a fault that only a clear of its own ends, and none has been sent. Its safety-line warning ends by itself.
+    pub fn fault_stays(&self) -> bool {
+        self.joints().iter().any(|node| !node.clear && node.in_fault())
+    }
+
     /// A joint is still being cleared: the cause of its error is not gone.
     pub fn clearing(&self) -> bool {
         self.joints().iter().any(|node| node.clear)

@@ -147,7 +147,8 @@ fn j04_a_stop_in_noise() {
 #[test]
 fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
     let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
-    let long = host::trajectory(&points, 10, 400).concat();
+    // Of a client that knows the extensions: on a plain line the segment would stop the arm as well (J-30).
+    let long = [&fixed::GET_INFO[..], &host::trajectory(&points, 10, 400).concat()].concat();
     for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
         let bytes = [front, &fixed::STOP].concat();
         let end = bytes.len() as u64;
@@ -175,4 +176,30 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
     }
     assert_eq!(exec_records(&operator), [DataStatus::NotAllowed, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
+}
+
+/// An existing proxy sends new waypoints while the arm moves: again and again, and nothing else, until they are taken.
+#[test]
+fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
+    for baud in [Some(115_200), None] {
+        let mut operator = moving(baud);
+        // What its user has asked for since the start is more than 2 s old.
+        operator.run(2_100);
+        assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Execute);
+        let mut refused = 0;
+        loop {
+            let there = operator.world.telemetry().joints.map(|joint| joint.position);
+            let frames = host::trajectory(&host::there_and_back(&there, &there, 0.1, 2, 10), 10, 400);
+            assert_eq!(frames.len(), 1);
+            match operator.response(&frames[0]).expect("a record").data {
+                DataStatus::NoError => break,
+                data => assert_eq!(data, DataStatus::IncorrectValue),
+            }
+            refused += 1;
+            assert!(refused < 1_000, "it is never taken");
+        }
+        assert!(refused > 0);
+        let t = operator.world.telemetry();
+        assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Stop, 0));
+    }
 }

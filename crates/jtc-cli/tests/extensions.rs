@@ -152,6 +152,20 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
+/// A script that jogs learns of an arm that was released meanwhile, and why.
+#[test]
+fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
+    let fault =
+        "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
+    let sim = Sim::with_faults(&["--no-throttle"], fault).with_parameters();
+    // It waits until all drives are enabled, which takes 4 s, and would then jog for a minute.
+    let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
+    let error = &output.json()["error"];
+    let message = error["message"].as_str().unwrap();
+    assert!(message.contains("released the arm") && message.contains("joint 4 does not answer"), "{error}");
+    assert!(error.to_string().contains("jtc recover"), "{error}");
+}
+
 /// The simulated board keeps its arm as flash does: in a file, over the end of the simulator.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {

@@ -55,7 +55,9 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         _ => with_keys(&mut session, out, over),
     };
     // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
-    let rested = rest(&mut session);
+    let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
+    // An error that has released the arm is the reason for whatever else went wrong, and nothing else may have.
+    without_error(session.fresh_status().ok())?;
     jogged?;
     let now = rested?;
     let value = json!({
@@ -173,11 +175,27 @@ fn refused(error: Error) -> Failure {
                 DataStatus::IncorrectValue => "the rate is above the joint's velocity limit: `jtc arm show`",
                 _ if *state != ControllerState::HoldPos => "joints are jogged in HoldPos: `jtc recover`",
                 _ if *trajectory == TrajectoryState::Pause => "a trajectory is paused: `jtc traj stop` first",
-                _ => "the arm is not held at rest yet, or a trajectory is being uploaded: `jtc status`",
+                _ => "the arm is not held at rest yet: `jtc status`",
             };
             failure.hint(next)
         }
         _ => failure,
+    }
+}
+
+/// The controller has not released the arm.
+fn without_error(status: Option<Status>) -> Result<(), Failure> {
+    match status {
+        Some(status) if status.state == ControllerState::Error => {
+            let reason = words::errors_line(&status);
+            Err(Failure::new(
+                ErrorKind::Fault,
+                "jog-fault",
+                format!("the controller has released the arm: {reason}"),
+            )
+            .hint(words::next_step(&status)))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -24,7 +24,8 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     if args.occurred {
         session.clear_occurred()?;
     }
-    session.clear(true, ALL_NODES)?;
+    // What is left is reported below.
+    session.clear_if_possible(true, ALL_NODES)?;
     let end = session.now() + EFFECT;
     let mut s = session.next_status()?;
     while session.now() < end {

@@ -72,6 +72,20 @@ impl<P: Port> Session<P> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
     }
 
+    /// Like [`clear`](Self::clear), but returns false when the controller refuses it because nothing can be cleared yet (J-21): the fault of
+    /// a node is still there.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::clear`].
+    pub fn clear_if_possible(&mut self, jtc: bool, nodes: u8) -> Result<bool, LinkError> {
+        match self.clear(jtc, nodes) {
+            Ok(()) => Ok(true),
+            Err(LinkError::Refused { code: DataStatus::NotAllowed, .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Clears current and occurred errors.
     ///
     /// # Errors

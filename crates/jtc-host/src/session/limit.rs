@@ -51,7 +51,10 @@ mod tests {
             let limit = Duration::from_millis(limit_ms);
             assert_eq!(waited(limit_ms, 1.0), limit);
             assert_eq!(waited(limit_ms, 8.0), limit * 8, "woken late");
-            assert!(waited(limit_ms, 0.3).abs_diff(limit) < Duration::from_millis(1), "woken early, by bytes");
+            assert!(
+                waited(limit_ms, 0.3).abs_diff(limit) < Duration::from_millis(1),
+                "woken early, by bytes"
+            );
         }
     }
 }

@@ -251,7 +251,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        self.session.clear(true, nodes)?;
+        // A fault that is still there is looked at again.
+        self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }
 

@@ -35,11 +35,11 @@ fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
         (gains(200.0, 400.0, 10.0), 2),
         (gains(200.0, 0.0, 10.0), 2),
         (gains(2.0, 30.0, 0.1), 2),
-        (gains(0.5, 0.01, 0.5), 2),
+        (gains(0.5, 0.2, 0.5), 2),
         (gains(1600.0, 3200.0, 80.0), 0),
         (gains(1600.0, 3200.0, 80.0), 5),
         (gains(1600.0, 3200.0, 80.0), 7),
-        (gains(8000.0, 1.0, 100.0), 2),
+        (gains(8000.0, 2000.0, 100.0), 2),
     ] {
         let StableInertia { least, most } = StableInertia::of(&gains, delay).expect("a stable range");
         let fast = |inertia| growth(&gains, delay, inertia, 6_000);

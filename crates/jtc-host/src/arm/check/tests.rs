@@ -129,7 +129,7 @@ fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     assert_eq!(with(&|pid| pid[1].ki = 50_000.0), of(&[2]));
     assert_eq!(with(&|pid| pid[2].kp = 1.0), of(&[3]));
     assert_eq!(with(&|pid| pid[2].kd = 0.0), of(&[3]));
-    assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 4.0)).len(), JOINTS);
+    assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 30.0)).len(), JOINTS);
     assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
 }
 
@@ -166,7 +166,7 @@ fn gains_that_do_not_tolerate_a_proposed_rotor_are_refused() {
     let with = |proposed: bool, factor: f64| {
         let mut arm = Arm::avena();
         arm.pid.as_mut().unwrap().iter_mut().for_each(|g| {
-            (g.kp, g.ki, g.kd) = (g.kp * factor, g.ki * factor, g.kd * factor);
+            (g.kp, g.ki, g.kd) = (g.kp * factor, g.ki * factor * factor, g.kd * factor);
         });
         if proposed {
             Joint::ALL.into_iter().for_each(|j| arm.sources.propose((Some(j), "rotor_inertia_kg_m2")));

@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::arm::ArmChoice;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session, plan};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Session, plan};
 use jtc_sim::{SimConfig, World};
 
 /// A six-axis arm of `scale` times a metre, with axes along y and z and what goes with its size: masses with the third power,
@@ -43,7 +43,7 @@ fn description(scale: f64) -> String {
 
 /// Gives a controller the parameters of `arm` and moves it; the arm that is really there is `plant`. The largest error of each joint in
 /// mrad, after the arm was held for some seconds.
-fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<[f64; 6], String> {
+fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     let config = SimConfig {
         baud: None,
         controller: arm.config(),
@@ -69,7 +69,8 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<[f64; 6], String> {
             return Err(jtc_host::words::errors_line(&status));
         }
     }
-    Ok(run.summary(arm).joints.map(|joint| joint.max_error_mrad.unwrap_or_default()))
+    let joints = run.summary(arm).joints;
+    Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
 }
 
 /// The rotors of a real arm are lighter or heavier than the proposed ones, and nobody has said so: it is held and moves.
@@ -111,7 +112,7 @@ fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
     arm.pid.as_mut().unwrap()[4].kd = 300.0;
     let mut session =
         Session::new(SimPort::new(World::new(SimConfig { baud: None, ..SimConfig::default() })));
-    let before = session.device_arm().unwrap();
+    let before = session.device_arm().ok();
     for error in [
         session.push_arm(&arm, |_| panic!("nothing is sent")).unwrap_err(),
         session.push_and_store_arm(&arm, |_| panic!("nothing is sent")).unwrap_err(),
@@ -123,7 +124,7 @@ fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
             "{text}"
         );
     }
-    assert_eq!(session.device_arm().unwrap(), before);
+    assert_eq!(session.device_arm().ok(), before);
 }
 
 /// From a small arm to a large one: held, moved, and followed to a few mrad.

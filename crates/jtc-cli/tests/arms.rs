@@ -205,3 +205,67 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     assert_eq!(one("torque_max_nm", 2)["from"], "proposed");
     assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }
+
+/// J-71: gains that are not stable are refused by the check, and given to no controller by any command.
+#[test]
+fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("arm.toml");
+    let good = include_str!("../../../arms/avena.toml");
+    std::fs::write(&path, good.replacen("kd = 80.0", "kd = 350.0", 1)).unwrap();
+    let path = path.to_str().unwrap();
+    let output = jtc(&["arm", "check", path]).ends(4);
+    assert!(output.out.contains("✗ joint 1") && output.out.contains("Kd 350"), "{}", output.out);
+    assert!(!output.out.contains("a controller takes this arm"), "{}", output.out);
+    let value = jtc(&["--json", "arm", "check", path]).ends(4).json();
+    assert_eq!((value["ok"].as_bool(), &value["rotor_margins"]), (Some(false), &serde_json::Value::Null));
+    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    let value = jtc(&["--json", "arm", "check", whole]).ends(0).json();
+    assert!(value["rotor_margins"]["all"]["down"].as_f64().is_some_and(|down| down < 0.5), "{value}");
+    assert_eq!(value["rotor_margins"]["joints"].as_array().map(Vec::len), Some(6));
+
+    let sim = Sim::start(&["--no-throttle"]);
+    for words in [
+        vec!["arm", "push", path],
+        vec!["arm", "push", path, "--store"],
+        vec!["params", "push", path],
+        vec!["recover", "--arm", path],
+    ] {
+        let output = sim.jtc(&words).ends(4);
+        for part in ["joint 1", "Kd 350", "nothing was sent", "jtc arm check FILE"] {
+            assert!(output.err.contains(part), "{words:?}, {part}: {}", output.err);
+        }
+    }
+    sim.jtc(&["arm", "push", whole]).ends(0);
+}
+
+/// Degrees in a robot description leave no file; the unit in a header is not turned once more.
+#[test]
+fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (urdf, toml) = (file("arm.urdf"), file("arm.toml"));
+    let text = jtc_host::Arm::avena().to_urdf();
+    let limits = |upper: &str| {
+        let (before, after) = text.split_once("upper=\"").unwrap();
+        let (_, after) = after.split_once('"').unwrap();
+        format!("{before}upper=\"{upper}\"{after}")
+    };
+    std::fs::write(&urdf, limits("150")).unwrap();
+    let output = jtc(&["arm", "import", &urdf, "-o", &toml]).ends(2);
+    assert!(output.err.contains("150° are 2.618 rad"), "{}", output.err);
+    assert!(!std::path::Path::new(&toml).exists());
+    std::fs::write(&urdf, limits("2.5")).unwrap();
+    jtc(&["arm", "import", &urdf, "-o", &toml]).ends(0);
+
+    let (waypoints, motion) = (file("w.csv"), file("o.csv"));
+    std::fs::write(&waypoints, "Q1_DEG,Q2_DEG,Q3_DEG,Q4_DEG,Q5_DEG,Q6_DEG\n0,0,0,0,0,0\n60,20,-30,0,20,0\n")
+        .unwrap();
+    let output = jtc(&["plan", &waypoints, "-o", &motion, "--deg"]).ends(2);
+    assert!(output.err.contains("leave --deg out"), "{}", output.err);
+    assert!(!std::path::Path::new(&motion).exists());
+    jtc(&["plan", &waypoints, "-o", &motion]).ends(0);
+    let last = std::fs::read_to_string(&motion).unwrap();
+    let cells: Vec<f64> = last.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!((cells[1] - 60f64.to_radians()).abs() < 1e-3, "{cells:?}");
+}

@@ -42,6 +42,7 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
         "ok": !refused,
         "findings": checked.findings,
         "holding": checked.holding,
+        "rotor_margins": checked.rotor_margins,
     });
     out.result(&value, || {
         format!("{name}: arm {}\n{}", arm.name, as_text(&checked.findings))

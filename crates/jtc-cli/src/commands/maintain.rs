@@ -64,6 +64,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         None => ParameterSource::None,
     };
     source.check()?;
+    arm.as_ref().map_or(Ok(()), Arm::check_gains)?;
     let its_out = *out;
     let stop = Stop::listen_with(move || {
         ended_at_once(

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, FrictionChoice, NOT_CARRIED, ParameterFile, ParameterSet};
-use jtc_host::words;
+use jtc_host::{Session, words};
 use jtc_wire::Joint;
 use serde_json::json;
 
 use crate::args::{AcceptArgs, FrictionKind, LinkArgs, ParamsCommand};
 use crate::limits;
+use crate::link::LinkPort;
 use crate::progress::Progress;
 
 /// Does one of the family.
@@ -42,6 +43,7 @@ fn push(
     let read = load(files, out)?;
     let set = read.parameter_set(choice);
     let mut session = link.session()?;
+    check_gains(&read, &set, &mut session)?;
     let differences = match &read.arm {
         Some(arm) => limits::accept(arm, &session.device_config()?, accept.accept_device_limits, out)?,
         None => Vec::new(),
@@ -90,6 +92,24 @@ fn push(
         text
     });
     Ok(())
+}
+
+/// Refuses gains that do not keep the arm stable: that of the files, or the one that the controller has.
+fn check_gains(
+    read: &ParameterFile,
+    set: &ParameterSet,
+    session: &mut Session<LinkPort>,
+) -> Result<(), Failure> {
+    let Some(pid) = set.pid else { return Ok(()) };
+    let arm = match &read.arm {
+        Some(arm) => Some(arm.clone()),
+        // One that cannot be read yet has no torque yet.
+        None if session.info()?.is_some() => session.device_arm().ok(),
+        None => None,
+    };
+    let Some(arm) = arm else { return Ok(()) };
+    let model = set.model.unwrap_or(arm.model);
+    Ok(Arm { pid: Some(pid), model, ..arm }.check_gains()?)
 }
 
 fn use_defaults(link: &LinkArgs, out: &Output) -> Result<(), Failure> {

@@ -3,6 +3,7 @@
 
 mod limits;
 mod moving;
+mod stability;
 
 use host_kit::{Finding, Severity};
 use jtc_core::settings;
@@ -11,6 +12,7 @@ use jtc_dynamics::{ArmModel, Link, ModelError};
 use jtc_wire::Joint;
 use serde::Serialize;
 
+pub use self::stability::RotorMargins;
 use super::source::JOINT_KEYS;
 use super::{Arm, PoseError, Source};
 
@@ -84,6 +86,8 @@ pub struct Checked {
     pub findings: Vec<ArmFinding>,
     /// Joint by joint; empty where the numbers allow no such question.
     pub holding: Vec<Holding>,
+    /// How far the rotor inertias may be from those of the file; `None` where the gains are not stable, or not given.
+    pub rotor_margins: Option<RotorMargins>,
 }
 
 impl Checked {
@@ -106,14 +110,11 @@ impl Arm {
         self.find_bounds(&faulty, &mut findings);
         self.find_missing(&mut findings);
         let holding = if sound { self.find_holding(&mut findings) } else { Vec::new() };
-        // Where rotors are unknown, so is what the gains move.
-        if sound && self.rotors_given == [true; JOINTS] {
-            self.find_gains(&mut findings);
-        }
+        let rotor_margins = if sound { self.find_gains(&mut findings) } else { None };
         self.find_poses(&mut findings);
         self.find_proposed(&mut findings);
         findings.sort_by_key(|f| f.finding.severity);
-        Checked { findings, holding }
+        Checked { findings, holding, rotor_margins }
     }
 
     /// `joint 2 (shoulder)`, or the number alone where it is the name.

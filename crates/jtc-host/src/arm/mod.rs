@@ -5,6 +5,7 @@ mod collect;
 mod csv;
 mod device;
 mod export;
+mod gains;
 mod image;
 mod parameters;
 mod poses;
@@ -26,11 +27,12 @@ use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, Tabl
 use jtc_dynamics::{ArmModel, ModelError};
 use jtc_wire::SettingValue;
 
-pub use check::{ArmFinding, Checked};
+pub use check::{ArmFinding, Checked, RotorMargins};
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 #[cfg(feature = "mcap")]
 pub(crate) use export::frame_name;
+pub use gains::RotorMargin;
 pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
 pub use poses::{PoseError, Poses, is_pose_name, remove_pose, save_pose};

@@ -6,8 +6,9 @@
 use jtc_core::{JOINTS, PidGains};
 use jtc_wire::{ACCELERATION_SCALE, Joint};
 
+use super::gains::{PROPOSED_RANGE, all_stable, is_heavy_enough, is_light_enough, mass_matrices};
 use super::source::JOINT_KEYS;
-use super::statics::{Ranges, inertia, worst_gravity};
+use super::statics::{Inertia, Ranges, inertia, worst_gravity};
 use super::{Arm, Change, Source, Warning};
 
 /// How a number is proposed.
@@ -24,14 +25,20 @@ pub const RULES: [Rule; 10] = [
     Rule { name: "gravity_m_s2", rule: "9.81 m/s² down, z of the robot description being up" },
     Rule { name: "position_min_rad", rule: "the drives' working area" },
     Rule { name: "position_max_rad", rule: "the drives' working area" },
-    Rule { name: "velocity_max_rad_s", rule: "the fastest that the drives do before they trip" },
+    Rule {
+        name: "velocity_max_rad_s",
+        rule: "the fastest that the drives do before they trip; of a number above 16 rad/s, which no arm reaches, its value in \
+               degrees per second if that is less",
+    },
     Rule {
         name: "torque_max_nm",
-        rule: "twice what gravity asks of the joint in its worst pose, a twentieth of the strongest joint's at least",
+        rule: "twice what gravity asks of the joint in its worst pose; at least a twentieth of the strongest joint's, and enough for \
+               an acceleration limit of 3 rad/s²",
     },
     Rule {
         name: "acceleration_max_rad_s2",
-        rule: "a third of the torque that gravity leaves in its worst pose, over the greatest inertia; 12.56 at most",
+        rule: "a third of the torque that gravity leaves in its worst pose, over the greatest inertia (three times the proposed \
+               rotor inertia); at most 12.56, and at most what makes such a rotor lag by a fifth of position_error_max_rad",
     },
     Rule { name: "position_error_max_rad", rule: "0.09 rad, 5°" },
     Rule {
@@ -40,8 +47,9 @@ pub const RULES: [Rule; 10] = [
     },
     Rule {
         name: "pid",
-        rule: "with J, the least inertia over all poses (rotor included, other joints free): Kp = J·(40/s)², Kd = 2·J·40/s, \
-               Ki = 2/s·Kp; the integral holds half of the torque limit",
+        rule: "with J, the least inertia over all poses (a fifth of the proposed rotor inertia, other joints free), and T, delay_ticks \
+               and 3 ms: Kd = 0.7·J/T, less where joints move each other; Kp = 20/s·Kd; Ki = 2/s·Kp, at most a third of Kp·Kd over the \
+               greatest inertia (three times the rotor); the integral holds half of the torque limit",
     },
     Rule {
         name: "friction_polynomial",
@@ -49,10 +57,26 @@ pub const RULES: [Rule; 10] = [
     },
 ];
 
-/// Natural frequency of a joint under its gains, rad/s, with its least inertia.
-const NATURAL: f64 = 40.0;
+/// Kd over the least inertia, times the age of the derivative (J-71).
+const DAMPING: f64 = 0.7;
+/// Half of the time over which the derivative is taken, and half of a tick for which a torque is held, s.
+const DERIVATIVE_AGE: f64 = 3e-3;
+/// Kp over Kd, 1/s.
+const STIFFNESS_RATE: f64 = 20.0;
 /// Ki over Kp, 1/s.
 const INTEGRAL_RATE: f64 = 2.0;
+/// Part of the greatest Ki that is stable without friction.
+const INTEGRAL_PART: f64 = 1.0 / 3.0;
+/// Reserve of the gains at both ends of the rotors that they have to tolerate.
+const RESERVE: f64 = 1.5;
+/// Steps of the search for gains with that reserve.
+const REDUCTIONS: usize = 60;
+/// Acceleration limit (rad/s²) for which a torque limit that is not given is enough.
+const ENOUGH_ACCELERATION: f64 = 3.0;
+/// Part of the torque that gravity leaves for the acceleration limit.
+const ACCELERATION_PART: f64 = 1.0 / 3.0;
+/// Part of the position error limit that a rotor as heavy as it may be lags by.
+const ERROR_PART: f64 = 0.2;
 /// Acceleration (rad/s²) that a drive without a load has with all its torque.
 const ROTOR_ACCELERATION: f64 = 200.0;
 /// Least acceleration limit that is proposed, rad/s²; gravity may leave nothing.
@@ -86,8 +110,7 @@ impl Arm {
         }
         let ranges = self.ranges();
         let worst = worst_gravity(&self.model, gravity, &ranges).map(|w| w.torque);
-        self.propose_torques(&worst);
-        let bounds = self.config().parameter_bounds;
+        self.propose_torques(&worst, &ranges);
         for (j, to) in self.joints.iter_mut().enumerate() {
             if !self.rotors_given[j] {
                 to.rotor_inertia = rounded(to.torque_max / ROTOR_ACCELERATION, 2);
@@ -95,24 +118,23 @@ impl Arm {
             }
         }
         self.rotors_given = [true; JOINTS];
-        let inertia = inertia(&self.model, &self.joints.map(|j| j.rotor_inertia), &ranges);
+        let heavy = self.joints.map(|j| PROPOSED_RANGE.up * j.rotor_inertia);
+        let most = inertia(&self.model, &heavy, &ranges).map(|of| of.most);
+        if self.pid.is_none() {
+            self.pid = Some(self.proposed_gains(&ranges));
+            Joint::ALL.into_iter().for_each(|joint| self.sources.fill_in((Some(joint), "pid")));
+        }
         for (joint, to) in Joint::ALL.into_iter().zip(&mut self.joints) {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
-                let left = (to.torque_max - worst[j]) / 3.0 / inertia[j].most;
-                to.acceleration_max = rounded(left.clamp(LEAST_ACCELERATION, ACCELERATION_SCALE), 3);
+                let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
+                // What the heaviest rotor needs beside the model's torque comes of a position error.
+                let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
+                let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
+                let lag = ERROR_PART * to.position_error_max * kp / unknown;
+                let most = left.min(lag).clamp(LEAST_ACCELERATION, ACCELERATION_SCALE);
+                to.acceleration_max = rounded(most, 3);
             }
-        }
-        if self.pid.is_none() {
-            self.pid = Some(std::array::from_fn(|j| {
-                let least = inertia[j].least;
-                let kp = rounded((least * NATURAL * NATURAL).min(bounds.kp_max), 3);
-                let kd = rounded((2.0 * least * NATURAL).min(bounds.kd_max), 3);
-                let ki = rounded((INTEGRAL_RATE * kp).min(bounds.ki_max), 3);
-                let most = rounded((0.5 * self.joints[j].torque_max / ki).min(bounds.integral_max), 3);
-                PidGains { kp, ki, kd, int_min: -most, int_max: most }
-            }));
-            Joint::ALL.into_iter().for_each(|joint| self.sources.fill_in((Some(joint), "pid")));
         }
         if self.friction().is_none() {
             self.propose_friction(friction);
@@ -126,15 +148,55 @@ impl Arm {
         }
     }
 
+    /// Gains that are stable with the lightest and the heaviest rotors that are to be expected.
+    fn proposed_gains(&self, ranges: &Ranges) -> [PidGains; JOINTS] {
+        let (delay, bounds) = (self.config().delay_ticks, self.config().parameter_bounds);
+        let rotor = |factor: f64| self.joints.map(|j| factor * j.rotor_inertia);
+        let (light, heavy) = (rotor(PROPOSED_RANGE.down), rotor(PROPOSED_RANGE.up));
+        let least = inertia(&self.model, &light, ranges).map(|of: Inertia| of.least);
+        let most = inertia(&self.model, &heavy, ranges).map(|of: Inertia| of.most);
+        let rate = DAMPING / (1e-3 * f64::from(delay) + DERIVATIVE_AGE);
+        let of = |damping: f64, integral: f64| -> [PidGains; JOINTS] {
+            std::array::from_fn(|j| {
+                let kd = rounded((damping * rate * least[j]).min(bounds.kd_max), 3);
+                let kp = rounded((STIFFNESS_RATE * kd).min(bounds.kp_max), 3);
+                let stable = INTEGRAL_PART * kp * kd / most[j];
+                let ki = rounded(integral * (INTEGRAL_RATE * kp).min(stable).min(bounds.ki_max), 3);
+                let most = rounded((0.5 * self.joints[j].torque_max / ki).min(bounds.integral_max), 3);
+                PidGains { kp, ki, kd, int_min: -most, int_max: most }
+            })
+        };
+        let matrices = mass_matrices(&self.model, ranges);
+        let (mut damping, mut integral) = (1.0, 1.0);
+        for _ in 0..REDUCTIONS {
+            let Some(stable) = all_stable(&of(damping, integral), delay) else { break };
+            if !matrices.iter().all(|m| is_heavy_enough(m, &light, &stable, RESERVE)) {
+                damping *= 0.95;
+            } else if !matrices.iter().all(|m| is_light_enough(m, &heavy, &stable, RESERVE)) {
+                integral *= 0.8;
+            } else {
+                break;
+            }
+        }
+        of(damping, integral)
+    }
+
     /// Torque limits that the description does not give: those of another arm would be strangers' numbers.
-    fn propose_torques(&mut self, worst: &[f64; JOINTS]) {
+    fn propose_torques(&mut self, worst: &[f64; JOINTS], ranges: &Ranges) {
         let open = |joint: Joint| self.sources.of((Some(joint), "torque_max_nm")) == Source::Default;
         let open: Vec<usize> = Joint::ALL.into_iter().filter(|j| open(*j)).map(Joint::index).collect();
         let given = (0..JOINTS).filter(|j| !open.contains(j)).map(|j| self.joints[j].torque_max);
         let strongest = given.fold(2.0 * worst.iter().copied().fold(0.0, f64::max), f64::max);
+        let links = inertia(&self.model, &[0.0; JOINTS], ranges);
         for j in open {
-            let torque = (2.0 * worst[j]).max(strongest / 20.0).clamp(0.1, jtc_bus::TORQUE_FULL_SCALE);
-            self.joints[j].torque_max = rounded(torque, 2);
+            let moving = ENOUGH_ACCELERATION / ACCELERATION_PART;
+            let rotor = PROPOSED_RANGE.up / ROTOR_ACCELERATION;
+            let enough = (worst[j] + moving * links[j].most) / (1.0 - moving * rotor);
+            let torque =
+                (2.0 * worst[j]).max(strongest / 20.0).max(enough).clamp(0.1, jtc_bus::TORQUE_FULL_SCALE);
+            let fine = rounded(1.01 * torque, 3).min(jtc_bus::TORQUE_FULL_SCALE);
+            let coarse = rounded(torque, 2);
+            self.joints[j].torque_max = if coarse < enough { fine } else { coarse };
             let place = format!("joint {}", self.joint_names[j]);
             let assumed = |w: &&mut Warning| w.place == place && w.problem.starts_with("effort limit");
             if let Some(warning) = self.warnings.iter_mut().find(assumed) {

@@ -11,7 +11,7 @@ const STARTS: usize = 24;
 /// Rounds of all joints in one search; it mostly ends after three.
 const ROUNDS: usize = 12;
 /// Poses in which inertia is looked at.
-const POSES: usize = 512;
+pub(super) const POSES: usize = 512;
 /// Less than this, relative to the torque, is no gain.
 const GAIN: f64 = 1e-9;
 
@@ -32,7 +32,7 @@ pub(super) struct Inertia {
 }
 
 /// The `n`-th pose of a sequence that fills the ranges evenly (Halton 1960).
-fn pose(n: usize, ranges: &Ranges) -> JointVec {
+pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     const PRIMES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];
     std::array::from_fn(|j| {
         let (mut rest, mut share, mut unit) = (n + 1, 0.0, 1.0);

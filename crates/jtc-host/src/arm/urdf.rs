@@ -28,6 +28,8 @@ struct Chain<'a> {
     flange: Vec<&'a Joint>,
     warnings: Vec<Warning>,
     sources: Sources,
+    /// Names of the joints whose limits give no position.
+    without_ranges: Vec<String>,
 }
 
 /// Standard gravity as arm files have it, m/s², downwards in a description whose z points upwards.
@@ -40,6 +42,7 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
     let robot = urdf_rs::read_from_string(&text).map_err(|e| text::locate(&text, &e.to_string()))?;
     only_once(&robot)?;
     let mut chain = Chain::of(&robot, choice)?;
+    chain.without_ranges = text::without_ranges(&text);
     let model = chain.model()?;
     let joints = chain.limits()?;
     let mut link_names = vec![chain.rotary[0].parent.link.clone()];
@@ -91,7 +94,8 @@ impl<'a> Chain<'a> {
     fn of(robot: &'a Robot, choice: &ArmChoice) -> Result<Self, FileError> {
         let rotary = choose(robot, choice)?;
         let (warnings, sources) = (Vec::new(), Sources::default());
-        let mut chain = Self { robot, rotary, flange: Vec::new(), warnings, sources };
+        let mut chain =
+            Self { robot, rotary, flange: Vec::new(), warnings, sources, without_ranges: Vec::new() };
         chain.find_flange(choice.tip.as_deref());
         for joint in &robot.joints {
             if joint.joint_type != JointType::Fixed && chain.rigid(joint) {

@@ -21,6 +21,16 @@ pub enum ParametersError {
         /// Joint, value and bounds.
         beyond: Beyond,
     },
+    /// The gains do not keep the arm stable.
+    #[error("{arm}: {problem}; nothing was sent")]
+    Unstable {
+        /// Name of the arm.
+        arm: String,
+        /// Which joint, the value and its limit.
+        problem: String,
+        /// What to do about it.
+        next: String,
+    },
     /// The controller needs parameters, and no source of them was named.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
     NoSource {
@@ -46,6 +56,11 @@ impl Diagnose for ParametersError {
                 "beyond-bounds",
                 "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \
                  is unchanged",
+            ),
+            Self::Unstable { next, .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "unstable-gains",
+                format!("{next}; `jtc arm check FILE` lists all of it"),
             ),
             Self::NoSource { .. } => Diagnosis::new(
                 ErrorKind::Refused,

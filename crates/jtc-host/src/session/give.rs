@@ -23,7 +23,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Incomplete`] for an arm without gains or friction, [`ExtensionError::Differs`] when what is read back is
+    /// [`ExtensionError::Incomplete`] for an arm without gains or friction, [`ParametersError::Unstable`](crate::ParametersError) for gains
+    /// with which it is not stable, [`ExtensionError::Differs`] when what is read back is
     /// another one; those of [`Session::set_settings`] and [`Session::push`].
     pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(ArmPart<'_>)) -> Result<Vec<PushReport>, Error> {
         self.push_arm_until(arm, || false, done)
@@ -139,5 +140,6 @@ fn whole(arm: &Arm) -> Result<(ParameterSet, u64), Error> {
     let Some(hash) = arm.hash()? else {
         return Err(ExtensionError::Incomplete { arm: arm.name.clone(), missing: set.missing() }.into());
     };
+    arm.check_gains()?;
     Ok((set, hash))
 }

@@ -108,6 +108,29 @@ points:
 ---
 ";
 
+/// As in files of waypoints: a unit counts in letters of any case, and no option turns the numbers once more.
+#[test]
+fn a_unit_in_a_header_counts_in_letters_of_any_case() {
+    let zeros = ",0,0,0,0,0\n";
+    for (header, position) in [
+        ("t,Q1_DEG,Q2_DEG,Q3_DEG,Q4_DEG,Q5_DEG,Q6_DEG", 1f64.to_radians()),
+        ("T,q1_Deg,q2,q3,q4,q5,q6", 1f64.to_radians()),
+        ("t,\"Q1_DEG\",q2,q3,q4,q5,q6", 1f64.to_radians()),
+        ("TIME_S,Q1_RAD,Q2,Q3,Q4,Q5,Q6", 1.0),
+        ("t,Q1,Q2,Q3,Q4,Q5,Q6_Deg", 1.0),
+    ] {
+        let text = format!("{header}\n0,0{zeros}0.1,0{zeros}1,1{zeros}");
+        let loaded = parse(&text).unwrap();
+        let last = loaded.trajectory.points.last().unwrap().position[0];
+        assert!((last - position).abs() < 1e-9, "{header}: {last}");
+        let error = loaded.in_degrees().expect_err(header).to_string();
+        assert!(error.contains("are known"), "{header}: {error}");
+    }
+    assert!(parse(&format!("t,Q1,Q2,Q3,Q4,Q5,Q6\n0,0{zeros}1,1{zeros}")).unwrap().in_degrees().is_ok());
+    let both = problem(&format!("t,q1,Q1_DEG,q2,q3,q4,q5,q6\n0,0,0{zeros}"));
+    assert!(both.contains("\"Q1_DEG\": this column is there twice"), "{both}");
+}
+
 /// Every column that waypoints have and trajectories have not is known as one of theirs.
 #[test]
 fn columns_of_waypoints_are_known_as_such() {

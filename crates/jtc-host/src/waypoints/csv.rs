@@ -8,12 +8,12 @@ use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, number, rows, short};
 
 /// What the columns are, in words.
-const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
+pub(super) const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
-/// What a column holds.
+/// What a column, or the key of an object, holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Column {
+pub(super) enum Column {
     Time,
     Pose,
     Leg,
@@ -49,12 +49,18 @@ pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
     if waypoints.is_empty() {
         return Err(FileError::at(Place::line(line), "a header and no waypoints"));
     }
-    let units_named = names.iter().any(|name| name.contains("_deg") || name.contains("_rad"));
+    let units_named = names.iter().any(|name| names_unit(name));
     Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
 }
 
-/// What the name of a column says, and the radians in its unit.
-fn column(name: &str) -> Option<(Column, f64)> {
+/// Whether the name of a column says the unit of an angle, in letters of any case.
+pub(super) fn names_unit(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    name.contains("_deg") || name.contains("_rad")
+}
+
+/// What the name of a column says, in letters of any case, and the radians in its unit.
+pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     let name = name.trim_matches('"').to_ascii_lowercase();
     match name.as_str() {
         "t" | "t_s" | "time" | "time_s" => return Some((Column::Time, 1.0)),

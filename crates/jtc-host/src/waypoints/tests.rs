@@ -100,6 +100,85 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     assert!(named.in_degrees().unwrap_err().to_string().contains("are known"));
 }
 
+/// A unit in the name of a column or key counts in letters of any case, and no option turns the numbers once more.
+#[test]
+fn a_unit_in_a_name_counts_in_letters_of_any_case() {
+    let joint_headers = [
+        "Q1_DEG,Q2_DEG,Q3_DEG,Q4_DEG,Q5_DEG,Q6_DEG",
+        "q1_Deg,q2_Deg,q3_Deg,q4_Deg,q5_Deg,q6_Deg",
+        "Q1_deg,Q2,Q3,Q4,Q5,Q6",
+        "q1_dEG,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg",
+        "\"Q1_DEG\",Q2,Q3,Q4,Q5,Q6",
+    ];
+    for header in joint_headers {
+        let text = format!("{header}\n60,0,0,0,0,0\n");
+        let file = WaypointFile::parse(&text).unwrap();
+        assert!(
+            (file.positions(&arm()).unwrap()[0].position[0] - 60f64.to_radians()).abs() < 1e-12,
+            "{text}"
+        );
+        let error = file.in_degrees().expect_err(&text).to_string();
+        assert!(error.contains("are known"), "{text}: {error}");
+    }
+    let keys = header_keys("Q1_DEG Q2 Q3 Q4 Q5 Q6");
+    let mixed = header_keys("q1_Deg q2_deg q3_rad q4 Q5_RAD q6");
+    for text in [format!("[{{{keys}}}]"), format!("{{\"waypoints\": [{{{mixed}}}]}}")] {
+        let file = WaypointFile::parse(&text).unwrap();
+        assert!(
+            (file.positions(&arm()).unwrap()[0].position[0] - 60f64.to_radians()).abs() < 1e-12,
+            "{text}"
+        );
+        assert!(file.in_degrees().is_err(), "{text}");
+    }
+    for named in [
+        "Q1_RAD,Q2,Q3,Q4,Q5,Q6\n1,0,0,0,0,0\n",
+        "X,Y,Z,ROLL_DEG,PITCH_DEG,YAW_DEG\n0.3,0,0.3,0,0,0\n",
+        "x,y,z,Roll,Pitch,Yaw_Rad\n0.3,0,0.3,0,0,0\n",
+        "[{\"x\": 0.3, \"y\": 0, \"z\": 0.3, \"ROLL_DEG\": 0, \"pitch\": 0, \"yaw\": 0}]",
+        "[{\"x\": 0.3, \"y\": 0, \"z\": 0.3, \"roll\": 0, \"pitch\": 0, \"Yaw_rad\": 0}]",
+    ] {
+        let error = WaypointFile::parse(named).unwrap().in_degrees().expect_err(named).to_string();
+        assert!(error.contains("are known"), "{named}: {error}");
+    }
+    let plain = WaypointFile::parse("Q1,Q2,Q3,Q4,Q5,Q6\n90,0,0,0,0,0\n").unwrap();
+    assert!(plain.in_degrees().is_ok());
+}
+
+/// Keys of an object with 60 for the first and 0 for the others.
+fn header_keys(names: &str) -> String {
+    let value = |i: usize| if i == 0 { 60 } else { 0 };
+    names
+        .split(' ')
+        .enumerate()
+        .map(|(i, name)| format!("\"{name}\": {}", value(i)))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Which of two values for one number is meant is not guessed.
+#[test]
+fn two_names_for_one_number_are_refused() {
+    let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";
+    let pose = "\"x\":0.3,\"y\":0,\"z\":0.3,\"roll\":0.1,\"pitch\":0,\"yaw\":0";
+    for (text, words) in [
+        (format!("[{{\"q1\":0,\"q1_deg\":0,{joints}}}]"), "waypoint 1: both q1 and q1_deg"),
+        (format!("[{{\"q1_rad\":0,\"Q1\":0,{joints}}}]"), "waypoint 1: both q1_rad and Q1"),
+        (format!("[{{\"q1\":0,\"q1\":0,{joints}}}]"), "waypoint 1: both q1 and q1"),
+        (format!("[{{{pose},\"roll_deg\":90}}]"), "waypoint 1: both roll and roll_deg"),
+        (format!("[{{\"roll_deg\":90,{pose}}}]"), "waypoint 1: both roll_deg and roll"),
+        (format!("[{{{pose},\"PITCH_DEG\":90}}]"), "waypoint 1: both pitch and PITCH_DEG"),
+        (format!("[{{{pose},\"yaw_rad\":1}}]"), "waypoint 1: both yaw and yaw_rad"),
+        (format!("[{{{pose},\"x_m\":1}}]"), "waypoint 1: both x and x_m"),
+        ("[{\"pose\":\"home\",\"name\":\"home\"}]".into(), "waypoint 1: both pose and name"),
+        ("[{\"pose\":\"home\",\"t\":1,\"time\":1}]".into(), "waypoint 1: both t and time"),
+        ("x,y,z,roll,pitch,yaw,roll_deg\n0,0,0,0,0,0,0\n".into(), "\"roll_deg\": this column is there twice"),
+        ("x,y,z,roll,pitch,yaw,YAW_DEG\n0,0,0,0,0,0,0\n".into(), "\"YAW_DEG\": this column is there twice"),
+    ] {
+        let error = WaypointFile::parse(&text).expect_err(&text).to_string();
+        assert!(error.contains(words), "{text}: {error}");
+    }
+}
+
 #[test]
 fn a_broken_file_is_refused_with_its_place() {
     for (text, words) in [

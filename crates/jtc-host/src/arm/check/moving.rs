@@ -6,15 +6,12 @@ use jtc_wire::Joint;
 
 use super::{ArmFinding, Holding};
 use crate::arm::Arm;
-use crate::arm::statics::{Inertia, Worst, inertia, worst_gravity};
+use crate::arm::statics::{Worst, worst_gravity};
 
 /// Share of the torque limit above which gravity leaves little for motion.
 const LITTLE_LEFT: f64 = 0.8;
 /// Torque limits so many times above what gravity asks of any joint are suspected to be in another unit.
 const FAR_ABOVE: f64 = 15.0;
-/// Kd over inertia, 1/s, from which the age of the derivative makes a joint oscillate: it is taken over 5 ms, of positions that
-/// are 2 ms old.
-const DERIVATIVE_MAX: f64 = 250.0;
 
 impl Arm {
     pub(super) fn find_holding(&self, findings: &mut Vec<ArmFinding>) -> Vec<Holding> {
@@ -83,45 +80,6 @@ impl Arm {
                 .next("torque_max_nm from the data sheet of the drives: it is what protects arm and people");
             found.name = Some("torque_max_nm");
             findings.push(found.measured(limit, torque, "N·m"));
-        }
-    }
-
-    pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) {
-        let Some(pid) = &self.pid else { return };
-        let inertia = inertia(&self.model, &self.joints.map(|j| j.rotor_inertia), &self.ranges());
-        for (joint, (gains, Inertia { least, most })) in Joint::ALL.into_iter().zip(pid.iter().zip(inertia)) {
-            let rate = gains.kd / least;
-            let mut warn = |what: String, value, limit, unit, why: &str, next: &str| {
-                let what = format!("{}: {what}", self.titled(joint));
-                let found = ArmFinding::new(Severity::Warning, "gains", what).because(why).next(next);
-                findings.push(found.of(joint, "pid").measured(value, limit, unit));
-            };
-            if rate > DERIVATIVE_MAX {
-                let what = format!(
-                    "Kd {} N·m·s/rad on {least:.4} kg·m² is {rate:.0}/s, more than {DERIVATIVE_MAX}/s",
-                    gains.kd
-                );
-                let why = "the derivative is some 5 ms late, and such a joint oscillates";
-                warn(
-                    what,
-                    rate,
-                    DERIVATIVE_MAX,
-                    "1/s",
-                    why,
-                    "a smaller Kd, or the rotor inertia, if that is missing",
-                );
-            }
-            // Routh: Ki·J < Kp·Kd. Friction damps beyond that.
-            let (swing, damped) = (gains.ki * most, gains.kp * gains.kd);
-            if swing > damped && gains.ki > 0.0 {
-                let what = format!(
-                    "Ki {} is more than Kp·Kd/J, {:.0}, with J = {most:.3} kg·m²",
-                    gains.ki,
-                    damped / most
-                );
-                let why = "without friction the integral swings the joint up";
-                warn(what, gains.ki, damped / most, "N·m/(rad·s)", why, "a smaller Ki or a larger Kd");
-            }
         }
     }
 }

@@ -109,13 +109,73 @@ fn torque_limits_in_another_unit_are_suspected() {
     assert!(found(&arm).contains(&("unit", Severity::Warning, None)));
 }
 
+/// Never with the words that a controller takes the arm: each is refused.
 #[test]
-fn j41_gains_that_swing_up_are_warned_of() {
-    let mut arm = Arm::avena();
-    let pid = arm.pid.as_mut().unwrap();
-    pid[3].kd = 400.0;
-    pid[4].kd = 1.0;
-    assert_eq!(found(&arm), [("gains", Severity::Warning, Some(4)), ("gains", Severity::Warning, Some(5))]);
+fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
+    use Severity::Problem;
+    let with = |change: &dyn Fn(&mut [jtc_core::PidGains; JOINTS])| {
+        let mut arm = Arm::avena();
+        change(arm.pid.as_mut().unwrap());
+        let checked = arm.check();
+        let gains: Vec<_> = found(&arm).into_iter().filter(|f| f.0 == "gains").collect();
+        assert_eq!(checked.is_refused(), !gains.is_empty());
+        assert_eq!(checked.rotor_margins.is_some(), gains.is_empty());
+        gains
+    };
+    let of = |joints: &[u8]| joints.iter().map(|j| ("gains", Problem, Some(*j))).collect::<Vec<_>>();
+    assert_eq!(with(&|pid| (pid[3].kd, pid[4].kd) = (400.0, 1.0)), of(&[4, 5]));
+    assert_eq!(with(&|pid| pid[0].ki = 0.0), of(&[]));
+    assert_eq!(with(&|pid| pid[5].kd = 300.0), of(&[6]));
+    assert_eq!(with(&|pid| pid[1].ki = 50_000.0), of(&[2]));
+    assert_eq!(with(&|pid| pid[2].kp = 1.0), of(&[3]));
+    assert_eq!(with(&|pid| pid[2].kd = 0.0), of(&[3]));
+    assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 30.0)).len(), JOINTS);
+    assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
+}
+
+/// Rotor inertias with which the same gains are stable still, and a little further are not.
+#[test]
+fn j71_the_rotor_margin_is_where_the_check_changes() {
+    let arm = Arm::avena();
+    let margins = arm.check().rotor_margins.unwrap();
+    let scaled = |of: &dyn Fn(usize) -> bool, factor: f64| {
+        let mut arm = Arm::avena();
+        let joints = arm.joints.iter_mut().enumerate().filter(|(j, _)| of(*j));
+        joints.for_each(|(_, limits)| limits.rotor_inertia *= factor);
+        arm.check().findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem)
+    };
+    let all = |_: usize| true;
+    assert!(margins.all.down > 0.0 && margins.all.down < 0.5 && margins.all.up > 2.0, "{margins:?}");
+    assert!(!scaled(&all, 1.02 * margins.all.down) && scaled(&all, 0.98 * margins.all.down));
+    assert!(!scaled(&all, 0.98 * margins.all.up) && scaled(&all, 1.02 * margins.all.up));
+    for (j, alone) in margins.joints.iter().enumerate() {
+        assert!(alone.down <= margins.all.down && alone.up >= margins.all.up, "{margins:?}");
+        let one = |k: usize| k == j;
+        assert!(!scaled(&one, 1.02 * alone.down) && !scaled(&one, 0.98 * alone.up), "joint {}", j + 1);
+        assert!(alone.down == 0.0 || scaled(&one, 0.97 * alone.down), "joint {}", j + 1);
+    }
+    let words = |arm: &Arm| {
+        arm.check().findings.into_iter().find(|f| f.code == "gains").map(|f| f.finding.what).unwrap()
+    };
+    assert!(words(&arm).contains(" times the rotor inertias; each joint alone "), "{}", words(&arm));
+}
+
+/// As long as nobody has measured them, rotors may be off by more than a measured one.
+#[test]
+fn gains_that_do_not_tolerate_a_proposed_rotor_are_refused() {
+    let with = |proposed: bool, factor: f64| {
+        let mut arm = Arm::avena();
+        arm.pid.as_mut().unwrap().iter_mut().for_each(|g| {
+            (g.kp, g.ki, g.kd) = (g.kp * factor, g.ki * factor * factor, g.kd * factor);
+        });
+        if proposed {
+            Joint::ALL.into_iter().for_each(|j| arm.sources.propose((Some(j), "rotor_inertia_kg_m2")));
+        }
+        found(&arm).into_iter().filter(|f| f.0 == "gains").collect::<Vec<_>>()
+    };
+    assert_eq!(with(false, 1.5), []);
+    assert_eq!(with(true, 1.5), [("gains", Severity::Problem, None)]);
+    assert_eq!(with(true, 0.5), []);
 }
 
 #[test]

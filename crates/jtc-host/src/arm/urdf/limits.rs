@@ -1,5 +1,7 @@
 //! Limits of a robot description's joints, and what the drives can do of them.
 
+use std::f64::consts::PI;
+
 use jtc_core::{Config, JOINTS, JointConfig, WORKING_AREA};
 use jtc_wire::Joint as Number;
 use urdf_rs::{Joint, JointType};
@@ -9,6 +11,13 @@ use super::choice::about;
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
+/// Most that a multi-turn joint has to either side, rad. Greater numbers are degrees.
+const TWO_TURNS: f64 = 4.0 * PI;
+/// A turn, with the digits that descriptions round it to, rad.
+const TURN: f64 = 6.3;
+/// No arm turns a joint faster, rad/s: 900 °/s are the fastest wrists. Greater numbers are degrees per second, or fill the field.
+const BELIEVABLE_SPEED: f64 = 16.0;
+
 /// As many digits as a person reads.
 pub(super) fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
@@ -16,6 +25,52 @@ pub(super) fn short(value: f64) -> f64 {
 
 fn is_limit(value: f64) -> bool {
     value > 0.0 && value.is_finite()
+}
+
+/// The highest velocity limit that the drives take, rad/s.
+fn fastest() -> f64 {
+    let drives = Config::avena();
+    drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor
+}
+
+/// Refuses position limits that are no range in rad: another number is not guessed, because the widest range that the drives have
+/// would take the arm into its stops. Whether both limits are beyond a turn, as those of some wrists are.
+fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
+        return Err(about(
+            joint,
+            format!("position limit {limit} is not a number: write both limits in rad"),
+        ));
+    }
+    if lower == upper {
+        let problem = format!(
+            "position limits {lower}..{upper} rad leave no way: write both limits in rad, or type=\"fixed\" for a joint that does not move"
+        );
+        return Err(about(joint, problem));
+    }
+    if lower > upper {
+        return Err(about(joint, format!("lower limit {lower} is not below upper {upper}")));
+    }
+    let beyond = |limit: &f64| limit.is_finite() && limit.abs() > TURN;
+    let degrees: Vec<String> = [lower, upper]
+        .iter()
+        .filter(|limit| beyond(limit))
+        .map(|limit| format!("{limit}° are {} rad", short(limit.to_radians())))
+        .collect();
+    if degrees.is_empty() {
+        return Ok(false);
+    }
+    if (-TWO_TURNS..-TURN).contains(&lower) && (TURN..TWO_TURNS).contains(&upper) {
+        return Ok(true);
+    }
+    let problem = format!(
+        "position limits {}..{} rad are beyond a turn. Degrees? {}. Write rad, or type=\"continuous\" for a joint without stops",
+        short(lower),
+        short(upper),
+        degrees.join(", ")
+    );
+    Err(about(joint, problem))
 }
 
 impl Chain<'_> {
@@ -42,29 +97,57 @@ impl Chain<'_> {
     fn position(&mut self, number: Number, joint: &Joint, to: &mut JointConfig) -> Result<(), FileError> {
         let (lower, upper) = (joint.limit.lower, joint.limit.upper);
         let endless = joint.joint_type == JointType::Continuous;
-        if endless || lower == 0.0 && upper == 0.0 || !lower.is_finite() || !upper.is_finite() {
-            // As far as the drives go; whether the mechanism has a stop is not given.
-            (to.position_min, to.position_max) = (-WORKING_AREA, WORKING_AREA);
+        let given = !endless && !self.without_ranges.contains(&joint.name);
+        let ends = if given { (lower, upper) } else { (f64::NEG_INFINITY, f64::INFINITY) };
+        (to.position_min, to.position_max) = ends;
+        if given && turns_more_than_once(joint)? {
             for key in ["position_min_rad", "position_max_rad"] {
                 self.sources.fill_in((Some(number), key));
             }
-            let why = if endless { "turns without end" } else { "has" };
-            let problem =
-                format!("{why}, no position limits: {}..{} rad are used", -WORKING_AREA, WORKING_AREA);
-            let problem = problem.replace("has, no", "no");
-            self.warn(Change::LimitAssumed, format!("joint {}", joint.name), problem);
-        } else if lower >= upper {
-            return Err(about(joint, format!("lower limit {lower} is not below upper {upper}")));
-        } else {
-            (to.position_min, to.position_max) = (lower, upper);
         }
+        // As far as the drives go where there is no limit; whether the mechanism has a stop is not given.
+        let mut assumed = Vec::new();
+        for (key, limit, end) in [
+            ("position_min_rad", &mut to.position_min, -WORKING_AREA),
+            ("position_max_rad", &mut to.position_max, WORKING_AREA),
+        ] {
+            if limit.is_infinite() {
+                *limit = end;
+                self.sources.fill_in((Some(number), key));
+                assumed.push(end);
+            }
+        }
+        let words = match assumed.as_slice() {
+            [] => return Ok(()),
+            [end] => format!("no position limit on one side: {end} rad is used there"),
+            _ if endless => {
+                format!(
+                    "turns without end, no position limits: {}..{} rad are used",
+                    -WORKING_AREA, WORKING_AREA
+                )
+            }
+            _ => format!("no position limits: {}..{} rad are used", -WORKING_AREA, WORKING_AREA),
+        };
+        self.warn(Change::LimitAssumed, format!("joint {}", joint.name), words);
         Ok(())
     }
 
     fn dynamic_limits(&mut self, number: Number, joint: &Joint, to: &mut JointConfig) {
         let (place, limit) = (format!("joint {}", joint.name), &joint.limit);
-        if is_limit(limit.velocity) {
+        if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
+        } else if is_limit(limit.velocity) {
+            // The slower of what it can mean: the drives' own end is no limit that anybody gave.
+            let in_degrees = limit.velocity.to_radians();
+            to.velocity_max = in_degrees.min(fastest());
+            self.sources.fill_in((Some(number), "velocity_max_rad_s"));
+            let problem = format!(
+                "velocity limit {}: no arm reaches that in rad/s; {0} °/s are {} rad/s; {} rad/s is used",
+                limit.velocity,
+                short(in_degrees),
+                short(to.velocity_max)
+            );
+            self.warn(Change::LimitAssumed, &place, problem);
         } else {
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));
             let problem = format!("velocity limit {}: {} rad/s is used", limit.velocity, to.velocity_max);
@@ -88,7 +171,7 @@ impl Chain<'_> {
     /// (J-35, J-43).
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) -> Result<(), FileError> {
         let drives = Config::avena();
-        let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
+        let fastest = fastest();
         let strongest = jtc_bus::TORQUE_FULL_SCALE;
         for (rotary, to) in self.rotary.into_iter().zip(joints) {
             let place = format!("joint {}", rotary.name);

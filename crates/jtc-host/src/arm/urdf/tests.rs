@@ -271,6 +271,134 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
     assert!(assumed.contains(&format!("joint a2: {words}")), "{assumed:?}");
 }
 
+/// The widest range that the drives have is never taken for one that is not believed: that would drive the joint into its stops.
+#[test]
+fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
+    let with = |limits: &str| {
+        robot(&parts(), "").replacen("lower=\"-1.5\" upper=\"1.5\"", limits, 2).replacen(
+            limits,
+            "lower=\"-1\" upper=\"1\"",
+            1,
+        )
+    };
+    for (limits, words) in [
+        (
+            "lower=\"-90\" upper=\"90\"",
+            "-90..90 rad are beyond a turn. Degrees? -90° are -1.5708 rad, 90° are 1.5708 rad",
+        ),
+        ("lower=\"-170\" upper=\"170\"", "170° are 2.9671 rad"),
+        (
+            "lower=\"-1.57\" upper=\"90\"",
+            "-1.57..90 rad are beyond a turn. Degrees? 90° are 1.5708 rad. Write rad",
+        ),
+        ("lower=\"-90\" upper=\"1.57\"", "Degrees? -90° are -1.5708 rad. Write rad"),
+        ("lower=\"0\" upper=\"150\"", "150° are 2.618 rad"),
+        ("lower=\"-150\" upper=\"0\"", "-150° are -2.618 rad"),
+        ("lower=\"-10\" upper=\"170\"", "-10° are -0.1745 rad, 170° are 2.9671 rad"),
+        ("lower=\"-5\" upper=\"7\"", "7° are 0.1222 rad"),
+        ("lower=\"10\" upper=\"12\"", "10° are 0.1745 rad, 12° are 0.2094 rad"),
+        ("lower=\"-360\" upper=\"360\"", "360° are 6.2832 rad"),
+        ("lower=\"-1e6\" upper=\"1e6\"", "type=\"continuous\" for a joint without stops"),
+        ("lower=\"-inf\" upper=\"90\"", "90° are 1.5708 rad"),
+        ("lower=\"nan\" upper=\"1\"", "position limit NaN is not a number"),
+        ("lower=\"-1\" upper=\"NaN\"", "position limit NaN is not a number"),
+        ("lower=\"0\" upper=\"0\"", "position limits 0..0 rad leave no way"),
+        ("lower=\"0.5\" upper=\"0.5\"", "position limits 0.5..0.5 rad leave no way"),
+        ("lower=\"0\"", "position limits 0..0 rad leave no way"),
+    ] {
+        let text = with(limits);
+        for error in [
+            Arm::from_urdf(&text).expect_err(limits),
+            Arm::import_text(&text, &ArmChoice::default()).expect_err(limits),
+        ] {
+            let error = error.to_string();
+            assert!(error.starts_with(", joint a2: ") && error.contains(words), "{limits}: {error}");
+        }
+        // A joint without stops stays one.
+        let endless = text.replacen("\"a2\" type=\"revolute\"", "\"a2\" type=\"continuous\"", 1);
+        assert!(Arm::from_urdf(&endless).is_ok(), "{limits}");
+    }
+}
+
+/// What is narrower stays, what is open on one side is marked there, and a wrist of more than a turn is cut and marked.
+#[test]
+fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
+    let second = |limits: &str| {
+        let text = robot(&parts(), "");
+        let (before, after) = text.split_once("name=\"a2\"").unwrap();
+        let after = after.replacen("lower=\"-1.5\" upper=\"1.5\"", limits, 1);
+        Arm::import_text(&format!("{before}name=\"a2\"{after}"), &ArmChoice::default()).unwrap()
+    };
+    let (file, proposed) = (Source::File, Source::Proposed);
+    for (limits, range, sources) in [
+        ("lower=\"-1.57\" upper=\"1.2\"", (-1.57, 1.2), (file, file)),
+        ("lower=\"-0.1\" upper=\"0\"", (-0.1, 0.0), (file, file)),
+        ("upper=\"2\"", (0.0, 2.0), (file, file)),
+        ("lower=\"-3.1416\" upper=\"3.1416\"", (-2.9905, 2.9905), (file, file)),
+        ("lower=\"-6.2832\" upper=\"6.2832\"", (-2.9905, 2.9905), (file, file)),
+        ("lower=\"-6.9813\" upper=\"6.9813\"", (-2.9905, 2.9905), (proposed, proposed)),
+        ("lower=\"-1\" upper=\"inf\"", (-1.0, 2.9905), (file, proposed)),
+        ("lower=\"-inf\" upper=\"1\"", (-2.9905, 1.0), (proposed, file)),
+        ("lower=\"-inf\" upper=\"inf\"", (-2.9905, 2.9905), (proposed, proposed)),
+        ("", (-2.9905, 2.9905), (proposed, proposed)),
+    ] {
+        let arm = second(limits);
+        let joint = &arm.joints[1];
+        assert_eq!((joint.position_min, joint.position_max), range, "{limits}");
+        let two = jtc_wire::Joint::from_number(2);
+        let of = |key| arm.sources.of((two, key));
+        assert_eq!((of("position_min_rad"), of("position_max_rad")), sources, "{limits}");
+        let marked =
+            arm.check().findings.iter().any(|f| f.code == "proposed" && f.name == Some("position_max_rad"));
+        assert_eq!(marked, sources.1 == proposed, "{limits}");
+        assert_eq!(arm.sources.of((jtc_wire::Joint::from_number(3), "position_min_rad")), file, "{limits}");
+    }
+}
+
+/// A velocity that no arm reaches is degrees per second, or fills the field. The slower of both is used, and marked for the check.
+#[test]
+fn a_velocity_that_is_not_believed_is_marked_and_never_the_fastest_in_silence() {
+    for (velocity, used, marked) in [
+        ("1.2", 1.2, false),
+        ("3.15", 1.5, false),
+        ("7.33", 1.5, false),
+        ("15.7", 1.5, false),
+        ("17", 17f64.to_radians(), true),
+        ("20", 20f64.to_radians(), true),
+        ("30", 30f64.to_radians(), true),
+        ("45", 45f64.to_radians(), true),
+        ("85", 85f64.to_radians(), true),
+        ("90", 1.5, true),
+        ("100", 1.5, true),
+        ("180", 1.5, true),
+        ("1000", 1.5, true),
+        ("1e30", 1.5, true),
+    ] {
+        let text = robot(&parts(), "").replacen("velocity=\"1.2\"", &format!("velocity=\"{velocity}\""), 1);
+        let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
+        assert!(
+            (arm.joints[0].velocity_max - used).abs() < 1e-9,
+            "{velocity}: {}",
+            arm.joints[0].velocity_max
+        );
+        let one = jtc_wire::Joint::from_number(1);
+        let source = arm.sources.of((one, "velocity_max_rad_s"));
+        assert_eq!(source == Source::Proposed, marked, "{velocity}");
+        let found = arm.check().findings.into_iter().any(|f| {
+            f.code == "proposed"
+                && f.name == Some("velocity_max_rad_s")
+                && f.finding.what.contains("joint 1,")
+        });
+        assert_eq!(found, marked, "{velocity}");
+        let said = changes(&arm, Change::LimitAssumed);
+        assert_eq!(
+            said.iter().any(|w| w.contains("no arm reaches that in rad/s")),
+            marked,
+            "{velocity}: {said:?}"
+        );
+    }
+}
+
 #[test]
 fn j43_limits_beyond_the_drives_are_cut_with_a_word_and_never_turned_around() {
     let with = |limit: &str| robot(&parts(), "").replacen(LIMIT, limit, 1);

@@ -91,6 +91,28 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
+/// Names of the joints whose limits give neither a lower nor an upper position: the reader makes 0 of both.
+pub(super) fn without_ranges(text: &str) -> Vec<String> {
+    let mut joints: Vec<(String, bool)> = Vec::new();
+    for tag in tags(text).filter(|tag| !tag.closes) {
+        if tag.depth == 1 {
+            joints.push((name(&tag), false));
+        } else if tag.depth == 2
+            && tag.text.starts_with("<limit")
+            && let Some((_, given)) = joints.last_mut()
+        {
+            *given |= has_attribute(&tag, &["lower", "upper"]);
+        }
+    }
+    let lacking = joints.into_iter().filter(|(_, given)| !given);
+    lacking.filter_map(|(name, _)| name.strip_prefix("joint ").map(str::to_owned)).collect()
+}
+
+/// Whether a tag has one of these attributes.
+fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
+    tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
+}
+
 /// The error of the reader about a text, at the element that it is about: the reader names what is wrong, not where.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");

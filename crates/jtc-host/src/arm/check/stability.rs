@@ -1,0 +1,178 @@
+//! Whether the gains keep the arm stable, and how far its rotor inertias may be from those of the file.
+
+use host_kit::{Finding, Severity};
+use jtc_core::{JOINTS, PidGains};
+use jtc_wire::Joint;
+use serde::Serialize;
+
+use super::{ArmFinding, numbers};
+use crate::arm::gains::{PROPOSED_RANGE, StableInertia, all_stable, mass_matrices, rotor_margin};
+use crate::arm::statics::{Inertia, inertia};
+use crate::arm::{Arm, RotorMargin, Source};
+use crate::error::ParametersError;
+
+/// How far the rotor inertias may be from those of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RotorMargins {
+    /// All of them by the same factor.
+    pub all: RotorMargin,
+    /// Each by itself, base to wrist.
+    pub joints: [RotorMargin; JOINTS],
+}
+
+impl Arm {
+    /// Refuses gains with which the arm is not stable, as [`Arm::check`] does. Where gains or rotor inertias are not given, there is
+    /// nothing to compare.
+    ///
+    /// # Errors
+    ///
+    /// [`ParametersError::Unstable`] with the first such finding.
+    pub fn check_gains(&self) -> Result<(), ParametersError> {
+        let mut findings = Vec::new();
+        if self.is_physical().is_ok() {
+            self.find_gains(&mut findings);
+        }
+        match findings.into_iter().find(|found| found.finding.severity == Severity::Problem) {
+            Some(ArmFinding { finding: Finding { what, why, next, .. }, .. }) => {
+                let problem = format!("{what}: {why}");
+                Err(ParametersError::Unstable { arm: self.name.clone(), problem, next })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Why the gains are not stable, joint by joint; else how far the rotors may be from those of the file. `None` where gains or
+    /// rotors are not given.
+    pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
+        let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
+        let delay = self.config().delay_ticks;
+        let rotor = self.joints.map(|j| j.rotor_inertia);
+        let ranges = self.ranges();
+        let moved = inertia(&self.model, &rotor, &ranges);
+        let unstable: Vec<ArmFinding> = Joint::ALL
+            .into_iter()
+            .zip(pid.iter().zip(moved))
+            .filter_map(|(joint, (gains, moved))| self.unstable_joint(joint, gains, moved, delay))
+            .collect();
+        if !unstable.is_empty() {
+            findings.extend(unstable);
+            return None;
+        }
+        let stable = all_stable(pid, delay)?;
+        let matrices = mass_matrices(&self.model, &ranges);
+        let margin = |of: [bool; JOINTS]| rotor_margin(&matrices, &rotor, &stable, of);
+        let Some(all) = margin([true; JOINTS]) else {
+            let what = "the gains are not stable together, though those of each joint alone are";
+            findings.push(
+                unstable_gains(what.to_owned())
+                    .because("joints that move each other have less inertia together")
+                    .next("smaller gains of all joints, with the same ratios"),
+            );
+            return None;
+        };
+        let joints = std::array::from_fn(|j| margin(std::array::from_fn(|k| k == j)).unwrap_or(all));
+        let margins = RotorMargins { all, joints };
+        findings.push(self.proposed_rotors(margin).unwrap_or_else(|| stable_gains(&margins, &rotor)));
+        Some(margins)
+    }
+
+    fn unstable_joint(
+        &self,
+        joint: Joint,
+        gains: &PidGains,
+        Inertia { least, most }: Inertia,
+        delay: u8,
+    ) -> Option<ArmFinding> {
+        let titled = self.titled(joint);
+        let PidGains { kp, ki, kd, .. } = gains;
+        let Some(stable) = StableInertia::of(gains, delay) else {
+            let what = format!("{titled}: Kp {kp}, Ki {ki} and Kd {kd} are stable with no inertia");
+            let found = unstable_gains(what).because("too little damping, or none");
+            return Some(found.next("a larger Kd, or a smaller Kp and Ki").of(joint, "pid"));
+        };
+        let found = if least < stable.least {
+            let kd_max = kd * least / stable.least;
+            unstable_gains(format!(
+                "{titled}: Kd {kd} N·m·s/rad is stable from {:.3} kg·m² on, the joint has {least:.3} kg·m²",
+                stable.least
+            ))
+            .because("the derivative is some 5 ms late, and such a joint oscillates")
+            .next(format!(
+                "Kd below {kd_max:.3}, better half of it, and Kp and Ki with it; or the rotor inertia, if that is missing"
+            ))
+            .measured(least, stable.least, "kg·m²")
+        } else if most > stable.most {
+            let ki_max = ki * stable.most / most;
+            unstable_gains(format!(
+                "{titled}: Ki {ki} N·m/(rad·s) is stable up to {:.3} kg·m², the joint has {most:.3} kg·m²",
+                stable.most
+            ))
+            .because("the integral makes the joint oscillate, unless its friction damps it")
+            .next(format!("Ki below {ki_max:.0}, better a third of it, or a larger Kd"))
+            .measured(most, stable.most, "kg·m²")
+        } else {
+            return None;
+        };
+        Some(found.of(joint, "pid"))
+    }
+
+    /// Rotors that nobody has measured, and gains that do not tolerate how far such a proposal may be off.
+    fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
+        let name = "rotor_inertia_kg_m2";
+        let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
+        let proposed: Vec<Joint> = Joint::ALL.into_iter().filter(is_proposed).collect();
+        let of = Joint::ALL.map(|joint| is_proposed(&joint));
+        let RotorMargin { down, up } = margin(of)?;
+        if proposed.is_empty() || down <= PROPOSED_RANGE.down && up >= PROPOSED_RANGE.up {
+            return None;
+        }
+        let what = format!(
+            "the gains are stable with {} times the proposed rotor inertias of {} only, {} is needed",
+            range(down, up),
+            numbers(&proposed),
+            range(PROPOSED_RANGE.down, PROPOSED_RANGE.up)
+        );
+        let found = unstable_gains(what)
+            .because("a proposed rotor inertia may be off by that much, and the arm oscillates then")
+            .next(
+                "the rotor inertia from the data sheet (then take it out of `proposed`), or import the description again: \
+                 `jtc arm import` proposes gains that tolerate it",
+            );
+        Some(ArmFinding { name: Some(name), ..found })
+    }
+}
+
+fn unstable_gains(what: String) -> ArmFinding {
+    ArmFinding::new(Severity::Problem, "gains", what)
+}
+
+fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
+    let what = if rotor.iter().all(|r| *r == 0.0) {
+        "the gains are stable in every pose".to_owned()
+    } else {
+        let each = margins.joints.map(|RotorMargin { down, up }| range(down, up));
+        let all = range(margins.all.down, margins.all.up);
+        format!(
+            "the gains are stable in every pose, and with {all} times the rotor inertias; each joint alone {}",
+            each.join(", ")
+        )
+    };
+    ArmFinding::new(Severity::Good, "gains", what)
+}
+
+/// `0.08..12`, with two digits that are on the safe side.
+fn range(down: f64, up: f64) -> String {
+    // What is a number of two digits stays one.
+    const ROUNDING: f64 = 1e-9;
+    format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
+}
+
+fn digits(value: f64, round: fn(f64) -> f64) -> String {
+    if value <= 0.0 {
+        return "0".to_owned();
+    }
+    let digits = 1 - value.log10().floor() as i32;
+    let (scale, places) = (10f64.powi(digits), digits.max(0) as usize);
+    let text = format!("{:.places$}", round(value * scale) / scale);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}

@@ -1,0 +1,185 @@
+//! How much inertia the gains of an arm tolerate, in the loop that the controller closes (J-41, J-71).
+//!
+//! The loop of one joint: a position is read, its torque acts `delay_ticks` later and for one tick, and the derivative is taken
+//! over five ticks. Such a loop is stable between two inertias. Below the lower one the derivative is too late, above the upper
+//! one the integral is too strong.
+//!
+//! Joints that move each other: with D the lower and U the upper inertias of the joints and M the mass matrix with rotors, the arm
+//! is stable where M − D and U − M are positive definite. This is exact where the gains of all joints have the same ratios.
+
+use std::f64::consts::PI;
+
+use jtc_core::{JOINTS, PidGains};
+use jtc_dynamics::{ArmModel, Dynamics, JointVec};
+
+use super::statics::{POSES, Ranges, pose};
+
+/// Tick of the controller, s.
+const DT: f64 = 1e-3;
+/// Ticks over which the controller takes the derivative (J-41).
+const WINDOW: f64 = 5.0;
+/// Steps of the search along the frequency, from [`SLOWEST`] to half of the tick rate.
+const STEPS: i32 = 400;
+/// Lowest frequency of the search, rad per tick.
+const SLOWEST: f64 = 1e-6;
+/// Rotor inertias, as factors of the proposed ones, that gains have to tolerate as long as nobody has measured the rotor: drives
+/// of one family differ by so much.
+pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
+/// Lightest and heaviest rotor that is tried, as a factor.
+const FACTORS: (f64, f64) = (0.0, 1000.0);
+
+type Matrix = [[f64; JOINTS]; JOINTS];
+
+/// The inertias (kg·m²) between which a joint is stable under its gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StableInertia {
+    /// Below it, the derivative is too late.
+    pub least: f64,
+    /// Above it, the integral is too strong; infinite without one.
+    pub most: f64,
+}
+
+/// Rotor inertias, as factors of those in the file, between which the arm is stable.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct RotorMargin {
+    /// Lowest factor; 0: also without a rotor.
+    pub down: f64,
+    /// Highest factor; 1000: that or more.
+    pub up: f64,
+}
+
+impl StableInertia {
+    /// `None`: these gains hold no inertia, or are no numbers.
+    ///
+    /// With θ the frequency in rad per tick, the loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), H being the control law with the
+    /// delay and half a tick of hold. So the inertia at a change of stability is that factor of H where H is real.
+    pub fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
+        let turned = |theta: f64| {
+            let half = 0.5 * gains.ki * DT;
+            let d = gains.kd / (WINDOW * DT);
+            let real = gains.kp + half + d * (1.0 - (WINDOW * theta).cos());
+            let imaginary = d * (WINDOW * theta).sin() - half / (0.5 * theta).tan();
+            let (s, c) = (theta * (f64::from(delay_ticks) + 0.5)).sin_cos();
+            (real * c + imaginary * s, imaginary * c - real * s)
+        };
+        let inertia = |theta: f64| {
+            let (s, c) = (0.5 * theta).sin_cos();
+            0.25 * DT * DT * c / (s * s) * turned(theta).0
+        };
+        let crossing = |mut low: f64, mut high: f64| {
+            let rises = turned(high).1 > 0.0;
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if (turned(middle).1 > 0.0) == rises { high = middle } else { low = middle }
+            }
+            inertia(0.5 * (low + high))
+        };
+        let theta = |step: i32| SLOWEST * (PI / SLOWEST).powf(f64::from(step) / f64::from(STEPS));
+        let mut found = Self { least: 0.0, most: f64::INFINITY };
+        let mut leads = turned(theta(0)).1 > 0.0;
+        let mut has_led = leads;
+        for step in 1..STEPS {
+            let (before, at) = (theta(step - 1), theta(step));
+            let now = turned(at).1 > 0.0;
+            if now && !leads && !has_led {
+                found.most = crossing(before, at);
+                has_led = true;
+            } else if leads && !now {
+                found.least = found.least.max(crossing(before, at));
+            }
+            leads = now;
+        }
+        (has_led && found.least > 0.0 && found.least < found.most).then_some(found)
+    }
+}
+
+/// Between which inertias each joint is stable; `None` where a joint never is.
+pub(super) fn all_stable(gains: &[PidGains; JOINTS], delay_ticks: u8) -> Option<[StableInertia; JOINTS]> {
+    let each: Vec<StableInertia> = gains.iter().filter_map(|g| StableInertia::of(g, delay_ticks)).collect();
+    each.try_into().ok()
+}
+
+/// Mass matrices without rotors in poses all over the ranges.
+pub(super) fn mass_matrices(model: &ArmModel, ranges: &Ranges) -> Vec<Matrix> {
+    let dynamics = Dynamics::new(model, [0.0; 3]);
+    (0..POSES).map(|n| dynamics.mass_matrix(&pose(n, ranges))).collect()
+}
+
+/// Whether a symmetric matrix is positive definite (Cholesky).
+fn is_positive(mut a: Matrix) -> bool {
+    for k in 0..JOINTS {
+        // NaN is not positive.
+        if !(a[k][k] > 0.0) {
+            return false;
+        }
+        for i in k + 1..JOINTS {
+            let factor = a[i][k] / a[k][k];
+            for j in k + 1..=i {
+                a[i][j] -= factor * a[j][k];
+            }
+        }
+    }
+    true
+}
+
+/// The mass matrix with these rotors is not below `stable` times `reserve`.
+pub(super) fn is_heavy_enough(
+    m: &Matrix,
+    rotor: &JointVec,
+    stable: &[StableInertia; JOINTS],
+    reserve: f64,
+) -> bool {
+    let mut a = *m;
+    (0..JOINTS).for_each(|j| a[j][j] += rotor[j] - reserve * stable[j].least);
+    is_positive(a)
+}
+
+/// The mass matrix with these rotors is not above `stable` over `reserve`.
+pub(super) fn is_light_enough(
+    m: &Matrix,
+    rotor: &JointVec,
+    stable: &[StableInertia; JOINTS],
+    reserve: f64,
+) -> bool {
+    let mut a = m.map(|row| row.map(|v| -v));
+    (0..JOINTS).for_each(|j| a[j][j] += (stable[j].most / reserve).min(1e15) - rotor[j]);
+    is_positive(a)
+}
+
+/// How much lighter and heavier the rotors of the joints `of` may be; `None`: the arm is not stable with `rotor` as it is.
+pub(super) fn rotor_margin(
+    matrices: &[Matrix],
+    rotor: &JointVec,
+    stable: &[StableInertia; JOINTS],
+    of: [bool; JOINTS],
+) -> Option<RotorMargin> {
+    let scaled = |factor: f64| std::array::from_fn(|j| if of[j] { rotor[j] * factor } else { rotor[j] });
+    let mut margin = RotorMargin { down: FACTORS.0, up: FACTORS.1 };
+    for m in matrices {
+        let light = |factor: f64| is_heavy_enough(m, &scaled(factor), stable, 1.0);
+        let heavy = |factor: f64| is_light_enough(m, &scaled(factor), stable, 1.0);
+        if !light(1.0) || !heavy(1.0) {
+            return None;
+        }
+        margin.down = end(margin.down, light);
+        margin.up = end(margin.up, heavy);
+    }
+    Some(margin)
+}
+
+/// The factor nearest to `far` at which `holds` does, which it does at 1.
+fn end(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if holds(far) {
+        return far;
+    }
+    let (mut good, mut bad) = (1.0, far);
+    for _ in 0..30 {
+        let middle = 0.5 * (good + bad);
+        if holds(middle) { good = middle } else { bad = middle }
+    }
+    good
+}
+
+#[cfg(test)]
+#[path = "gains_tests.rs"]
+mod tests;

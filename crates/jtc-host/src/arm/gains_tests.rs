@@ -1,0 +1,98 @@
+//! The limits of stability against the loop itself, tick by tick.
+
+use super::*;
+use crate::arm::Arm;
+
+/// Size of the position error of one joint (rad) in the last of three equal parts of `ticks`, over that in the second.
+fn growth(gains: &PidGains, delay: u8, inertia: f64, ticks: usize) -> f64 {
+    let mut torques = vec![0.0; usize::from(delay) + 1];
+    let mut errors = [0.0; 6];
+    let (mut q, mut qd, mut integral) = (0.0, 1e-3, 0.0);
+    let mut sizes = [0.0f64; 3];
+    for k in 0..ticks {
+        let error = -q;
+        errors.rotate_left(1);
+        errors[5] = error;
+        integral += error * DT;
+        torques.rotate_left(1);
+        torques[usize::from(delay)] =
+            gains.kp * error + gains.ki * integral + gains.kd * (error - errors[0]) / (5.0 * DT);
+        let qdd = torques[0] / inertia;
+        q += qd * DT + 0.5 * qdd * DT * DT;
+        qd += qdd * DT;
+        let part = &mut sizes[3 * k / ticks];
+        *part = part.max(f64::abs(q));
+    }
+    sizes[2] / sizes[1]
+}
+
+#[test]
+fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
+    let gains = |kp, ki, kd| PidGains { kp, ki, kd, int_min: -1e9, int_max: 1e9 };
+    for (gains, delay) in [
+        (gains(8000.0, 14000.0, 80.0), 2),
+        (gains(4000.0, 24000.0, 60.0), 2),
+        (gains(200.0, 400.0, 10.0), 2),
+        (gains(200.0, 0.0, 10.0), 2),
+        (gains(2.0, 30.0, 0.1), 2),
+        (gains(0.5, 0.2, 0.5), 2),
+        (gains(1600.0, 3200.0, 80.0), 0),
+        (gains(1600.0, 3200.0, 80.0), 5),
+        (gains(1600.0, 3200.0, 80.0), 7),
+        (gains(8000.0, 2000.0, 100.0), 2),
+    ] {
+        let StableInertia { least, most } = StableInertia::of(&gains, delay).expect("a stable range");
+        let fast = |inertia| growth(&gains, delay, inertia, 6_000);
+        assert!(fast(1.03 * least) < 1.0, "{gains:?}: {least} {}", fast(1.03 * least));
+        assert!(fast(0.97 * least) > 1.0, "{gains:?}: {least} {}", fast(0.97 * least));
+        if gains.ki == 0.0 {
+            assert_eq!(most, f64::INFINITY);
+            continue;
+        }
+        // Slow: some hundred swings of it.
+        let slow = |inertia: f64| {
+            let swing = std::f64::consts::TAU * (inertia / gains.kp).sqrt() / DT;
+            growth(&gains, delay, inertia, ((300.0 * swing) as usize).clamp(6_000, 20_000_000))
+        };
+        assert!(slow(0.97 * most) < 1.0, "{gains:?}: {most} {}", slow(0.97 * most));
+        assert!(slow(1.03 * most) > 1.0, "{gains:?}: {most} {}", slow(1.03 * most));
+    }
+}
+
+#[test]
+fn j41_gains_that_hold_no_inertia_are_known() {
+    let gains = |kp, ki, kd| PidGains { kp, ki, kd, int_min: -1.0, int_max: 1.0 };
+    for none in [
+        gains(0.0, 0.0, 0.0),
+        gains(100.0, 0.0, 0.0),
+        gains(100.0, 50.0, 0.0),
+        gains(100.0, 0.0, 0.1),
+        gains(100.0, 1e6, 5.0),
+        gains(-100.0, 0.0, -5.0),
+        gains(f64::NAN, 0.0, 1.0),
+        gains(1.0, f64::INFINITY, 1.0),
+        gains(1.0, 0.0, f64::NAN),
+        gains(1.0, 0.0, f64::INFINITY),
+    ] {
+        assert_eq!(StableInertia::of(&none, 2), None, "{none:?}");
+    }
+}
+
+/// A rotor on its own, whose margin is known without any matrix.
+#[test]
+fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
+    let arm = Arm::avena();
+    let gains = arm.pid.unwrap();
+    let stable = gains.map(|g| StableInertia::of(&g, 2).unwrap());
+    let rotor = [0.7; JOINTS];
+    let margin = rotor_margin(&[[[0.0; JOINTS]; JOINTS]], &rotor, &stable, [true; JOINTS]).unwrap();
+    let least = stable.iter().map(|s| s.least / 0.7).fold(0.0, f64::max);
+    let most = stable.iter().map(|s| s.most / 0.7).fold(f64::INFINITY, f64::min);
+    assert!((margin.down - least).abs() < 1e-6 && (margin.up - most).abs() < 1e-6 * most, "{margin:?}");
+    // Two joints that carry each other whole are one with twice the stiffness.
+    let mut both = [[0.0; JOINTS]; JOINTS];
+    (both[4][4], both[5][5], both[4][5], both[5][4]) = (0.3, 0.3, 0.3, 0.3);
+    let coupled = rotor_margin(&[both], &rotor, &stable, [true; JOINTS]).unwrap();
+    assert!(coupled.up < margin.up || coupled.down <= margin.down, "{coupled:?}");
+    assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
+}

@@ -88,7 +88,7 @@ def compare(jtc, folder, rng, states, row):
     file = descriptions.folder() / file
     arm = folder / "arm.toml"
     options = [*(["--joints", joints] if joints else []), *(["--tip", tip] if tip else [])]
-    report = json.loads(run([jtc, "--json", "arm", "import", file, *options, "-o", arm, "--force"]))
+    report = json.loads(run([jtc, "--json", "arm", "import", file, *options, "-o", arm, "--overwrite"]))
     checked = json.loads(run([jtc, "--json", "arm", "check", arm]))
     shown = json.loads(run([jtc, "--json", "arm", "show", arm]))
     gravity = [v["value"] for v in shown["values"] if v["name"].startswith("gravity")]

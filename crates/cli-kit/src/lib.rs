@@ -18,7 +18,9 @@ mod stdout;
 #[cfg(feature = "trial")]
 pub mod trial;
 pub mod usage;
+pub mod variables;
 pub mod view;
+mod within;
 
 pub use bar::{Stderr, draws_bars};
 pub use failure::Failure;
@@ -31,3 +33,4 @@ pub use output_file::OutputFile;
 pub use screen::{Screen, restore_terminal};
 pub use signal::Stop;
 pub use stdout::stdout_is_stuck;
+pub use within::print_within;

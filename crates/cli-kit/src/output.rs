@@ -121,6 +121,15 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
+    /// One line of a log before the command begins: a note, or with JSON an event `note`, since the command may stream events.
+    pub(crate) fn log(&self, text: &str) {
+        if !self.json {
+            return self.note(text);
+        }
+        let event = json!({ "event": "note", "time_s": 0.0, "text": text });
+        suspended(|| drop(writeln!(std::io::stderr().lock(), "{event}")));
+    }
+
     /// A bar on stderr; invisible where stderr is no terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_steps(total, what)

@@ -50,12 +50,12 @@ impl Diagnose for OutputError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Exists { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "exists", "name another file; --force writes over it")
+                Diagnosis::new(ErrorKind::Refused, "exists", "name another file; --overwrite writes over it")
             }
             Self::SameFile { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "same-file",
-                "name another file; --force does not cover this",
+                "name another file; --overwrite does not cover this",
             ),
             Self::Io { source, .. } => source.diagnosis(),
         }
@@ -87,9 +87,9 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
+    /// Opens `path` for writing. A file that is there is refused without `overwrite`, and one of `others` (what the command reads, and
     /// its other outputs) always. To report that nothing was sent is left to commands that send.
-    pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, OutputError> {
+    pub fn open(path: &Path, overwrite: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
         }
@@ -103,7 +103,7 @@ impl OutputFile {
             Err(e) => return Err(io(e)),
         }
         // A pipe or a device holds nothing that could be lost.
-        if !force && path.is_file() {
+        if !overwrite && path.is_file() {
             return Err(OutputError::Exists { path: path.to_owned() });
         }
         let file = OpenOptions::new().write(true).open(path).map_err(io)?;

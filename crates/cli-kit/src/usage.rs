@@ -3,37 +3,69 @@
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Parser;
 use clap::error::ErrorKind;
 
-use crate::{Failure, Output, exit};
+use crate::variables::{Variables, on_off};
+use crate::{Failure, Output, exit, print_within};
+
+/// A command waits no longer than this for the reader of what is printed before it begins.
+const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// The command line of this process; otherwise help, version or wrong usage is printed, and the exit code is to be returned. Wrong
-/// usage is one JSON object on stdout where `--json` or the variable `json_env` asks for JSON, besides the words on stderr.
-pub fn parse<Cli: Parser>(program: &'static str, json_env: &str) -> Result<Cli, ExitCode> {
-    Cli::try_parse().map_err(|e| {
-        let shown = e.print().and_then(|()| std::io::stdout().flush());
-        if !e.use_stderr() {
-            let _ = shown.inspect_err(Output::lose);
-            let Some(why) = Output::lost() else { return ExitCode::SUCCESS };
-            let _ = writeln!(std::io::stderr(), "{program}: the help could not be printed: {why}");
-            return ExitCode::from(exit::USAGE);
+/// usage is one JSON object on stdout where `--json` or its variable asks for JSON, besides the words on stderr. Variables that set
+/// an option of the command are named on stderr.
+pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Result<Cli, ExitCode> {
+    let typed: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let value = |name: &str| std::env::var_os(name);
+    let mut command = Cli::command();
+    let read = command.try_get_matches_from_mut(std::env::args_os()).and_then(|matches| {
+        let cli = Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut command))?;
+        Ok((cli, matches))
+    });
+    let out = Output::new(program, json_is_asked(typed.iter(), value(variables.json).as_deref()));
+    let e = match read {
+        Ok((cli, matches)) => {
+            let report = variables.report(program, &command, &matches, value);
+            if let Some(refused) = report.refused {
+                out.failure(&refused);
+                return Err(ExitCode::from(refused.exit()));
+            }
+            let lines: Vec<String> = report.ignored.into_iter().chain(report.in_effect).collect();
+            if !lines.is_empty() {
+                // A stop is not held by a stderr that nobody reads.
+                print_within(PRINT_TIMEOUT, move || lines.iter().for_each(|line| out.log(line)));
+            }
+            return Ok(cli);
         }
-        if json_is_asked(std::env::args_os().skip(1), std::env::var_os(json_env).as_deref()) {
-            let (message, hint) = words(&e, program);
-            let error = Failure::usage(message).hint(hint).to_json();
-            Output::bytes(format!("{}\n", serde_json::json!({ "error": error })).as_bytes());
-        }
-        ExitCode::from(exit::USAGE)
-    })
+        Err(e) => e,
+    };
+    let shown = e.print().and_then(|()| std::io::stdout().flush());
+    if !e.use_stderr() {
+        let _ = shown.inspect_err(Output::lose);
+        let Some(why) = Output::lost() else { return Err(ExitCode::SUCCESS) };
+        let _ = writeln!(std::io::stderr(), "{program}: the help could not be printed: {why}");
+        return Err(ExitCode::from(exit::USAGE));
+    }
+    let lines = variables.report_error(program, &command, &e, &typed, value);
+    lines.iter().for_each(|line| out.note(line));
+    if out.is_json() {
+        let (message, hint) = words(&e, program);
+        let hint =
+            [hint].into_iter().chain(lines).filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
+        let error = Failure::usage(message).hint(hint).to_json();
+        Output::bytes(format!("{}\n", serde_json::json!({ "error": error })).as_bytes());
+    }
+    Err(ExitCode::from(exit::USAGE))
 }
 
 /// The option among the words, as far as options go, or the variable with a value that means yes.
-fn json_is_asked(words: impl Iterator<Item = OsString>, variable: Option<&OsStr>) -> bool {
-    let no = ["", "0", "n", "no", "f", "false", "off"];
-    let by_variable = variable.is_some_and(|v| !no.contains(&v.to_string_lossy().to_lowercase().as_str()));
-    by_variable || words.take_while(|word| word != "--").any(|word| word == "--json")
+fn json_is_asked<'a>(words: impl Iterator<Item = &'a OsString>, variable: Option<&OsStr>) -> bool {
+    let by_variable = variable.is_some_and(|v| on_off(&v.to_string_lossy()) == Ok(true));
+    let mut options = words.take_while(|word| *word != "--");
+    by_variable || options.any(|word| word == "--json")
 }
 
 /// What is wrong and what helps, from the parser's words.
@@ -54,7 +86,8 @@ mod tests {
     #[test]
     fn json_is_asked_for_by_option_or_variable() {
         let asked = |words: &[&str], variable: Option<&str>| {
-            json_is_asked(words.iter().map(OsString::from), variable.map(OsStr::new))
+            let words: Vec<OsString> = words.iter().map(OsString::from).collect();
+            json_is_asked(words.iter(), variable.map(OsStr::new))
         };
         assert!(asked(&["traj", "rum", "--json"], None) && asked(&["x"], Some("1")));
         assert!(!asked(&["decode", "--", "--json"], None) && !asked(&[], Some("false")) && !asked(&[], None));

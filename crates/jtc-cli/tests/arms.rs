@@ -128,7 +128,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(output.err.contains("is no robot description"), "{}", output.err);
 
     // What was changed and proposed is in the text as well, and the file passes its check with warnings.
-    let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--force"]).ends(0);
+    let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--overwrite"]).ends(0);
     for words in [
         "left out: ",
         "joint grip: revolute: is held at 0",

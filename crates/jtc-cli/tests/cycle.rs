@@ -155,7 +155,7 @@ fn broken_off() {
     }
     let run = "jtc traj run cycle.csv --speed 40 --record broken.mcap";
     page.case_of_a_moment("Ctrl-C in the middle of it", run, || {
-        let run = format!("{run} --force");
+        let run = format!("{run} --overwrite");
         done(&desk, "jtc move --to 0,0,0,0,0,0 --speed 100");
         let in_motion = |jtc: &std::process::Child, _: &common::Sim| {
             std::thread::sleep(std::time::Duration::from_millis(1500));

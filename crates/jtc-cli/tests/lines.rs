@@ -17,7 +17,7 @@ impl Dir {
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {
         let name = if text.starts_with('[') { "waypoints.json" } else { "waypoints.csv" };
         let (file, out) = (self.file(name, text), self.path("out.csv"));
-        let words = [&["--json", "plan", &file, "-o", &out, "--force"], options].concat();
+        let words = [&["--json", "plan", &file, "-o", &out, "--overwrite"], options].concat();
         let printed = jtc(&words).ends(0).json();
         jtc(&["traj", "check", &out]).ends(0);
         (printed, flange(&std::fs::read_to_string(out).unwrap()))

@@ -97,7 +97,7 @@ fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     // One that is there is written over on demand only; removed, it is gone, and the file as it was but for its end.
     let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
     assert!(refused.err.contains("pose \"up\" is there already"), "{}", refused.err);
-    sim.jtc(&["pose", "save", "up", "--arm", &arm, "--force"]).ends(0);
+    sim.jtc(&["pose", "save", "up", "--arm", &arm, "--overwrite"]).ends(0);
     jtc(&["pose", "remove", "up", "--arm", &arm]).ends(0);
     let left = jtc(&["pose", "list", "--arm", &arm]).ends(0).out;
     assert!(left.contains("home") && !left.contains("up "), "{left}");

@@ -160,13 +160,13 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     std::fs::write(&old, "precious").unwrap();
     let run = |more: &[&str]| jtc(&[&["traj", "run", &file, "--port", "/nowhere/tty"], more].concat());
     let output = run(&["--record", &old]).ends(4);
-    assert!(output.err.contains("there already") && output.err.contains("--force"), "{}", output.err);
-    let output = run(&["--record", &file, "--force"]).ends(4);
+    assert!(output.err.contains("there already") && output.err.contains("--overwrite"), "{}", output.err);
+    let output = run(&["--record", &file, "--overwrite"]).ends(4);
     assert!(output.err.contains("uses itself"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
-    run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--force"]).ends(4);
+    run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
     // Allowed, and then there is no port: the old file is as it was, and no empty one is left behind.
-    run(&["--record", &old, "--report", &path("new.html"), "--force"]).ends(3);
+    run(&["--record", &old, "--report", &path("new.html"), "--overwrite"]).ends(3);
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
     assert!(!std::path::Path::new(&path("new.html")).exists());
     jtc(&["teach", "record", &old, "--port", "/nowhere/tty"]).ends(4);
@@ -212,13 +212,13 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
-        output.err.contains("report.html is there already") && output.err.contains("--force"),
+        output.err.contains("report.html is there already") && output.err.contains("--overwrite"),
         "{}",
         output.err
     );
     assert!(!output.err.contains("parameters:"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(out.join("picture.svg")).unwrap(), "precious");
-    jtc(&["demo", "--force", "--out", out.to_str().unwrap()]).ends(0);
+    jtc(&["demo", "--overwrite", "--out", out.to_str().unwrap()]).ends(0);
     assert!(out.join("picture.svg").metadata().unwrap().len() > 10_000);
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
@@ -279,7 +279,7 @@ fn examples_are_files_that_the_named_commands_take() {
         }
         // It may have been changed since.
         jtc(&["example", name, "-o", to]).ends(4);
-        jtc(&["example", name, "-o", to, "--force"]).ends(0);
+        jtc(&["example", name, "-o", to, "--overwrite"]).ends(0);
     }
     let output = jtc(&["example", "nothing"]).ends(2);
     assert!(output.err.contains("motion, waypoints"), "{}", output.err);

@@ -113,7 +113,7 @@ fn given_times_are_kept() {
     let text = "t,q1,q2,q3,q4,q5,q6\n1,0,0,0,0,0,0\n3.5,0.4,0.1,-0.2,0,0.3,0\n,0.2,0.3,-0.5,0,0.3,0\n8,0,0,0,0,0,0\n";
     let (file, out) = (dir.file("timed.csv", text), dir.path("out.csv"));
     for blend in ["0", "0.05"] {
-        let value = json(&[&file, "-o", &out, "--force", "--blend", blend], 0);
+        let value = json(&[&file, "-o", &out, "--overwrite", "--blend", blend], 0);
         let times: Vec<f64> =
             value["waypoint_times_s"].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect();
         assert!((times[1] - 2.5).abs() < 1e-3 && (times[3] - 7.0).abs() < 1e-3, "{blend}: {times:?}");
@@ -178,12 +178,12 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
-        output.err.contains("out.csv is there already") && output.err.contains("--force"),
+        output.err.contains("out.csv is there already") && output.err.contains("--overwrite"),
         "{}",
         output.err
     );
-    jtc(&["plan", &good, "-o", &out, "--force"]).ends(0);
-    jtc(&["plan", &good, "-o", &good, "--force"]).ends(4);
+    jtc(&["plan", &good, "-o", &out, "--overwrite"]).ends(0);
+    jtc(&["plan", &good, "-o", &good, "--overwrite"]).ends(4);
 }
 
 /// Many waypoints are a motion like any other; one that no trajectory can carry is refused.
@@ -200,7 +200,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     assert_eq!(value["waypoints"], 10_000);
     assert_eq!(value["waypoint_times_s"].as_array().unwrap().len(), 10_000);
     jtc(&["traj", "check", &out]).ends(0);
-    let output = jtc(&["plan", &file, "-o", &out, "--force"]).ends(4);
+    let output = jtc(&["plan", &file, "-o", &out, "--overwrite"]).ends(4);
     assert!(
         output.err.contains("12000 points are") && output.err.contains("plan it in parts"),
         "{}",

@@ -59,7 +59,7 @@ fn read(path: &Path) -> Recording {
 
 /// `jtc report` makes its page of it.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
-    let words = ["--json", "report", path.to_str().expect("a name"), "--force"];
+    let words = ["--json", "report", path.to_str().expect("a name"), "--overwrite"];
     run(command_in(dir), &words, "").ends(0).json()
 }
 

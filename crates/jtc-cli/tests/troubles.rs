@@ -146,7 +146,7 @@ fn outputs(page: &mut Page) {
     for (title, command) in [
         ("The recording is there already", "jtc traj run motion.csv --record old.csv"),
         ("A recording of no known form", "jtc traj run motion.csv --record run.txt"),
-        ("The disk is full", "jtc traj run motion.csv --record full.csv --force"),
+        ("The disk is full", "jtc traj run motion.csv --record full.csv --overwrite"),
         ("The result has no place", "jtc status > /dev/full"),
         ("A word that is no command", "jtc traj chek motion.csv"),
         ("The same for a program", "jtc --json traj chek motion.csv 2> /dev/null"),

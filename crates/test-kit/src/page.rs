@@ -143,7 +143,8 @@ fn block(title: &str, command: &str, printed: &Printed) -> String {
     for line in command.lines() {
         let _ = writeln!(text, "$ {line}");
     }
-    let lines: Vec<&str> = printed.text.lines().map(str::trim_end).collect();
+    let lines: Vec<&str> =
+        printed.text.lines().filter(|line| !crate::shows_variables(line)).map(str::trim_end).collect();
     let left_out = if lines.len() > LINES_MAX { lines.len() - SHOWN.0 - SHOWN.1 } else { 0 };
     for (i, line) in lines.iter().enumerate() {
         match i.checked_sub(SHOWN.0) {

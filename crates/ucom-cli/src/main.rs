@@ -11,7 +11,7 @@ mod shape;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use cli_kit::{Output, exit};
+use cli_kit::{Output, exit, print_within};
 
 use args::Cli;
 
@@ -19,7 +19,7 @@ use args::Cli;
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
-    let cli: Cli = match cli_kit::usage::parse("ucom", "UCOM_JSON") {
+    let cli: Cli = match cli_kit::usage::parse("ucom", &args::VARIABLES) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
             Some(why) => {
                 let exit = if acts { exit::FAULT } else { exit::USAGE };
                 let text = format!("ucom: the result could not be printed: {why}");
-                interrupt::print_within(PRINT_TIMEOUT, move || out.note(text));
+                print_within(PRINT_TIMEOUT, move || out.note(text));
                 ExitCode::from(exit)
             }
         },
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
             if !failure.printed {
                 // Nobody reads what stands in stdout already.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
-                interrupt::print_within(PRINT_TIMEOUT, move || out.failure(&failure));
+                print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }
             ExitCode::from(exit)
         }

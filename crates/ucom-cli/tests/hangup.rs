@@ -57,7 +57,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
                 recorded["frames"].as_u64().unwrap(),
                 "{name} {ending}"
             );
-            assert!(output.err.is_empty(), "{name} {ending}: {}", output.err);
+            assert_eq!(output.err.lines().count(), 1, "only the variable: {name} {ending}: {}", output.err);
         }
         ended_by(view, name).ends(0);
     }

@@ -123,16 +123,16 @@ fn files_are_kept_and_nothing_is_made_up() {
         let output = ucom(&[words, &bus].concat()).ends(4);
         let error = &output.json()["error"];
         assert_eq!(error["code"], "exists", "{words:?}: {}", output.out);
-        assert!(error["hint"].as_str().unwrap().contains("--force"), "{words:?}: {}", output.out);
+        assert!(error["hint"].as_str().unwrap().contains("--overwrite"), "{words:?}: {}", output.out);
     }
-    // Nobody is there: also with --force there is nothing to write.
-    for words in [&["--json", "probe", "--out", &toml, "--force"][..], &["--json", "probe"]] {
+    // Nobody is there: also with --overwrite there is nothing to write.
+    for words in [&["--json", "probe", "--out", &toml, "--overwrite"][..], &["--json", "probe"]] {
         let output = ucom(&[words, &bus].concat()).ends(3);
         assert_eq!(output.json()["error"]["code"], "no-boards", "{}", output.out);
     }
     kept.iter().for_each(|name| assert_eq!(std::fs::read_to_string(file(name)).unwrap(), "mine", "{name}"));
-    ucom(&[&["dbc", "none", "--out", &dbc, "--force"][..], &bus].concat()).ends(0);
-    ucom(&[&["record", &log, "--for", "0.1", "--force"][..], &bus].concat()).ends(0);
+    ucom(&[&["dbc", "none", "--out", &dbc, "--overwrite"][..], &bus].concat()).ends(0);
+    ucom(&[&["record", &log, "--for", "0.1", "--overwrite"][..], &bus].concat()).ends(0);
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
 

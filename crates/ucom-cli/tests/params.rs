@@ -100,7 +100,7 @@ fn files_are_not_written_over() {
         assert!(sim.ucom(words).ends(4).err.contains("is there already"), "{words:?}");
         assert_eq!(std::fs::read(&file).unwrap(), b"mine");
         assert!(!peer.all(50).iter().any(|f| f.starts_with("3C1#")));
-        sim.ucom(&[words, &["--force"]].concat()).ends(0);
+        sim.ucom(&[words, &["--overwrite"]].concat()).ends(0);
         peer.all(100);
         assert_ne!(std::fs::read(&file).unwrap(), b"mine");
         sim.file("mine", b"mine");

@@ -15,10 +15,10 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     assert!(output.err.contains("ucom doctor"), "{}", output.err);
     let piped = sim.ucom(&["record", "-", "--for", "3"]).ends(0);
     assert!(piped.out.is_empty() && piped.err.contains("nothing has come"), "{}", piped.err);
-    let program = sim.ucom(&["--json", "record", &file, "--for", "3", "--force"]).ends(0);
-    assert!(program.err.is_empty(), "{}", program.err);
+    let program = sim.ucom(&["--json", "record", &file, "--for", "3", "--overwrite"]).ends(0);
+    assert!(!program.err.contains("nothing has come"), "{}", program.err);
     let mut peer = sim.peer();
-    let child = sim.spawn(&["record", &file, "--count", "1", "--force"]);
+    let child = sim.spawn(&["record", &file, "--count", "1", "--overwrite"]);
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let its = recorded.clone();
     let ask = std::thread::spawn(move || {

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 
-use super::{AcceptArgs, ForceArgs, LinkArgs};
+use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// `jtc arm …`
 #[derive(Debug, Subcommand)]
@@ -38,7 +37,7 @@ pub enum ArmCommand {
         /// Arm file (TOML) or robot description (URDF); without it the controller is asked
         file: Option<PathBuf>,
         /// Angles in degrees
-        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         deg: bool,
         #[command(flatten)]
         link: LinkArgs,
@@ -56,7 +55,7 @@ pub enum ArmCommand {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
         /// Keep it over a loss of power
-        #[arg(long, env = "JTC_STORE", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         store: bool,
         #[command(flatten)]
         accept: AcceptArgs,
@@ -67,10 +66,10 @@ pub enum ArmCommand {
     #[command(after_help = "Examples:\n  jtc arm pull -o board.toml")]
     Pull {
         /// Arm file to write
-        #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+        #[arg(short, long, env = "JTC_PULL_OUT", value_name = "FILE")]
         out: PathBuf,
         #[command(flatten)]
-        force: ForceArgs,
+        overwrite: OverwriteArgs,
         #[command(flatten)]
         link: LinkArgs,
     },
@@ -93,14 +92,14 @@ pub struct ImportArgs {
     #[arg(value_name = "URDF")]
     pub urdf: PathBuf,
     /// Arm file to write
-    #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+    #[arg(short, long, env = "JTC_IMPORT_OUT", value_name = "FILE")]
     pub out: PathBuf,
     /// The six joints that move, base to wrist
-    #[arg(long, env = "JTC_JOINTS", value_name = "A,B,C,D,E,F", value_delimiter = ',')]
+    #[arg(long, value_name = "A,B,C,D,E,F", value_delimiter = ',')]
     pub joints: Option<Vec<String>>,
     /// The link that is the flange
-    #[arg(long, env = "JTC_TIP", value_name = "LINK")]
+    #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
 }

@@ -1,7 +1,6 @@
 //! `jtc bench`: joints that are not there.
 
 use clap::Subcommand;
-use clap::builder::FalseyValueParser;
 use jtc_wire::Joint;
 
 use super::LinkArgs;
@@ -23,7 +22,7 @@ pub enum BenchCommand {
         #[arg(required = true, value_name = "JOINT=RAD", value_parser = joint)]
         joints: Vec<(Joint, f64)>,
         /// The angles are degrees
-        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         deg: bool,
         #[command(flatten)]
         link: LinkArgs,

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 
 use super::LinkArgs;
@@ -57,10 +56,10 @@ pub enum FirmwareCommand {
 #[derive(Args, Clone, Debug)]
 pub struct ImageArgs {
     /// Image, a binary (.bin) or an ELF file
-    #[arg(long, env = "JTC_IMAGE", value_name = "FILE", conflicts_with = "board")]
+    #[arg(long, value_name = "FILE", conflicts_with = "board")]
     pub image: Option<PathBuf>,
     /// The installed image of this board: nucleo-h745zi-q, nucleo-h745zi-q-ldo or nucleo-h743zi2
-    #[arg(long, env = "JTC_BOARD", value_name = "NAME")]
+    #[arg(long, value_name = "NAME")]
     pub board: Option<String>,
 }
 
@@ -73,19 +72,19 @@ pub struct FlashArgs {
     #[arg(long, env = "JTC_DRIVE", value_name = "DIR")]
     pub drive: Option<PathBuf>,
     /// Do not ask: the arm is supported, its drives are without power, and the safety wires are as in the image
-    #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub yes: bool,
     /// The drive does not name its board: it is that of the image
-    #[arg(long, env = "JTC_ASSUME_BOARD", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub assume_board: bool,
     /// The solder bridges of the board are set to the core supply of the image
-    #[arg(long, env = "JTC_ACCEPT_SUPPLY", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub accept_supply: bool,
     /// Flash also a board that runs this very image
-    #[arg(long, env = "JTC_AGAIN", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub again: bool,
     /// Do not ask the controller afterwards what it runs: nothing proves that the image arrived
-    #[arg(long, env = "JTC_NO_READ_BACK", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub no_read_back: bool,
     /// How long the board may take to run the image, s
     #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 
-use super::{ForceArgs, LinkArgs};
+use super::{LinkArgs, OverwriteArgs};
 
 /// `jtc log …`
 #[derive(Debug, Subcommand)]
@@ -20,16 +20,16 @@ pub enum LogCommand {
     )]
     Fetch {
         /// Write the recording here (.mcap)
-        #[arg(short, long, env = "JTC_OUT", value_name = "FILE.mcap")]
+        #[arg(short, long, env = "JTC_LOG_OUT", value_name = "FILE.mcap")]
         out: Option<PathBuf>,
         /// Write the report page here (.html)
-        #[arg(long, env = "JTC_REPORT", value_name = "FILE.html")]
+        #[arg(long, env = "JTC_LOG_REPORT", value_name = "FILE.html")]
         report: Option<PathBuf>,
         /// The arm of the log, where it is not the one that the controller has now
         #[arg(long, env = "JTC_ARM", value_name = "FILE")]
         arm: Option<PathBuf>,
         #[command(flatten)]
-        force: ForceArgs,
+        overwrite: OverwriteArgs,
         #[command(flatten)]
         link: LinkArgs,
     },

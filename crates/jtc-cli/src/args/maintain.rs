@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 
 use super::{AcceptArgs, LinkArgs};
@@ -13,7 +12,7 @@ pub struct MonitorArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// End after so many statuses
-    #[arg(long, env = "JTC_COUNT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
 
@@ -23,7 +22,7 @@ pub struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// Clear the memory of errors that occurred, too
-    #[arg(long, env = "JTC_OCCURRED", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub occurred: bool,
 }
 
@@ -31,16 +30,16 @@ pub struct ClearArgs {
 #[derive(Args, Debug)]
 pub struct ResetArgs {
     /// Joints, counted from 1: 2, or 1,3
-    #[arg(long, env = "JTC_JOINTS", value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub joints: Vec<u8>,
     /// The gripper
-    #[arg(long, env = "JTC_GRIPPER", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub gripper: bool,
     /// All joints and the gripper
-    #[arg(long, env = "JTC_ALL", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub all: bool,
     /// Do not ask: the arm may lose torque
-    #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub yes: bool,
     /// A bit mask, as older versions took it: refused, with what to type instead
     #[arg(hide = true, value_name = "MASK")]
@@ -73,10 +72,10 @@ pub struct RecoverArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// Arm file whose friction, gains and arm model the controller is given, all three
-    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Give the controller's own defaults, those of its built-in arm, when it misses parameters
-    #[arg(long, env = "JTC_DEFAULTS", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub defaults: bool,
     #[command(flatten)]
     pub accept: AcceptArgs,
@@ -92,10 +91,10 @@ pub struct JogArgs {
     #[arg(value_name = "RATE", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// The rate is in degrees a second
-    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub deg: bool,
     /// End after so many seconds
-    #[arg(long, env = "JTC_DURATION", value_name = "S")]
+    #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
     #[command(flatten)]
     pub link: LinkArgs,

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 
-use super::{AcceptArgs, ForceArgs, LinkArgs};
+use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// What a trajectory is checked against.
 #[derive(Args, Clone, Debug)]
@@ -14,16 +13,10 @@ pub struct CheckArgs {
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
-    #[arg(
-        long,
-        env = "JTC_SPEED_PERCENT",
-        value_name = "PCT",
-        default_value_t = 100.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "PCT", default_value_t = 100.0, allow_hyphen_values = true)]
     pub speed: f64,
     /// The numbers of the file are degrees, for files that do not name their unit; a CSV header does with q1_deg..q6_deg
-    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub deg: bool,
 }
 
@@ -41,7 +34,7 @@ pub enum TrajCommand {
         #[command(flatten)]
         check: CheckArgs,
         /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m; `traj run` takes that of the controller
-        #[arg(long, env = "JTC_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
+        #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
         payload: Option<jtc_core::Payload>,
     },
     /// What a file holds
@@ -50,7 +43,7 @@ pub enum TrajCommand {
         /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
         file: PathBuf,
         /// The numbers of the file are degrees, for files that do not name their unit
-        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         deg: bool,
     },
     /// Check, upload, execute, follow, report
@@ -79,7 +72,7 @@ pub enum TrajCommand {
         #[command(flatten)]
         run: RunArgs,
         /// What was measured: the last motion by hand, or else the last execution
-        #[arg(long, env = "JTC_MEASURED", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         measured: bool,
     },
     /// Go on with a run that an error, a stop or a lost link broke off
@@ -129,13 +122,13 @@ pub struct RunArgs {
     #[command(flatten)]
     pub check: CheckArgs,
     /// Move to the first point before
-    #[arg(long, env = "JTC_APPROACH", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub approach: bool,
     /// Points of a segment, 1 to 1500, in at most 100 segments; default: short enough for the CRC to be strong
-    #[arg(long, env = "JTC_POINTS_PER_SEGMENT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub points_per_segment: Option<usize>,
     /// Run it so many times; figures are kept of the last 1000, samples of the last one. A path that does not end where it begins needs --approach
-    #[arg(long, env = "JTC_REPEAT", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     #[command(flatten)]
     pub execute: ExecuteArgs,
@@ -160,10 +153,10 @@ pub struct ContinueArgs {
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
     /// The trajectory that was run, as it was run; default: the one in the recording
-    #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     /// How often the motion was to be run, those that were finished included; default: as the recording has it (MCAP)
-    #[arg(long, env = "JTC_REPEAT", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: Option<u32>,
     /// Arm whose limits and masses count, TOML or URDF; default: that of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
@@ -176,7 +169,7 @@ pub struct ContinueArgs {
 #[derive(Args, Clone, Debug)]
 pub struct ExecuteArgs {
     /// What becomes of the motion when this program is killed or loses its agent: through `jtc serve` alone
-    #[arg(long, env = "JTC_WHEN_GONE", value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
+    #[arg(long, value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
     pub when_gone: Option<String>,
     #[command(flatten)]
     pub link: LinkArgs,
@@ -190,13 +183,13 @@ pub struct ExecuteArgs {
 #[derive(Args, Clone, Debug)]
 pub struct RunFiles {
     /// Record the motion, .mcap or .csv
-    #[arg(long, env = "JTC_RECORD", value_name = "FILE")]
+    #[arg(long, env = "JTC_RUN_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Write the report page, .html; of several runs it is that of the last one
-    #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
+    #[arg(long, env = "JTC_RUN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
 }
 
 /// `jtc teach …`
@@ -221,17 +214,17 @@ pub enum TeachCommand {
         /// Trajectory file to write, CSV
         file: PathBuf,
         #[command(flatten)]
-        force: ForceArgs,
+        overwrite: OverwriteArgs,
         #[command(flatten)]
         link: LinkArgs,
         /// End after so many seconds
-        #[arg(long, env = "JTC_DURATION", value_name = "S")]
+        #[arg(long, value_name = "S")]
         duration: Option<f64>,
         /// Write waypoints instead of the motion
-        #[arg(long, env = "JTC_WAYPOINTS", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         waypoints: bool,
         /// How far the motion may be from the legs between waypoints, rad of the joint that is furthest; default: 0.01
-        #[arg(long, env = "JTC_TOLERANCE", value_name = "RAD", requires = "waypoints")]
+        #[arg(long, value_name = "RAD", requires = "waypoints")]
         tolerance: Option<f64>,
     },
 }

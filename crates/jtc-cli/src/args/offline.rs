@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 
-use super::ForceArgs;
+use super::OverwriteArgs;
 
 /// Options of `jtc dynamics`.
 #[derive(Args, Debug)]
@@ -16,10 +15,10 @@ pub struct DynamicsArgs {
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Gravity in the base frame, m/s²; default: the arm file's
-    #[arg(long, env = "JTC_GRAVITY", value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
     pub gravity: Option<[f64; 3]>,
     /// Count the drives' reflected rotor inertias of the arm file, too
-    #[arg(long, env = "JTC_ROTORS", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub rotors: bool,
 }
 
@@ -47,10 +46,10 @@ pub struct ExampleArgs {
     /// Name of the example; without it, or `list`: what there is
     pub name: Option<String>,
     /// Directory to write it to; default: this one
-    #[arg(short = 'o', long = "out", env = "JTC_OUT", value_name = "DIR")]
+    #[arg(short = 'o', long = "out", env = "JTC_EXAMPLE_DIR", value_name = "DIR")]
     pub dir: Option<PathBuf>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
 }
 
 /// Options of `jtc help`.
@@ -66,10 +65,10 @@ pub struct ReportArgs {
     /// Recording, .mcap or .csv
     pub file: PathBuf,
     /// Page to write; default: beside the recording
-    #[arg(long, env = "JTC_OUT", value_name = "FILE")]
+    #[arg(long, env = "JTC_REPORT_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
     /// Arm whose limits count, for recordings that do not hold them (CSV)
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,

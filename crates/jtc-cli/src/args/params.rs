@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::LinkArgs;
@@ -23,7 +22,7 @@ pub enum ParamsCommand {
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
         /// Which friction to send where files hold both
-        #[arg(long, env = "JTC_FRICTION", value_enum, default_value_t = FrictionKind::Polynomial)]
+        #[arg(long, value_enum, default_value_t = FrictionKind::Polynomial)]
         friction: FrictionKind,
         #[command(flatten)]
         accept: AcceptArgs,
@@ -61,6 +60,6 @@ pub enum FrictionKind {
 #[derive(Args, Clone, Copy, Debug)]
 pub struct AcceptArgs {
     /// Go on although the controller uses other limits, gravity or rotor inertia than the arm file gives
-    #[arg(long, env = "JTC_ACCEPT_DEVICE_LIMITS", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub accept_device_limits: bool,
 }

@@ -41,13 +41,13 @@ pub enum PayloadCommand {
 #[derive(Args, Clone, Copy, Debug)]
 pub struct PayloadArgs {
     /// Mass, kg
-    #[arg(long, env = "JTC_MASS", value_name = "KG", allow_hyphen_values = true)]
+    #[arg(long, value_name = "KG", allow_hyphen_values = true)]
     pub mass: f64,
     /// Centre of mass in the flange frame, m
-    #[arg(long, env = "JTC_COM", value_name = "X,Y,Z", value_parser = com, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = com, allow_hyphen_values = true)]
     pub com: [f64; 3],
     /// Inertia about the centre of mass along the axes of the flange, kg·m²: Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz; default: a point mass
-    #[arg(long, env = "JTC_INERTIA", value_name = "IXX,IYY,IZZ[,IXY,IXZ,IYZ]", value_parser = inertia, allow_hyphen_values = true)]
+    #[arg(long, value_name = "IXX,IYY,IZZ[,IXY,IXZ,IYZ]", value_parser = inertia, allow_hyphen_values = true)]
     pub inertia: Option<[f64; 6]>,
 }
 

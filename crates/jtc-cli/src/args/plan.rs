@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 use jtc_wire::JOINTS;
 
-use super::{ExecuteArgs, ForceArgs, LinkArgs};
+use super::{ExecuteArgs, LinkArgs, OverwriteArgs};
 
 /// Options of `jtc plan`.
 #[derive(Args, Debug)]
@@ -14,52 +13,40 @@ pub struct PlanArgs {
     /// Waypoints, CSV or JSON
     pub file: PathBuf,
     /// Trajectory to write, .csv
-    #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+    #[arg(short, long, env = "JTC_PLAN_OUT", value_name = "FILE")]
     pub out: PathBuf,
     /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each
-    #[arg(long, env = "JTC_BLEND", value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
     /// The flange keeps to a straight line on each leg of which the file does not say how the arm moves
-    #[arg(long, env = "JTC_LINE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub line: bool,
     /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there
-    #[arg(long, env = "JTC_BLEND_M", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(
-        long,
-        env = "JTC_SPEED_PERCENT",
-        value_name = "PCT",
-        default_value_t = 100.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "PCT", default_value_t = 100.0, allow_hyphen_values = true)]
     pub speed: f64,
     /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load
-    #[arg(long, env = "JTC_NO_JERK_LIMIT", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub no_jerk_limit: bool,
     /// Arm whose limits, masses and poses count, TOML or URDF; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// The numbers of the file are degrees, for files that do not name their unit
-    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub deg: bool,
     /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m
-    #[arg(long, env = "JTC_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
+    #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
     pub payload: Option<jtc_core::Payload>,
     /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque
-    #[arg(
-        long,
-        env = "JTC_TEMPERATURE",
-        value_name = "C",
-        default_value_t = 20.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
     pub temperature: f64,
     /// Write a page with the motion, its limits and what binds when, .html
-    #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
+    #[arg(long, env = "JTC_PLAN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
 }
 
 /// Options of `jtc move`.
@@ -69,7 +56,6 @@ pub struct MoveArgs {
     /// Joint positions, rad, or the name of a pose of the arm file
     #[arg(
         long,
-        env = "JTC_TO",
         value_name = "Q1,…,Q6|NAME",
         value_parser = target,
         allow_hyphen_values = true,
@@ -79,7 +65,6 @@ pub struct MoveArgs {
     /// A pose of the flange in the base frame instead: m, and roll, pitch and yaw in rad
     #[arg(
         long,
-        env = "JTC_TO_FLANGE",
         value_name = "X,Y,Z,ROLL,PITCH,YAW",
         value_parser = flange_pose,
         allow_hyphen_values = true,
@@ -87,19 +72,13 @@ pub struct MoveArgs {
     )]
     pub to_flange: Option<[f64; 6]>,
     /// The flange keeps to a straight line
-    #[arg(long, env = "JTC_LINE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub line: bool,
     /// The positions, or roll, pitch and yaw, are degrees; not for poses by name, whose unit is known
-    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub deg: bool,
     /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(
-        long,
-        env = "JTC_SPEED_PERCENT",
-        value_name = "PCT",
-        default_value_t = 50.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "PCT", default_value_t = 50.0, allow_hyphen_values = true)]
     pub speed: f64,
     /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
@@ -154,7 +133,7 @@ pub enum PoseCommand {
     /// Save where the arm is into the arm file
     #[command(
         after_help = "The arm stands still meanwhile: while a trajectory is executed or a joint is jogged it is refused. The rest of the file stays as it is, comments included.\n\nExamples:\n  \
-                            jtc pose save home --arm my-arm.toml\n  jtc pose save above-table --arm my-arm.toml --force"
+                            jtc pose save home --arm my-arm.toml\n  jtc pose save above-table --arm my-arm.toml --overwrite"
     )]
     Save {
         /// A letter, then letters, digits, _, - and .
@@ -164,8 +143,8 @@ pub enum PoseCommand {
         #[command(flatten)]
         link: LinkArgs,
         /// Write over a pose of this name
-        #[arg(long, env = "JTC_FORCE", value_parser = FalseyValueParser::new())]
-        force: bool,
+        #[arg(long, alias = "force")]
+        overwrite: bool,
     },
     /// All poses of the arm file
     #[command(
@@ -175,7 +154,7 @@ pub enum PoseCommand {
         #[command(flatten)]
         arm: PoseArm,
         /// Positions in degrees
-        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        #[arg(long)]
         deg: bool,
     },
     /// Take a pose out of the arm file

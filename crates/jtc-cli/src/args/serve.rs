@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::FalseyValueParser;
+use cli_kit::variables::on_off;
 use jtc_agent::modbus::Network;
 
 use super::LinkArgs;
@@ -13,7 +13,7 @@ use super::LinkArgs;
 #[derive(Args, Debug)]
 pub struct ServeArgs {
     /// A simulated controller instead of a port
-    #[arg(long, env = "JTC_SIM", value_parser = FalseyValueParser::new(), conflicts_with = "port")]
+    #[arg(long, env = "JTC_SIM", value_parser = on_off, conflicts_with = "port")]
     pub sim: bool,
     /// Arm, TOML or URDF: the one to simulate with --sim, which the controller has stored where the file is complete, and that of a
     /// controller that cannot be asked for its own; default: the built-in one
@@ -37,7 +37,7 @@ pub struct ServeArgs {
     )]
     pub allow_origins: Vec<String>,
     /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
-    #[arg(id = "link_with_token", long = "link", env = "JTC_LINK", value_parser = FalseyValueParser::new())]
+    #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
+use cli_kit::variables::on_off;
 
-use super::ForceArgs;
+use super::OverwriteArgs;
 
 /// How fast virtual time runs.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
@@ -20,10 +20,10 @@ pub enum SimSpeed {
 #[derive(Args, Debug)]
 pub struct DemoArgs {
     /// Directory for recording, report and picture
-    #[arg(long, env = "JTC_OUT", value_name = "DIR", default_value = "demo")]
+    #[arg(long, env = "JTC_DEMO_DIR", value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
     /// How fast virtual time runs
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Max)]
     pub speed: SimSpeed,
@@ -49,7 +49,7 @@ pub struct SimArgs {
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
     pub baud: u32,
     /// Bytes take no time on the line
-    #[arg(long, env = "JTC_NO_THROTTLE", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "JTC_NO_THROTTLE", value_parser = on_off)]
     pub no_throttle: bool,
     /// How fast virtual time runs
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Realtime)]
@@ -67,5 +67,5 @@ pub struct SimArgs {
     #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
 }

@@ -26,7 +26,7 @@ pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
             show::show(&link.session()?.device_arm()?, "the controller", *deg, out)
         }
         ArmCommand::Push { file, store, accept, link } => device::push(file, *store, *accept, link, out),
-        ArmCommand::Pull { out: file, force, link } => device::pull(file, *force, link, out),
+        ArmCommand::Pull { out: file, overwrite, link } => device::pull(file, *overwrite, link, out),
         ArmCommand::Diff { file, link } => device::diff(file, link, out),
     }
 }

@@ -47,7 +47,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
     let file = |name: &str| args.out.join(name);
-    let open = |name: &str| OutputFile::open(&file(name), args.force.force, &[]);
+    let open = |name: &str| OutputFile::open(&file(name), args.overwrite.overwrite, &[]);
     let (page, mut mcap, mut csv, picture) =
         (open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?, open(NAMES[3])?);
     let begin = Instant::now();

@@ -27,7 +27,7 @@ pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
     std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;
     // Without a name of its own the directory of the terminal is not part of what is typed next.
     let path = if args.dir.is_some() { dir.join(example.file) } else { example.file.into() };
-    OutputFile::open(&path, args.force.force, &[])?.write(example.text())?;
+    OutputFile::open(&path, args.overwrite.overwrite, &[])?.write(example.text())?;
     let next = example.next.replace("{}", &typed(&path));
     let value = json!({ "file": path, "what": example.what, "next": next });
     out.result(&value, || format!("{}: {}\ntry: {next}", path.display(), example.what));

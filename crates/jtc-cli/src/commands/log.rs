@@ -17,8 +17,8 @@ use crate::failure::output_lost;
 /// Does one of the commands.
 pub fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        LogCommand::Fetch { out: file, report, arm, force, link } => {
-            let files = Files::open(file.as_deref(), report.as_deref(), arm.as_deref(), force.force)?;
+        LogCommand::Fetch { out: file, report, arm, overwrite, link } => {
+            let files = Files::open(file.as_deref(), report.as_deref(), arm.as_deref(), overwrite.overwrite)?;
             fetch(files, arm.as_deref(), link, out)
         }
         LogCommand::Clear { link } => clear(link, out),
@@ -37,7 +37,7 @@ impl Files {
         file: Option<&Path>,
         report: Option<&Path>,
         arm: Option<&Path>,
-        force: bool,
+        overwrite: bool,
     ) -> Result<Self, Failure> {
         if let Some(file) = file
             && Format::of(file)? != Format::Mcap
@@ -46,9 +46,9 @@ impl Files {
             return Err(Failure::usage(message));
         }
         let inputs: Vec<&Path> = arm.into_iter().collect();
-        let recording = file.map(|file| OutputFile::open(file, force, &inputs)).transpose()?;
+        let recording = file.map(|file| OutputFile::open(file, overwrite, &inputs)).transpose()?;
         let others: Vec<&Path> = inputs.into_iter().chain(file).collect();
-        let report = report.map(|page| OutputFile::open(page, force, &others)).transpose()?;
+        let report = report.map(|page| OutputFile::open(page, overwrite, &others)).transpose()?;
         Ok(Self { recording, report })
     }
 }

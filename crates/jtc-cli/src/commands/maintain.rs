@@ -54,7 +54,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     if args.defaults && arm.is_some() {
-        return Err(Failure::usage("--arm (or JTC_ARM) and --defaults name two sets of numbers")
+        return Err(Failure::usage("--arm and --defaults name two sets of numbers")
             .hint("name one: nothing was sent"));
     }
     let given = arm.as_ref().map(|arm| (arm.name.as_str(), arm.parameter_set()));

@@ -17,7 +17,7 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     }
     if args.deg && matches!(args.to, Some(Target::Pose(_))) {
         let message = "--deg is for joint positions and poses of the flange, and the unit of a named pose is known; nothing was sent";
-        return Err(Failure::usage(message).hint("leave --deg out (and JTC_DEG, where it is set)"));
+        return Err(Failure::usage(message).hint("leave --deg out"));
     }
     let (name, option) = match (&args.to, &args.to_flange) {
         (Some(Target::Pose(name)), _) => (name.clone(), "--to"),

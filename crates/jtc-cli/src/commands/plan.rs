@@ -33,10 +33,13 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
     let mut inputs: Vec<&Path> = vec![&args.file];
     inputs.extend(args.arm.as_deref());
-    let trajectory = OutputFile::open(&args.out, args.force.force, &inputs)?;
+    let trajectory = OutputFile::open(&args.out, args.overwrite.overwrite, &inputs)?;
     inputs.push(&args.out);
-    let page =
-        args.report.as_deref().map(|page| OutputFile::open(page, args.force.force, &inputs)).transpose()?;
+    let page = args
+        .report
+        .as_deref()
+        .map(|page| OutputFile::open(page, args.overwrite.overwrite, &inputs))
+        .transpose()?;
     let config = Config { payload: args.payload.unwrap_or_default(), ..arm.config() };
     let friction = arm.friction();
     let planner = Planner {

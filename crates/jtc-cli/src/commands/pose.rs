@@ -13,7 +13,7 @@ use crate::args::{LinkArgs, PoseCommand};
 /// Does one of the family.
 pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        PoseCommand::Save { name, arm, link, force } => save(name, &arm.arm, link, *force, out),
+        PoseCommand::Save { name, arm, link, overwrite } => save(name, &arm.arm, link, *overwrite, out),
         PoseCommand::List { arm, deg } => list(&arm.arm, *deg, out),
         PoseCommand::Remove { name, arm } => {
             remove_pose(&arm.arm, name)?;
@@ -24,15 +24,15 @@ pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-fn save(name: &str, file: &Path, link: &LinkArgs, force: bool, out: &Output) -> Result<(), Failure> {
+fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
     // Before the controller is asked: what is wrong with name or file is wrong without it.
     let arm = Arm::load(file)?;
-    if arm.poses.contains_key(name) && !force {
+    if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();
         return Err(jtc_host::arm::PoseError::Exists { path, name: name.into() }.into());
     }
     let position = link.session()?.standing()?.positions();
-    save_pose(file, name, &position, force)?;
+    save_pose(file, name, &position, overwrite)?;
     let arm = Arm::load(file)?;
     let saved = arm.poses.get(name).copied().unwrap_or(position);
     // Saved all the same: limits may be what is wrong.

@@ -19,9 +19,9 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let picture = page.with_extension("svg");
     let inputs: Vec<&Path> =
         [Some(&args.file), args.arm.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-    let force = args.force.force;
-    let page_file = OutputFile::open(&page, force, &inputs)?;
-    let picture_file = OutputFile::open(&picture, force, &[&inputs[..], &[page.as_path()]].concat())?;
+    let overwrite = args.overwrite.overwrite;
+    let page_file = OutputFile::open(&page, overwrite, &inputs)?;
+    let picture_file = OutputFile::open(&picture, overwrite, &[&inputs[..], &[page.as_path()]].concat())?;
     let mut digest = Digest::new();
     let recording = scan(&args.file, |sample| digest.push(sample))?;
     if let Some(cut) = &recording.cut {

@@ -35,8 +35,11 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let (arm, config) = simulated(args.arm.as_deref(), kept, out)?;
     let faults = args.faults.as_deref().map(faults).transpose()?.unwrap_or_default();
     let inputs: Vec<&Path> = [&args.arm, &args.faults].into_iter().filter_map(|p| p.as_deref()).collect();
-    let file =
-        args.record.as_deref().map(|path| OutputFile::open(path, args.force.force, &inputs)).transpose()?;
+    let file = args
+        .record
+        .as_deref()
+        .map(|path| OutputFile::open(path, args.overwrite.overwrite, &inputs))
+        .transpose()?;
     let mut config =
         SimConfig { baud: (!args.no_throttle).then_some(args.baud), seed: args.seed, faults, ..config };
     config.arm.payload = args.payload.unwrap_or_default();

@@ -30,7 +30,7 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
-        TeachCommand::Record { file, force, link, duration, waypoints, tolerance } => {
+        TeachCommand::Record { file, overwrite, link, duration, waypoints, tolerance } => {
             let tolerance = tolerance.unwrap_or(TOLERANCE);
             if *waypoints && !(1e-6..=1.0).contains(&tolerance) {
                 let message =
@@ -44,7 +44,7 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
                 );
                 return Err(Failure::usage(message).hint("name a file, or leave --waypoints out"));
             }
-            let output = OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?;
+            let output = OutputFile::open(file, overwrite.overwrite, &[]).map_err(Failure::nothing_sent)?;
             record(output, link, *duration, waypoints.then_some(tolerance), out)
         }
     }

@@ -45,7 +45,8 @@ impl Terminal {
         std::thread::spawn(move || {
             for line in BufReader::new(out).split(b'\n') {
                 let Ok(line) = line else { break };
-                if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
+                let line = String::from_utf8_lossy(&line).into_owned();
+                if !crate::shows_variables(&line) && sender.send(line).is_err() {
                     break;
                 }
             }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::FalseyValueParser;
+use cli_kit::variables::on_off;
 
 use super::boards::{Boards, flash_id};
 use super::{ForceArgs, ValueEnum};
@@ -27,44 +27,44 @@ pub struct UpdateArgs {
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
     /// Send the files as they are, whatever they hold: text and files not named .bin are refused otherwise
-    #[arg(long, env = "UCOM_RAW_IMAGE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub raw: bool,
     /// What the addresses of Intel HEX and S-records count; default: words in S-records and bytes in Intel HEX, unless the records
     /// follow each other in the other unit alone
-    #[arg(long, env = "UCOM_ADDRESSES", value_enum, value_name = "UNIT")]
+    #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
     /// The flash number that the board must have
-    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
+    #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
     /// Flash date to write, or its 16 bits as 0x3AC1; default: today
-    #[arg(long, env = "UCOM_DATE", value_name = "YYYY-MM-DD")]
+    #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Option<String>,
     /// Check everything, send nothing that changes a board
-    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
     /// Start the application afterwards and see that it runs
-    #[arg(long, env = "UCOM_START", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub start: bool,
     /// Write the board's flash number into the header, so that no other board takes the image
-    #[arg(long, env = "UCOM_NAME_TARGET", value_parser = FalseyValueParser::new(), conflicts_with = "group")]
+    #[arg(long, conflicts_with = "group")]
     pub name_target: bool,
     /// All these boards with one transfer, by broadcast, instead of one after the other
-    #[arg(long, env = "UCOM_GROUP", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub group: bool,
     /// Exloader for RAM, with the profile's `prog.plan` exloader-app
-    #[arg(long, env = "UCOM_EXLOADER", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub exloader: Option<PathBuf>,
     /// Image of data memory, with `prog.plan` pmem-xmem
-    #[arg(long, env = "UCOM_DATA", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub data: Option<PathBuf>,
     /// File of the second cycle, with `prog.plan` raw; default: IMAGE again
-    #[arg(long, env = "UCOM_SECOND", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub second: Option<PathBuf>,
     /// Program ID that the board must show at the end, where the image does not contain it
-    #[arg(long, env = "UCOM_EXPECT_PROGRAM_ID", value_name = "ID", value_parser = program_id)]
+    #[arg(long, value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
     /// Accept an image that cannot be verified as done: exit code 0 where the profile leaves nothing to compare
-    #[arg(long, env = "UCOM_UNVERIFIED", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub unverified: bool,
     /// Flash numbers of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
@@ -80,7 +80,7 @@ pub struct RepairArgs {
     #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub board: u8,
     /// The flash number that the board must have; default: as the inventory has it
-    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
+    #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
     /// Flash numbers of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]

@@ -4,16 +4,18 @@ mod boards;
 mod firmware;
 mod options;
 mod serve;
+mod variables;
 
 use std::path::PathBuf;
 
-use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use cli_kit::variables::on_off;
 
 pub use boards::{Assignment, Boards};
 pub use firmware::{Addresses, RepairArgs, UpdateArgs};
 pub use options::*;
 pub use serve::ServeArgs;
+pub use variables::VARIABLES;
 
 /// Motor boards on a CAN bus from your terminal.
 #[derive(Debug, Parser)]
@@ -28,7 +30,7 @@ pub use serve::ServeArgs;
                   ucom update 3 firmware.hex                   check, program, verify\n  \
                   ucom --json info | jq .boards[0].program_id  for programs\n\n\
                   A bus: socketcan:can0, slcan:/dev/ttyACM0@1000000, socketcand:HOST:PORT/can0, multicast:ADDR:PORT.\n\
-                  Every option can be set by an environment variable, see `ucom COMMAND --help`.\n\
+                  Options that name a place, a file or a format can be set by environment variables, see `ucom COMMAND --help`.\n\
                   Exit codes: 0 done, 1 a board reported an error, 2 wrong usage or unreadable input, 3 no answer,\n\
                   4 refused by a check (nothing was sent or moved), 5 failed while running.",
     max_term_width = 100,
@@ -37,7 +39,7 @@ pub use serve::ServeArgs;
 )]
 pub struct Cli {
     /// Print one JSON object (streams: one a line) instead of text
-    #[arg(long, global = true, env = "UCOM_JSON", value_parser = FalseyValueParser::new(), help_heading = "Common")]
+    #[arg(long, global = true, env = "UCOM_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     #[command(flatten)]
     pub link: LinkArgs,
@@ -61,12 +63,20 @@ pub struct LinkArgs {
     pub edges: Option<PathBuf>,
 }
 
-/// Go on where a check would refuse.
+/// Go on where a check of the bus would refuse.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ForceArgs {
-    /// Go on where a check would refuse: another PC on the bus, a running board, bus load, a file that is there
-    #[arg(long, env = "UCOM_FORCE", value_parser = FalseyValueParser::new())]
+    /// Go on where a check of the bus would refuse: another PC on it, a running board, bus load
+    #[arg(long)]
     pub force: bool,
+}
+
+/// Files that are there already.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct OverwriteArgs {
+    /// Write over output files that are there already
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 /// The commands.
@@ -254,7 +264,7 @@ pub enum Command {
     #[command(after_help = "Examples:\n  ucom man --out ~/.local/share/man/man1")]
     Man {
         /// Directory for the pages; without it the main page goes to stdout
-        #[arg(long, env = "UCOM_OUT", value_name = "DIR")]
+        #[arg(long, env = "UCOM_MAN_DIR", value_name = "DIR")]
         out: Option<PathBuf>,
     },
 }
@@ -313,20 +323,11 @@ mod tests {
     }
 
     #[test]
-    fn the_command_line_is_sound_and_has_an_example_and_variables_for_each_command() {
+    fn the_command_line_is_sound_and_has_an_example_for_each_command() {
         Cli::command().debug_assert();
         for sub in Cli::command().get_subcommands() {
             let help = sub.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains("Examples:"), "{} has no example", sub.get_name());
-            for arg in sub.get_arguments().filter(|a| a.get_long().is_some()) {
-                let env = arg.get_env().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-                assert!(
-                    env.starts_with("UCOM_"),
-                    "{} --{}: no variable",
-                    sub.get_name(),
-                    arg.get_long().unwrap()
-                );
-            }
         }
     }
 }

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use clap::builder::FalseyValueParser;
+use cli_kit::variables::on_off;
 
 use super::boards::{Assignment, Boards, bits, flash_id, one_board, raw_status, seconds};
-use super::{ForceArgs, ValueEnum};
+use super::{ForceArgs, OverwriteArgs, ValueEnum};
 
 /// Options of `ucom sim`.
 #[derive(Args, Debug)]
@@ -39,7 +39,7 @@ pub struct InitArgs {
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Write the inventory anew, whatever stood in it before
-    #[arg(long, env = "UCOM_RENEW", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub renew: bool,
     #[command(flatten)]
     pub force: ForceArgs,
@@ -60,13 +60,13 @@ pub struct StatusArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Bits to set, as ASTART,OPINIT
-    #[arg(long, env = "UCOM_SET", value_name = "BITS", value_parser = bits)]
+    #[arg(long, value_name = "BITS", value_parser = bits)]
     pub set: Option<ucom::Status>,
     /// Bits to clear
-    #[arg(long, env = "UCOM_CLEAR", value_name = "BITS", value_parser = bits)]
+    #[arg(long, value_name = "BITS", value_parser = bits)]
     pub clear: Option<ucom::Status>,
     /// One PC_SETSTATUS as it is: mask and value as hexadecimal bytes, value bits outside the mask included
-    #[arg(long, env = "UCOM_RAW", value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
+    #[arg(long, value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
     pub raw: Option<(u8, u8)>,
     #[command(flatten)]
     pub force: ForceArgs,
@@ -99,7 +99,7 @@ pub struct StopArgs {
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
     /// Only end control; the application stays started
-    #[arg(long, env = "UCOM_CONTROL_ONLY", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub control_only: bool,
 }
 
@@ -115,14 +115,17 @@ pub struct IoArgs {
     #[command(flatten)]
     pub cache: CacheArgs,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
+    /// Taken from older scripts: there is no check of the bus to overrule
+    #[arg(long, hide = true)]
+    pub force: bool,
 }
 
 /// Where descriptions are kept.
 #[derive(Args, Clone, Debug)]
 pub struct CacheArgs {
     /// Ask the board even when its descriptions are known
-    #[arg(long, env = "UCOM_FRESH", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
     /// Directory of known descriptions; default: ucom in the user's cache directory
     #[arg(long, env = "UCOM_CACHE", value_name = "DIR")]
@@ -139,7 +142,7 @@ pub struct CiArgs {
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
     /// Run the board under supervision for so many seconds, outputs active
-    #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
+    #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
     pub cache: CacheArgs,
@@ -160,16 +163,18 @@ pub struct ParArgs {
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
     /// Check a parameter file against the boards, then write its parameters
-    #[arg(long, env = "UCOM_APPLY", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub apply: Option<PathBuf>,
     /// With --apply: check everything, write nothing
-    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
     /// Names of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]
     pub cache: CacheArgs,
+    #[command(flatten)]
+    pub overwrite: OverwriteArgs,
     #[command(flatten)]
     pub force: ForceArgs,
 }
@@ -181,10 +186,10 @@ pub struct SoArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// End after so many snapshots
-    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub count: Option<u64>,
     /// A CSV table: time_s, board, then a column for each output
-    #[arg(long, env = "UCOM_CSV", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_CSV", value_parser = on_off)]
     pub csv: bool,
     #[command(flatten)]
     pub cache: CacheArgs,
@@ -208,13 +213,13 @@ pub struct RunArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Enable the outputs: things move
-    #[arg(long, env = "UCOM_ACTIVE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub active: bool,
     /// Inputs to begin with, BOARD.NAME=VALUE
-    #[arg(long, env = "UCOM_CI", value_name = "B.NAME=V", value_delimiter = ',')]
+    #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub ci: Vec<Assignment>,
     /// Parameters to begin with, BOARD.NAME=VALUE
-    #[arg(long, env = "UCOM_PAR", value_name = "B.NAME=V", value_delimiter = ',')]
+    #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub par: Vec<Assignment>,
     /// Parameters and first inputs from a file, YAML; `ucom help params` shows the form
     #[arg(long, env = "UCOM_PARAMS", value_name = "FILE")]
@@ -223,16 +228,16 @@ pub struct RunArgs {
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// What to do when a board is lost; default: the profile's on_lost
-    #[arg(long, env = "UCOM_ON_LOST", value_enum, value_name = "POLICY")]
+    #[arg(long, value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,
     /// Have the boards send the texts of their applications
-    #[arg(long, env = "UCOM_DEBUG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub debug: bool,
     /// Have the boards send all their texts (global debug)
-    #[arg(long, env = "UCOM_GLOBAL_DEBUG", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub global_debug: bool,
     /// End after so many seconds
-    #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
+    #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
     pub cache: CacheArgs,
@@ -244,10 +249,10 @@ pub struct RunArgs {
 #[derive(Args, Debug)]
 pub struct MonitorArgs {
     /// End after so many views, one a second
-    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub count: Option<u64>,
     /// Send nothing at all, not even PC_INFO
-    #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = on_off)]
     pub listen_only: bool,
 }
 
@@ -260,10 +265,11 @@ pub struct RecordArgs {
     #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     /// End after so many frames
-    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    #[command(flatten)]
-    pub force: ForceArgs,
+    /// Write over output files that are there already
+    #[arg(long, alias = "force")]
+    pub overwrite: bool,
 }
 
 /// Options of `ucom replay`.
@@ -272,10 +278,10 @@ pub struct ReplayArgs {
     /// Recording, .log .fzi .mcap
     pub file: PathBuf,
     /// Send frames too that reset, number, program, start or move boards
-    #[arg(long, env = "UCOM_INTRUSIVE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub intrusive: bool,
     /// Times the original speed
-    #[arg(long, env = "UCOM_SPEED", value_name = "X", default_value_t = 1.0)]
+    #[arg(long, value_name = "X", default_value_t = 1.0)]
     pub speed: f64,
     #[command(flatten)]
     pub force: ForceArgs,
@@ -288,7 +294,7 @@ pub struct SendArgs {
     #[arg(value_name = "FRAME", required = true)]
     pub frames: Vec<String>,
     /// Send frames too that reset, number, program, start or move boards
-    #[arg(long, env = "UCOM_INTRUSIVE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub intrusive: bool,
 }
 
@@ -299,10 +305,10 @@ pub struct DecodeArgs {
     #[arg(default_value = "-")]
     pub file: PathBuf,
     /// Decode the bus instead
-    #[arg(long, env = "UCOM_LIVE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub live: bool,
     /// End after so many frames
-    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
 
@@ -310,17 +316,19 @@ pub struct DecodeArgs {
 #[derive(Args, Debug)]
 pub struct ProbeArgs {
     /// Profile to write; default: stdout
-    #[arg(long, env = "UCOM_OUT", value_name = "FILE")]
+    #[arg(long, env = "UCOM_PROBE_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Measure also what shows only while numbers are given: resets and numbers the chain
-    #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub init: bool,
     /// Start a control loop, outputs safe, to see which heartbeats count
-    #[arg(long, env = "UCOM_ALIVE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub alive: bool,
     /// Image that is on a board, to find the checksum of Program IDs
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
     pub image: Option<PathBuf>,
+    #[command(flatten)]
+    pub overwrite: OverwriteArgs,
     #[command(flatten)]
     pub force: ForceArgs,
 }
@@ -332,25 +340,25 @@ pub struct ConformanceArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Also tests that reset and number the chain anew, and that set and clear status bits
-    #[arg(long, env = "UCOM_CONFORMANCE_INIT", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub init: bool,
     /// Also tests that start applications and control loops; outputs stay safe; more than a minute a board
-    #[arg(long, env = "UCOM_CONFORMANCE_RUN", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub run: bool,
     /// Also tests that program the one board that is named with this image
-    #[arg(long, env = "UCOM_CONFORMANCE_PROGRAM", value_name = "IMAGE")]
+    #[arg(long, value_name = "IMAGE")]
     pub program: Option<PathBuf>,
     /// With --program: the flash number that the board must have; default: as the inventory has it
-    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = super::boards::flash_id)]
+    #[arg(long, value_name = "ID", value_parser = super::boards::flash_id)]
     pub flash_id: Option<u16>,
     /// Flash numbers of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Only these tests, as D-T10,D-T11
-    #[arg(long, env = "UCOM_ONLY", value_name = "TESTS", value_delimiter = ',')]
+    #[arg(long, value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Also when another PC is on the bus; boards that run are never tested with --init, --run or --program
-    #[arg(long, env = "UCOM_FORCE", value_parser = FalseyValueParser::new())]
+    #[arg(long)]
     pub force: bool,
 }
 
@@ -361,12 +369,15 @@ pub struct DbcArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// File to write; default: stdout
-    #[arg(long, env = "UCOM_OUT", value_name = "FILE")]
+    #[arg(long, env = "UCOM_DBC_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
     #[command(flatten)]
-    pub force: ForceArgs,
+    pub overwrite: OverwriteArgs,
+    /// Taken from older scripts: there is no check of the bus to overrule
+    #[arg(long, hide = true)]
+    pub force: bool,
 }
 
 /// Options of `ucom explain`.

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::FalseyValueParser;
+use cli_kit::variables::on_off;
 
 use super::CacheArgs;
 
@@ -12,10 +12,10 @@ use super::CacheArgs;
 #[derive(Args, Debug)]
 pub struct ServeArgs {
     /// A simulated chain instead of a bus
-    #[arg(long, env = "UCOM_SIM", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_SIM", value_parser = on_off)]
     pub sim: bool,
     /// Number of simulated boards, 0..31; default: the ten of the built-in head
-    #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub boards: Option<u8>,
     /// Address to listen at; beyond this computer everyone needs a token
     #[arg(long, env = "UCOM_AGENT_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8781")]
@@ -27,7 +27,7 @@ pub struct ServeArgs {
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
-    #[arg(id = "link_with_token", long = "link", env = "UCOM_LINK", value_parser = FalseyValueParser::new())]
+    #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]

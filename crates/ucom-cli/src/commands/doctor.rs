@@ -43,7 +43,7 @@ fn line(f: &Finding) -> String {
 
 /// Measures and writes a profile.
 pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let output = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
+    let output = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let image = match &args.image {
         Some(path) => {
             let image = Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?;

@@ -18,12 +18,14 @@ use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
-    let file = args.template.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
+    let file =
+        args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
     // What is there is a table that somebody has filled in.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e)
-            .hint("--template - shows the table, to be added by hand; --force writes over it"),
+            .hint("--template - shows the table, to be added by hand; --overwrite writes over it"),
         false => Failure::nothing_sent(e),
     })?;
     let mut driver = link.session()?;
@@ -252,7 +254,8 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let file = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
+    note_force(args.force, out);
+    let file = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let (profile, signals) = (link.profile()?, link.signal_table()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
@@ -278,6 +281,13 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         }
     }
     Ok(())
+}
+
+/// Notes that `--force` overrules nothing here: older scripts have it to write over a file.
+fn note_force(force: bool, out: &Output) {
+    if force {
+        out.note("--force has no effect here: there is no check of the bus; --overwrite writes over a file");
+    }
 }
 
 /// Readers of DBC files take them for Windows-1252; units have letters like ° and µ, which it has where Latin-1 has them.

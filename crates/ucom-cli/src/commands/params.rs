@@ -24,7 +24,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return Err(Failure::usage("--dry-run goes with --apply FILE"));
     }
     let signals = link.signal_table()?;
-    let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
+    let file = args.save.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
     let file = file.map_err(Failure::nothing_sent)?;
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
@@ -47,15 +47,15 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
 }
 
 /// The file to write, opened before anything is sent and not written over unless that was asked for.
-pub fn open_output(file: &Path, force: bool) -> Result<OutputFile, Failure> {
-    OutputFile::open(file, force, &[]).map_err(Failure::nothing_sent)
+pub fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
+    OutputFile::open(file, overwrite, &[]).map_err(Failure::nothing_sent)
 }
 
 /// The same; `-` is stdout, and so `None`.
-pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, OutputError> {
+pub fn file_or_stdout(file: &Path, overwrite: bool) -> Result<Option<OutputFile>, OutputError> {
     match file.as_os_str() == "-" {
         true => Ok(None),
-        false => OutputFile::open(file, force, &[]).map(Some),
+        false => OutputFile::open(file, overwrite, &[]).map(Some),
     }
 }
 

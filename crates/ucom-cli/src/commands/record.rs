@@ -130,7 +130,7 @@ fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>
     }
     let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
     let files = [Some(args.file.clone()), beside].into_iter().flatten();
-    files.map(|file| open_output(&file, args.force.force)).collect()
+    files.map(|file| open_output(&file, args.overwrite)).collect()
 }
 
 /// Who may end a replay, and where its notes go.

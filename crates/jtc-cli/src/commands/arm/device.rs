@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::super::info::hash;
 use super::super::named_arm;
-use crate::args::{AcceptArgs, ForceArgs, LinkArgs};
+use crate::args::{AcceptArgs, LinkArgs, OverwriteArgs};
 use crate::limits;
 use crate::link::LinkPort;
 
@@ -109,8 +109,13 @@ fn without_extensions(
 }
 
 /// Writes the controller's arm to a file.
-pub(super) fn pull(file: &Path, force: ForceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let target = OutputFile::open(file, force.force, &[])?;
+pub(super) fn pull(
+    file: &Path,
+    overwrite: OverwriteArgs,
+    link: &LinkArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let target = OutputFile::open(file, overwrite.overwrite, &[])?;
     let arm = link.session()?.device_arm()?;
     let name = target.name();
     target.write(arm.to_toml())?;

@@ -13,7 +13,7 @@ use crate::args::ImportArgs;
 pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     let choice = ArmChoice { joints: args.joints.clone(), tip: args.tip.clone() };
     let arm = Arm::import(&args.urdf, &choice)?;
-    let file = OutputFile::open(&args.out, args.force.force, &[&args.urdf])?;
+    let file = OutputFile::open(&args.out, args.overwrite.overwrite, &[&args.urdf])?;
     let name = file.name();
     file.write(arm.to_toml())?;
     let proposed: Vec<ArmValue> = arm.values().into_iter().filter(|v| v.from == Source::Proposed).collect();

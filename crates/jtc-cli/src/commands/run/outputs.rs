@@ -21,7 +21,7 @@ impl Outputs {
         let mut others: Vec<&Path> = course.inputs.iter().map(|path| path.as_path()).collect();
         let files = &course.execute.files;
         let open = |path: Option<&Path>, others: &[&Path]| {
-            path.map(|path| OutputFile::open(path, files.force.force, others)).transpose()
+            path.map(|path| OutputFile::open(path, files.overwrite.overwrite, others)).transpose()
         };
         let record = open(files.record.as_deref(), &others)?;
         others.extend(files.record.as_deref());

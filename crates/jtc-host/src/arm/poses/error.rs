@@ -87,7 +87,7 @@ impl Diagnose for PoseError {
                 "outside-limits",
                 "a pose from another arm, or limits that were changed since: save it again, or correct it in the file".into(),
             ),
-            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --force writes over it".into()),
+            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --overwrite writes over it".into()),
             Self::Description { .. } => {
                 (ErrorKind::Usage, "no-arm-file", "`jtc arm import URDF -o arm.toml` makes an arm file of it".into())
             }

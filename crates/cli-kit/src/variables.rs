@@ -1,0 +1,286 @@
+//! Environment variables that set options: the rule for on and off, a line about those that decide something, and words about those
+//! that are not read any more.
+//!
+//! Only options that name a place, a file or a format have a variable, and a few harmless numbers. An option that moves, resets,
+//! numbers, programs, enables outputs, sets bits, answers a question or overrules a check has none: a shell keeps a variable for
+//! commands that it was not meant for. `audit` checks this for all options of a command line.
+
+#[cfg(feature = "trial")]
+pub mod audit;
+
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+
+use clap::error::{ContextKind, ContextValue};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command};
+
+use crate::Failure;
+
+/// Reads an on/off variable. Letter case does not count; an empty one is off, as if it were not set.
+pub fn on_off(text: &str) -> Result<bool, String> {
+    match text.to_ascii_lowercase().as_str() {
+        "1" | "true" | "yes" | "on" => Ok(true),
+        "" | "0" | "false" | "no" | "off" => Ok(false),
+        _ => Err("expected 1, true, yes or on, or 0, false, no or off".into()),
+    }
+}
+
+/// The variables of a program.
+#[derive(Clone, Copy, Debug)]
+pub struct Variables {
+    /// The variable of `--json`.
+    pub json: &'static str,
+    /// Variables that are not read any more.
+    pub retired: &'static [Retired],
+    /// Commands without a device: they do not use the global options of the link.
+    pub offline: &'static [&'static str],
+}
+
+/// A variable that set an option once.
+#[derive(Clone, Copy, Debug)]
+pub struct Retired {
+    /// Its name.
+    pub variable: &'static str,
+    /// The words of the command that has the option; empty for every command that has it.
+    pub command: &'static str,
+    /// The long name of the option.
+    pub option: &'static str,
+    /// The consequence of not reading it.
+    pub without: Without,
+}
+
+/// What a command does when it ignores a variable that is set.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Without {
+    /// Less than the variable asked for: it goes on, with a note.
+    Less,
+    /// Something else or more, as a motion at another speed: it is refused.
+    Other,
+}
+
+impl Retired {
+    /// A variable that made a command do more.
+    pub const fn less(variable: &'static str, command: &'static str, option: &'static str) -> Self {
+        Self { variable, command, option, without: Without::Less }
+    }
+
+    /// A variable that limited or shaped what a command does.
+    pub const fn other(variable: &'static str, command: &'static str, option: &'static str) -> Self {
+        Self { variable, command, option, without: Without::Other }
+    }
+
+    /// The option that it set, if the command has it and does not read this variable for it.
+    fn option_of<'a>(&self, command: &'a Command, words: &str) -> Option<&'a Arg> {
+        let named = self.command.is_empty() || self.command == words;
+        let mut options = command.get_arguments().filter(|arg| arg.get_long() == Some(self.option));
+        options.find(|arg| named && arg.get_env() != Some(OsStr::new(self.variable)))
+    }
+}
+
+/// Words about the variables that are set.
+#[derive(Debug, Default)]
+pub(crate) struct Report {
+    /// A line for the variables that set an option of this command.
+    pub in_effect: Option<String>,
+    /// A line for each variable that is ignored.
+    pub ignored: Vec<String>,
+    /// The end of a command that would do something else without a variable.
+    pub refused: Option<Failure>,
+}
+
+/// A command of the command line.
+struct Chosen<'a> {
+    program: &'static str,
+    command: &'a Command,
+    /// Its words, `traj run`.
+    words: String,
+}
+
+impl Chosen<'_> {
+    /// As it is typed, in quotation marks of the docs.
+    fn typed(&self) -> String {
+        format!("`{}`", format!("{} {}", self.program, self.words).trim())
+    }
+}
+
+impl Variables {
+    /// What to print about the variables of a command line that was read. `value` is the environment.
+    pub(crate) fn report(
+        &self,
+        program: &'static str,
+        root: &Command,
+        matches: &ArgMatches,
+        value: impl Fn(&str) -> Option<OsString>,
+    ) -> Report {
+        let (mut command, mut matches, mut words) = (root, matches, Vec::new());
+        let mut used = BTreeMap::new();
+        loop {
+            for arg in command.get_arguments().filter(|arg| is_set_by_variable(arg, matches)) {
+                let variable = arg.get_env().unwrap_or_default().to_string_lossy().into_owned();
+                let value = value(&variable).unwrap_or_default();
+                used.insert(variable, (shown(&value), arg.is_global_set()));
+            }
+            let Some((name, below)) = matches.subcommand() else { break };
+            let Some(sub) = command.find_subcommand(name) else { break };
+            words.push(name);
+            (command, matches) = (sub, below);
+        }
+        let words = words.join(" ");
+        if self.offline.contains(&words.as_str()) {
+            used.retain(|variable, (_, global)| variable == self.json || !*global);
+        }
+        let chosen = Chosen { program, command, words };
+        let is_typed =
+            |arg: &Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
+        let unread = self.unread(&chosen, is_typed, value);
+        let in_effect =
+            used.iter().map(|(variable, (value, _))| format!("{variable}={value}")).collect::<Vec<_>>();
+        Report {
+            in_effect: (!in_effect.is_empty())
+                .then(|| format!("{program}: from the environment: {}", in_effect.join(", "))),
+            refused: unread
+                .iter()
+                .find(|found| found.without == Without::Other)
+                .map(|found| found.refusal(&chosen)),
+            ignored: unread.iter().map(|found| found.note(&chosen)).collect(),
+        }
+    }
+
+    /// What to print about variables where the command line could not be read: those that an option in the error was set by, and those
+    /// that are not read any more.
+    pub(crate) fn report_error(
+        &self,
+        program: &'static str,
+        root: &Command,
+        error: &clap::Error,
+        typed: &[OsString],
+        value: impl Fn(&str) -> Option<OsString>,
+    ) -> Vec<String> {
+        let chosen = chosen(program, root, typed);
+        let option = |arg: &Arg| arg.get_long().map(|long| format!("--{long}"));
+        let is_typed = |arg: &Arg| {
+            let option = option(arg).unwrap_or_default();
+            typed.iter().any(|word| word.to_string_lossy().split('=').next() == Some(&option))
+        };
+        let named = options_in(error);
+        let of_root = root.get_arguments().filter(|arg| arg.is_global_set());
+        let mut lines = Vec::new();
+        for arg in chosen.command.get_arguments().chain(of_root) {
+            let (Some(option), Some(variable)) = (option(arg), arg.get_env()) else { continue };
+            let variable = variable.to_string_lossy();
+            if named.contains(&option)
+                && !is_typed(arg)
+                && let Some(value) = value(&variable)
+            {
+                lines.push(format!("{option} is set by the variable {variable}={}", shown(&value)));
+            }
+        }
+        lines.dedup();
+        lines.extend(self.unread(&chosen, is_typed, value).iter().map(|found| found.note(&chosen)));
+        lines
+    }
+
+    /// Variables that are set, belonged to options of this command that are not typed, and are not read any more.
+    fn unread(
+        &self,
+        chosen: &Chosen<'_>,
+        is_typed: impl Fn(&Arg) -> bool,
+        value: impl Fn(&str) -> Option<OsString>,
+    ) -> Vec<Unread> {
+        let mut all: BTreeMap<&str, Unread> = BTreeMap::new();
+        for retired in self.retired {
+            let Some(arg) = retired.option_of(chosen.command, &chosen.words) else { continue };
+            let Some(value) = value(retired.variable).filter(|value| !value.is_empty()) else { continue };
+            let is_off = !arg.get_action().takes_values() && on_off(&value.to_string_lossy()) == Ok(false);
+            if is_off || is_typed(arg) {
+                continue;
+            }
+            let option = match arg.get_env() {
+                Some(variable) => format!("--{} or {}", retired.option, variable.to_string_lossy()),
+                None => format!("--{}", retired.option),
+            };
+            let found = all.entry(retired.variable).or_insert_with(|| Unread {
+                variable: retired.variable,
+                value: shown(&value),
+                options: Vec::new(),
+                without: Without::Less,
+            });
+            found.options.push(option);
+            if retired.without == Without::Other {
+                found.without = Without::Other;
+            }
+        }
+        all.into_values().collect()
+    }
+}
+
+/// A variable that is set and not read any more.
+struct Unread {
+    variable: &'static str,
+    value: String,
+    options: Vec<String>,
+    without: Without,
+}
+
+impl Unread {
+    fn note(&self, chosen: &Chosen<'_>) -> String {
+        let Self { variable, value, .. } = self;
+        let (program, typed, options) = (chosen.program, chosen.typed(), self.options.join(" or "));
+        format!("{program}: {variable}={value} is ignored: {typed} does not read it; type {options}")
+    }
+
+    fn refusal(&self, chosen: &Chosen<'_>) -> Failure {
+        let Self { variable, value, .. } = self;
+        Failure::usage(format!(
+            "{variable}={value} is set, and {} does not read it any more; nothing was sent",
+            chosen.typed()
+        ))
+        .hint(format!("type {}, or unset {variable}", self.options.join(" or ")))
+    }
+}
+
+/// The option counts because of its variable: it is not typed, and an on/off variable is on.
+fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
+    let id = arg.get_id().as_str();
+    arg.get_env().is_some()
+        && matches.value_source(id) == Some(ValueSource::EnvVariable)
+        && (arg.get_action().takes_values() || matches.get_flag(id))
+}
+
+/// The command that the words name, as far as they do.
+fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> Chosen<'a> {
+    let (mut command, mut words) = (root, Vec::new());
+    for word in typed.iter().take_while(|word| *word != "--") {
+        if let Some(sub) = command.find_subcommand(word) {
+            words.push(sub.get_name());
+            command = sub;
+        }
+    }
+    Chosen { program, command, words: words.join(" ") }
+}
+
+/// The options that the error names.
+fn options_in(error: &clap::Error) -> Vec<String> {
+    let mut all = Vec::new();
+    for kind in [ContextKind::InvalidArg, ContextKind::PriorArg] {
+        match error.get(kind) {
+            Some(ContextValue::String(one)) => all.push(one.clone()),
+            Some(ContextValue::Strings(several)) => all.extend(several.iter().cloned()),
+            _ => {}
+        }
+    }
+    all.iter().filter_map(|shown| shown.split([' ', '=']).next().map(str::to_owned)).collect()
+}
+
+/// A value on one line, without characters that act on a terminal.
+fn shown(value: &OsStr) -> String {
+    let mut text = String::new();
+    for c in value.to_string_lossy().chars() {
+        if c.is_control() { text.extend(c.escape_default()) } else { text.push(c) }
+    }
+    text
+}
+
+#[cfg(all(test, feature = "trial"))]
+mod tests;

@@ -1,0 +1,176 @@
+//! A walk over all options of a command line: each variable must be of an allowed kind.
+
+use std::collections::BTreeMap;
+
+use clap::{Arg, ArgAction, Command, CommandFactory};
+
+use super::Variables;
+
+/// Why an option may have a variable.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Kind {
+    /// It names a port, a bus, an address, a host or a folder.
+    Place,
+    /// It names a file that is read, or one that belongs to the machine or the chain.
+    File,
+    /// It names a file or folder that one command writes.
+    Output,
+    /// It chooses the form of what is printed.
+    Format,
+    /// A rate or a limit of the line, of time or of a disk, which changes no motion.
+    Rate,
+    /// A setting of a simulator.
+    Simulator,
+    /// It makes a command send less.
+    Caution,
+}
+
+/// Forms of values that name a place or a file.
+const PLACES: [&str; 11] = [
+    "FILE",
+    "FILE.mcap",
+    "FILE.html",
+    "IMAGE",
+    "DIR",
+    "PATH",
+    "URL",
+    "HOST",
+    "HOST:PORT",
+    "ADDRESS:PORT",
+    "ORIGIN",
+];
+
+/// All faults of the variables of a command line; empty when there is none. `allowed` lists each variable with the reason why it may
+/// exist; `without` lists options, as `update --data`, that name a file and have no variable all the same.
+pub fn faults<Cli: CommandFactory>(
+    prefix: &str,
+    variables: &Variables,
+    allowed: &[(&str, Kind)],
+    without: &[&str],
+) -> Vec<String> {
+    let mut root = Cli::command();
+    root.build();
+    let mut options = Vec::new();
+    collect(&root, "", &mut options);
+    let mut faults = Vec::new();
+    let mut seen: BTreeMap<String, (String, &Arg)> = BTreeMap::new();
+    for (typed, arg) in &options {
+        let names_place = value_name(arg).is_some_and(|name| PLACES.contains(&name.as_str()));
+        let Some(variable) = arg.get_env().map(|name| name.to_string_lossy().into_owned()) else {
+            if names_place && !without.contains(&typed.as_str()) && !arg.is_hide_set() {
+                faults.push(format!("{typed}: it names a place or a file and has no variable"));
+            }
+            continue;
+        };
+        if without.contains(&typed.as_str()) {
+            faults.push(format!("{typed}: it is listed as one without a variable, and has {variable}"));
+        }
+        let Some((_, kind)) = allowed.iter().find(|(name, _)| *name == variable) else {
+            faults.push(format!("{typed}: {variable} is not in the list of allowed variables"));
+            continue;
+        };
+        if !variable.starts_with(prefix) {
+            faults.push(format!("{typed}: {variable} does not begin with {prefix}"));
+        }
+        if let Some(why) = misfit(*kind, arg, names_place) {
+            faults.push(format!("{typed}: {variable} is listed as {kind:?}, but {why}"));
+        }
+        match seen.get(&variable) {
+            Some((other, first)) if !mean_the_same(*kind, first, arg) => {
+                faults.push(format!("{variable} has two meanings: {other} and {typed}"));
+            }
+            Some(_) => {}
+            None => drop(seen.insert(variable, (typed.clone(), arg))),
+        }
+    }
+    faults.extend(lists(&root, variables, allowed, without, &options, &seen));
+    faults
+}
+
+/// What stands in the lists and nowhere else.
+fn lists(
+    root: &Command,
+    variables: &Variables,
+    allowed: &[(&str, Kind)],
+    without: &[&str],
+    options: &[(String, &Arg)],
+    seen: &BTreeMap<String, (String, &Arg)>,
+) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (variable, _) in allowed.iter().filter(|(name, _)| !seen.contains_key(*name)) {
+        faults.push(format!("no option has the allowed variable {variable}"));
+    }
+    for option in without.iter().filter(|one| options.iter().all(|(typed, _)| typed != *one)) {
+        faults.push(format!("there is no option {option}"));
+    }
+    let commands = commands(root);
+    for retired in variables.retired {
+        let mut of_variable = variables.retired.iter().filter(|other| other.variable == retired.variable);
+        if !of_variable
+            .any(|one| commands.iter().any(|(words, command)| one.option_of(command, words).is_some()))
+        {
+            faults.push(format!(
+                "no option had {}: {} --{}",
+                retired.variable, retired.command, retired.option
+            ));
+        }
+    }
+    for words in variables.offline {
+        if commands.iter().all(|(name, _)| name != words) {
+            faults.push(format!("there is no command {words}"));
+        }
+    }
+    faults
+}
+
+/// Why an option is not of this kind.
+fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
+    let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
+    match kind {
+        Kind::File | Kind::Output if is_flag || !names_place => Some("its value is no file or folder"),
+        Kind::Rate if is_flag => Some("it has no value"),
+        Kind::Caution if !is_flag => Some("it has a value"),
+        _ if is_flag && arg.get_value_parser().type_id() != clap::builder::ValueParser::bool().type_id() => {
+            Some("it is no on/off option")
+        }
+        _ => None,
+    }
+}
+
+/// Two options of one variable are the same option of two commands.
+fn mean_the_same(kind: Kind, one: &Arg, other: &Arg) -> bool {
+    let help = |arg: &Arg| arg.get_help().map(ToString::to_string);
+    one.get_long() == other.get_long()
+        && value_name(one) == value_name(other)
+        && (kind != Kind::Output || help(one) == help(other))
+}
+
+fn value_name(arg: &Arg) -> Option<String> {
+    let names = arg.get_value_names().filter(|_| arg.get_action().takes_values())?;
+    names.first().map(ToString::to_string)
+}
+
+/// All options with the words of their command, `update --data`; a global one once.
+fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a Arg)>) {
+    for arg in command.get_arguments().filter(|arg| words.is_empty() || !arg.is_global_set()) {
+        if let Some(long) = arg.get_long() {
+            options.push((format!("{words} --{long}").trim().to_owned(), arg));
+        }
+    }
+    for sub in command.get_subcommands() {
+        collect(sub, format!("{words} {}", sub.get_name()).trim(), options);
+    }
+}
+
+/// All commands with their words.
+fn commands(root: &Command) -> Vec<(String, &Command)> {
+    fn walk<'a>(command: &'a Command, words: &str, all: &mut Vec<(String, &'a Command)>) {
+        all.push((words.to_owned(), command));
+        for sub in command.get_subcommands() {
+            walk(sub, format!("{words} {}", sub.get_name()).trim(), all);
+        }
+    }
+    let mut all = Vec::new();
+    walk(root, "", &mut all);
+    all
+}

@@ -1,0 +1,33 @@
+//! Words that nobody may read: printed, and not waited for.
+
+use std::time::Duration;
+
+/// Prints in a thread of its own, and waits for that no longer than `timeout`: a pipe that nobody reads (`2>&1 | less`)
+/// does not keep the process from ending.
+pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
+    let (done, printed) = std::sync::mpsc::channel();
+    let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
+        print();
+        let _ = done.send(());
+    });
+    if spawned.is_ok() {
+        let _ = printed.recv_timeout(timeout);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words without a reader do not keep the process.
+    #[test]
+    fn words_without_a_reader_are_not_waited_for() {
+        let (never, reader) = std::sync::mpsc::channel::<()>();
+        let since = std::time::Instant::now();
+        print_within(Duration::from_millis(20), move || {
+            let _ = reader.recv();
+        });
+        assert!(since.elapsed() < Duration::from_secs(5));
+        drop(never);
+    }
+}

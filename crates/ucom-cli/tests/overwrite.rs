@@ -1,0 +1,76 @@
+//! `--overwrite` writes over a file and lifts no check of the bus; `--force` lifts a check of the bus and writes over no file.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, ended_by, ucom};
+
+/// The advice of the file's check, followed while boards run, resets nothing.
+#[test]
+fn writing_over_a_file_never_resets_a_running_chain() {
+    let sim = Sim::numbered(&["--boards", "2"]);
+    let runner = sim.spawn(&["run", "1,2", "--active"]);
+    let mut peer = sim.peer();
+    peer.wait("381#");
+    peer.wait("382#");
+    let file = sim.file("boards.toml", b"mine");
+    for option in ["--init", "--alive"] {
+        let probe =
+            |more: &[&str]| sim.ucom(&[&["probe", option, "--out", &file], more].concat()).ends(4).err;
+        let there = probe(&[]);
+        assert!(there.contains("is there already") && there.contains("--overwrite"), "{option}: {there}");
+        assert!(!there.contains("--force"), "{option}: {there}");
+        let runs = probe(&["--overwrite"]);
+        assert!(runs.contains("running its control loop"), "{option}: {runs}");
+        assert!(!runs.contains("--overwrite"), "{option}: {runs}");
+        let forced = probe(&["--force"]);
+        assert!(forced.contains("is there already") && !forced.contains("--force"), "{option}: {forced}");
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+    peer.wait("381#");
+    peer.wait("382#");
+    let output = ended_by(runner, "-INT").ends(0);
+    assert!(!output.err.contains("rebooted"), "{}", output.err);
+}
+
+/// Each command that writes a file: `--force` alone writes over none, and `--overwrite` does.
+#[test]
+fn force_writes_over_no_file() {
+    let sim = Sim::numbered(&["--boards", "1"]);
+    sim.ucom(&["start", "all"]).ends(0);
+    let file = sim.file("mine", b"mine");
+    for words in [
+        &["par", "1", "--save", &file][..],
+        &["par", "1", "kp=3", "--save", &file],
+        &["io", "1", "--template", &file],
+        &["dbc", "1", "--out", &file],
+        &["dbc", "none", "--out", &file],
+        &["probe", "--out", &file],
+    ] {
+        for more in [&[][..], &["--force"]] {
+            let refused = sim.ucom(&[words, more].concat()).ends(4).err;
+            assert!(refused.contains("is there already; nothing was sent"), "{words:?}: {refused}");
+            let hint = refused.lines().last().unwrap();
+            assert!(hint.contains("--overwrite writes over it"), "{words:?}: {refused}");
+            assert!(!hint.contains("--force"), "{words:?}: {refused}");
+            assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine", "{words:?}");
+        }
+        sim.ucom(&[words, &["--overwrite"]].concat()).ends(0);
+        assert_ne!(std::fs::read_to_string(&file).unwrap(), "mine", "{words:?}");
+        sim.file("mine", b"mine");
+    }
+}
+
+/// `record` has no check of the bus: its `--force` of older scripts is `--overwrite`, and no help shows it.
+#[test]
+fn record_takes_force_for_overwrite() {
+    let sim = Sim::numbered(&["--boards", "1"]);
+    for word in ["--overwrite", "--force"] {
+        let file = sim.file("mine.log", b"mine");
+        sim.ucom(&["record", &file, "--for", "0.1"]).ends(4);
+        sim.ucom(&["record", &file, "--for", "0.1", word]).ends(0);
+        assert_ne!(std::fs::read_to_string(&file).unwrap(), "mine", "{word}");
+    }
+    let help = ucom(&["record", "--help"]).ends(0).out;
+    assert!(help.contains("--overwrite") && !help.contains("--force"), "{help}");
+}

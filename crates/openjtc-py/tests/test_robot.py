@@ -134,6 +134,26 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     assert not (tmp_path / "none.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("package", "act"),
+    [("matplotlib", "plot"), ("pandas", "to_pandas"), ("polars", "to_polars")],
+)
+def test_what_an_optional_package_is_needed_for_says_how_to_install_it(robot, package: str, act: str, monkeypatch):
+    plan = robot.plan([[0] * 6, HOME])
+    # As where it is not installed.
+    for module in [name for name in sys.modules if name.partition(".")[0] == package]:
+        monkeypatch.delitem(sys.modules, module)
+
+    class Missing:
+        def find_spec(self, name, path=None, target=None):
+            if name.partition(".")[0] == package:
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [Missing(), *sys.meta_path])
+    with pytest.raises(ImportError, match=f"pip install {package}$"):
+        getattr(plan, act)()
+
+
 def test_plans_keep_the_limits_and_run(robot):
     waypoints = [HOME, HOME + 0.3, HOME - [0.4, 0.1, 0, 0, 0.2, 0]]
     plan = robot.plan(waypoints, blend=0.05)

@@ -134,6 +134,13 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     assert not (tmp_path / "none.csv").exists()
 
 
+def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
+    run = robot.move([0, 30, 0, 0, 0, 0], degrees=True)
+    # A notebook takes every form that an object has, and shows one.
+    forms = [form for form in ("html", "svg", "png", "jpeg", "pdf", "markdown") if hasattr(run, f"_repr_{form}_")]
+    assert forms == ["html"] and len(run._repr_html_()) < 2_000_000
+
+
 @pytest.mark.parametrize(
     ("package", "act"),
     [("matplotlib", "plot"), ("pandas", "to_pandas"), ("polars", "to_polars")],

@@ -155,9 +155,6 @@ class Samples:
         page = html.escape(self._native.html(), quote=True)
         return f'<iframe srcdoc="{page}" style="width:100%;height:640px;border:0" title="report"></iframe>'
 
-    def _repr_svg_(self) -> str:
-        return self._native.svg()
-
     def _table(self) -> str:
         head = f"{'':<20}{'RMS mrad':>10}{'max mrad':>10}{'rad/s':>8}{'N·m':>8}{'share %':>9}"
         rows = [head]

@@ -287,7 +287,7 @@ class Plan(Samples):
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check."""
+        """What was changed for the check, and which waypoints rounded corners miss."""
         return self._plan.notes
 
     @property

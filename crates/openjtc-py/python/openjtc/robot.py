@@ -47,11 +47,15 @@ class Robot(Connected):
         line: bool = False,
         degrees: bool = False,
     ) -> Plan:
-        """Plans a motion of the controller's arm with its payload; nothing moves. Arguments are those of `Planner` and `Planner.through`."""
+        """Plans a motion of the controller's arm with its payload; nothing moves.
+
+        Arguments are those of `Planner` and `Planner.through`. `speed` is 100 % of what the limits allow, also on a real arm: `run` and its
+        `speed` decide how fast the plan is run.
+        """
         mass, com, inertia = self._link.payload() if self.info else (0.0, [0.0] * 3, [0.0] * 6)
         payload = Payload(mass, tuple(com), tuple(inertia)) if mass else None
-        planner = Planner(self.arm, speed=speed, blend=blend, line=line, payload=payload)
-        return planner.through(waypoints, times=times, degrees=degrees)
+        planner = Planner(self.arm, speed=speed, line=line, payload=payload)
+        return planner.through(waypoints, times=times, blend=blend, degrees=degrees)
 
     def check(
         self,

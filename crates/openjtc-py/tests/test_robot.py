@@ -134,6 +134,28 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     assert not (tmp_path / "none.csv").exists()
 
 
+def test_a_move_without_a_speed_is_slow_and_says_so(robot):
+    """Joint positions, a pose of the flange and approaches, with and without a speed."""
+    told = "at 25 % of the limits; `speed=` sets it"
+    way = robot.plan([[0] * 6, HOME])
+    slow = robot.move(HOME)
+    assert f"move {told}" in slow.notes
+    robot.move([0] * 6, speed=100)
+    same = robot.move(HOME, speed=25)
+    assert same.duration == pytest.approx(slow.duration, abs=0.1) and not same.notes
+    robot.move([0] * 6, speed=100)
+    assert slow.duration > 1.7 * robot.move(HOME, speed=100).duration
+    assert f"move {told}" in robot.move(flange=[0.6, -0.3, 0.4, 0, 0, 0]).notes
+    approached = robot.run(way, approach=True)
+    assert f"approach {told}" in approached.notes
+    assert approached.duration == pytest.approx(way.duration, abs=0.3)
+    robot.move(HOME + 0.1, speed=100)
+    assert not robot.run(way, approach=True, speed=100).notes
+    assert not robot.run(robot.plan([HOME, [0] * 6])).notes
+    # Twice the approach, one note.
+    assert robot.run(robot.plan([robot.position, HOME]), approach=True, repeat=3).notes.count(f"approach {told}") == 1
+
+
 @pytest.mark.parametrize(
     ("length", "blend"), [(60, 5), (60, 10), (30, 5), (30, 1), (90, 20), (45, 28), (10, 3), (80, 0.5), (57, 2), (60, 0)]
 )

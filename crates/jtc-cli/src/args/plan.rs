@@ -92,15 +92,9 @@ pub struct MoveArgs {
     /// The positions, or roll, pitch and yaw, are degrees; not for poses by name, whose unit is known
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
     pub deg: bool,
-    /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(
-        long,
-        env = "JTC_SPEED_PERCENT",
-        value_name = "PCT",
-        default_value_t = 50.0,
-        allow_hyphen_values = true
-    )]
-    pub speed: f64,
+    /// Speed in percent of what the limits allow, 1 to 100; default: 10, and 25 in a simulator
+    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", allow_hyphen_values = true)]
+    pub speed: Option<f64>,
     /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,

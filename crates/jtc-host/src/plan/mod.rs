@@ -19,6 +19,7 @@
 mod again;
 mod approach;
 mod corners;
+mod default_speed;
 mod error;
 mod lines;
 mod rest_of;
@@ -38,6 +39,7 @@ use serde::Serialize;
 
 pub use approach::{ApproachError, approach};
 pub use corners::{BLEND_M_MAX, BLEND_MAX};
+pub use default_speed::MoveSpeed;
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use rest_of::rest_of;

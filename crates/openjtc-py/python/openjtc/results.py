@@ -191,7 +191,7 @@ class Run(Samples):
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check."""
+        """What was changed for the check, and the speed where none was named."""
         return self._native.notes
 
     def __repr__(self) -> str:

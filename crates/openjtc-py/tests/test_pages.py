@@ -132,7 +132,7 @@ def told_to_install() -> list[tuple[Path, str]]:
     kinds = {".md", ".py", ".pyi", ".rs", ".ipynb", ".toml"}
     files = [file for place in places for file in [ROOT / place, *sorted((ROOT / place).rglob("*"))] if file.suffix in kinds]
     return [
-        (file, word.strip("`'\"\\),."))
+        (file, word.lstrip("`'\"\\(").rstrip("`'\"\\),."))
         for file in files
         if "target" not in file.parts and file != Path(__file__).resolve() and file.is_file()
         for command in re.findall(r"pip3? install ([^\n#]*)", file.read_text(encoding="utf-8"))

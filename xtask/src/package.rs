@@ -16,7 +16,7 @@ const FIRST_LINES: &str = "import openjtc\n\
     with openjtc.connect('sim:', speed=None) as robot:\n    \
         run = robot.move([0, 30, -60, 0, 30, 0], degrees=True)\n    \
         print(run)\n    \
-        assert run.outcome == 'finished' and run._repr_svg_().startswith('<svg')\n";
+        assert run.outcome == 'finished' and run._repr_html_().startswith('<iframe')\n";
 
 /// Where the wheel is put.
 fn wheels() -> PathBuf {

@@ -19,6 +19,33 @@ fn arm(sim: &Sim) -> String {
     sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
 }
 
+/// A move and an approach for which the user names no speed are slow, and the speed is printed.
+#[test]
+fn j52_a_move_without_a_speed_is_slow() {
+    let sim = ready();
+    let default = "at 25 % of the limits; --speed sets it";
+    let mut to = |words: &[&str]| {
+        let output = sim.jtc(&[&["--json", "move", "--to", "0.4,0.2,-0.3,0,0,0"], words].concat()).ends(0);
+        sim.jtc(&["move", "--to", "0,0,0,0,0,0", "--speed", "100"]).ends(0);
+        (output.json()["executed_s"].as_f64().unwrap(), output.err)
+    };
+    let (slow, said) = to(&[]);
+    assert!(said.contains(default), "{said}");
+    let (same, named) = to(&["--speed", "25"]);
+    assert!((slow - same).abs() < 0.1 && !named.contains("of the limits"), "{slow} s, {same} s: {named}");
+    let (full, _) = to(&["--speed", "100"]);
+    assert!(slow > 1.7 * full, "{slow} s, {full} s");
+    let motion = sim.path("motion.csv");
+    sim.jtc(&["example", "motion", "-o", &motion]).ends(0);
+    let mut approach = |words: &[&str]| {
+        sim.jtc(&["move", "--to", "0.4,0.2,-0.3,0,0,0", "--speed", "100"]).ends(0);
+        sim.jtc(&[&["traj", "run", &motion, "--approach"], words].concat()).ends(0).err
+    };
+    let said = approach(&[]);
+    assert!(said.contains("s to the first point, ") && said.contains(default), "{said}");
+    assert!(!approach(&["--speed", "100"]).contains("of the limits"));
+}
+
 /// To a pose of the flange in joint space, and from there on a straight line; what cannot be is refused before anything moves.
 #[test]
 fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {

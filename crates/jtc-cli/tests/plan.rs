@@ -32,6 +32,29 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// `--deg` makes degrees of the blend as of the positions, and a waypoint that a rounded corner misses is named.
+#[test]
+fn a_blend_is_in_the_unit_of_the_positions() {
+    let dir = Dir::new();
+    let header = "q1,q2,q3,q4,q5,q6\n";
+    let in_rad = dir.file("rad.csv", &format!("{header}0,0,0,0,0,0\n1,0,0,0,0,0\n1,1,0,0,0,0\n"));
+    let degrees = 1f64.to_degrees();
+    let in_degrees = format!("{header}0,0,0,0,0,0\n{degrees},0,0,0,0,0\n{degrees},{degrees},0,0,0,0\n");
+    let in_degrees = dir.file("degrees.csv", &in_degrees);
+    let (out, other) = (dir.path("out.csv"), dir.path("other.csv"));
+    for blend in [0.0f64, 0.02, 0.1, 0.3, 0.5] {
+        let (rad, deg) = (blend.to_string(), blend.to_degrees().to_string());
+        let a = json(&[&in_rad, "-o", &out, "--force", "--blend", &rad], 0);
+        let b = json(&[&in_degrees, "-o", &other, "--force", "--deg", "--blend", &deg], 0);
+        assert_eq!(a["points"], b["points"], "{blend}");
+        for (a, b) in rows(&out).iter().flatten().zip(rows(&other).iter().flatten()) {
+            assert!((a - b).abs() < 1e-6, "{blend}: {a}, {b}");
+        }
+        let missed = a["notes"].to_string().contains("rounded corners: waypoint 2 is missed by 0.");
+        assert_eq!(missed, blend >= 0.3, "{blend}: {}", a["notes"]);
+    }
+}
+
 /// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is no slower without a
 /// limit; what is printed is what is in the file.
 #[test]
@@ -162,6 +185,11 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         ),
         (vec![&back], 2, "back.csv, line 4: waypoint 3: time 1 s is not after 2 s"),
         (vec![&good, "--blend", "-0.1"], 2, "blend of -0.1 rad"),
+        (vec![&good, "--blend", "5"], 2, "blend of 5 rad is out of range, expected 0..0.5 rad"),
+        (vec![&good, "--blend", "0.51"], 2, "blend of 0.51 rad is out of range"),
+        (vec![&good, "--blend", "inf"], 2, "blend of inf rad is out of range"),
+        (vec![&good, "--deg", "--blend", "29"], 2, "blend of 0.506"),
+        (vec![&good, "--line", "--blend-m", "20"], 2, "blend of 20 m is out of range, expected 0..0.5 m"),
         (vec![&good, "--speed", "0"], 2, "speed 0 % is not within 1..100 %"),
         (vec![&good, "--speed", "101"], 2, "speed 101 % is not within 1..100 %"),
         (vec![&good, "--payload", "25,0,0,0.1"], 4, "good.csv, line"),

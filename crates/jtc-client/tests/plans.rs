@@ -104,6 +104,8 @@ fn what_cannot_be_planned_is_refused_with_place_value_and_limit_and_is_not_kept(
         (change("speed_percent", json!(101)), json!(101.0), json!(100.0)),
         (change("temperature_c", json!(-41)), json!(-41.0), json!(-40.0)),
         (change("blend_rad", json!(-1)), Value::Null, Value::Null),
+        (change("blend_rad", json!(5)), json!(5.0), json!(0.5)),
+        (change("blend_m", json!(20)), json!(20.0), json!(0.5)),
         (change("payload", json!({ "mass_kg": -1, "com_m": [0, 0, 0] })), Value::Null, Value::Null),
         (change("keep", json!({ "number": 100, "name": "" })), Value::Null, Value::Null),
         (change("waypoints", json!("pose\nnowhere\n")), Value::Null, Value::Null),

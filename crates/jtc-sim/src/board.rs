@@ -9,7 +9,7 @@ use jtc_core::{
 };
 use jtc_wire::{
     BootCause, EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, FrameType, LinkEvent, RawPoint, ReceivedEvent,
-    Receiver, STATUS_LEN, StoreState, UrgentWatch,
+    Receiver, SIMULATOR, STATUS_LEN, StoreState, UrgentWatch,
 };
 
 /// The host's line: the world has one.
@@ -134,7 +134,7 @@ impl Board {
     fn boot(&mut self) {
         let boot_cause = if self.watchdog_resets > 0 { BootCause::Watchdog } else { BootCause::PowerOn };
         self.controller.set_identity(Identity {
-            board: "simulator",
+            board: SIMULATOR,
             firmware: env!("CARGO_PKG_VERSION"),
             revision: "",
             boots: 1 + self.watchdog_resets,

@@ -15,7 +15,7 @@ pub use image::{ArmImage, FrictionImage, Hash, IMAGE_MAX, field as image_field};
 pub(crate) use log::LOG_HEAD_LEN;
 pub use log::{LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState};
 
-pub use info::{BootCause, INFO_LEN, INFO_WRITTEN, Info, Program, StoreState, capability};
+pub use info::{BootCause, INFO_LEN, INFO_WRITTEN, Info, Program, SIMULATOR, StoreState, capability};
 
 /// Version of the extensions that this crate speaks. Later ones only add.
 pub const EXTENSION_VERSION: u8 = 1;

@@ -1,6 +1,6 @@
 """A Gymnasium environment over the simulated arm: reach joint positions with torques, 50 decisions a second.
 
-    pip install openjtc[gym]
+    pip install './openjtc-0.2.0-….whl[gym]'    # the wheel of a release, by its whole name; or only `pip install gymnasium` beside it
     python gym_environment.py
 
 checks the environment and runs a scripted policy in it. The actions are shares of the torques that the drives reach.

@@ -100,6 +100,7 @@ const COMMANDS: &[(&str, &str)] = &[
     ("jtc log fetch", "robot.flight_log()"),
     ("--accept-device-limits", "accept_device_limits=True"),
     ("--baud", "baud="),
+    ("--deg", "degrees=True"),
 ];
 
 /// What helps, in terms of Python.

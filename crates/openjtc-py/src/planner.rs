@@ -85,6 +85,11 @@ pub struct Planner {
 }
 
 impl Planner {
+    /// The blend that is given, or its own.
+    fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
+        given.map_or(Ok(self.blend), |blend| distance("blend", blend))
+    }
+
     fn plan(
         &self,
         py: Python<'_>,
@@ -97,7 +102,6 @@ impl Planner {
                 friction: friction.as_ref(),
                 temperature: self.temperature,
                 speed_pct: self.speed,
-                blend: self.blend,
                 jerk: self.jerk,
                 ..HostPlanner::new(&self.config)
             };
@@ -110,13 +114,23 @@ impl Planner {
         Ok(planned?)
     }
 
-    fn waypoints(&self, py: Python<'_>, file: WaypointFile) -> PyResult<Plan> {
+    fn waypoints(&self, py: Python<'_>, file: WaypointFile, blend: Option<f64>) -> PyResult<Plan> {
+        let blend = self.blend(blend)?;
         self.plan(py, |planner| {
-            let options = WayOptions { line: self.line, blend: self.blend, blend_m: self.blend_m };
+            let options = WayOptions { line: self.line, blend, blend_m: self.blend_m };
             let way = Way::of(&file, &self.arm, options).map_err(|error| of_waypoints(&error))?;
-            way.planned(planner).map_err(|error| Failure { message: file.located(&error), ..error.into() })
+            way.planned(&HostPlanner { blend, ..planner.clone() })
+                .map_err(|error| Failure { message: file.located(&error), ..error.into() })
         })
     }
+}
+
+/// A blend that is negative, or not a number, is not valid.
+fn distance(what: &str, value: f64) -> Result<f64, Failure> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Failure::usage(format!("{what}: {value} is no distance")))
 }
 
 fn of_waypoints(error: &WaypointError) -> Failure {
@@ -139,11 +153,7 @@ impl Planner {
         payload: Option<PayloadNumbers>,
     ) -> Result<Self, Failure> {
         let payload = crate::dynamics::payload(payload)?;
-        for (what, value) in [("blend", blend), ("blend_m", blend_m)] {
-            if !value.is_finite() || value < 0.0 {
-                return Err(Failure::usage(format!("{what}: {value} is no distance")));
-            }
-        }
+        let (blend, blend_m) = (distance("blend", blend)?, distance("blend_m", blend_m)?);
         let config = jtc_core::Config { payload, ..arm.inner.config() };
         let temperature = temperature.unwrap_or(COLD);
         Ok(Self { arm: Arc::clone(&arm.inner), config, speed, blend, blend_m, line, jerk, temperature })
@@ -170,14 +180,17 @@ impl Planner {
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// Through positions (N, 6), with times (s from the first, NaN: as soon as the limits allow).
-    #[pyo3(signature = (positions, times=None))]
+    /// Through positions (N, 6), with a blend (rad) in the place of its own, and with times (s from the first, NaN: as soon as the limits
+    /// allow).
+    #[pyo3(signature = (positions, blend=None, times=None))]
     fn through(
         &self,
         py: Python<'_>,
         positions: &Bound<'_, PyAny>,
+        blend: Option<f64>,
         times: Option<Vec<f64>>,
     ) -> PyResult<Plan> {
+        let blend = self.blend(blend)?;
         let (positions, _) = array::rows(positions, "waypoints")?;
         let times = times.unwrap_or_else(|| vec![f64::NAN; positions.len()]);
         if times.len() != positions.len() {
@@ -189,21 +202,27 @@ impl Planner {
             .zip(times)
             .map(|(position, time)| Waypoint { position, time: time.is_finite().then_some(time) })
             .collect();
-        self.plan(py, |planner| Ok(planner.through(&waypoints)?))
+        self.plan(py, |planner| Ok(HostPlanner { blend, ..planner.clone() }.through(&waypoints)?))
     }
 
     /// Through the waypoints of a file, CSV or JSON.
-    fn through_file(&self, py: Python<'_>, path: PathBuf, degrees: bool) -> PyResult<Plan> {
+    fn through_file(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        blend: Option<f64>,
+        degrees: bool,
+    ) -> PyResult<Plan> {
         let file = WaypointFile::load(&path).map_err(Failure::from)?;
         let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
-        self.waypoints(py, file)
+        self.waypoints(py, file, blend)
     }
 
     /// Through the waypoints of the text of such a file.
-    fn through_text(&self, py: Python<'_>, text: &str, degrees: bool) -> PyResult<Plan> {
+    fn through_text(&self, py: Python<'_>, text: &str, blend: Option<f64>, degrees: bool) -> PyResult<Plan> {
         let file = WaypointFile::parse(text).map_err(Failure::from)?;
         let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
-        self.waypoints(py, file)
+        self.waypoints(py, file, blend)
     }
 
     /// Checks a trajectory, from `start` where it is given.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use jtc_host::Sample;
 use jtc_host::plan::Bound as Binding;
 use jtc_host::recording::{RecordingInfo, write_all};
-use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html, picture_svg};
+use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html};
 use jtc_host::sample::JointSample;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -140,11 +140,6 @@ impl Samples {
     /// The report: one page that opens offline.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| html(&self.input(&Digest::of(&self.samples))))
-    }
-
-    /// Commanded and measured positions and their error, as a picture.
-    fn svg(&self, py: Python<'_>) -> String {
-        py.detach(|| picture_svg(&self.input(&Digest::of(&self.samples))))
     }
 
     /// A recording, MCAP or CSV by the ending.

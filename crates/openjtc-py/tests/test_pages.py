@@ -124,3 +124,27 @@ def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         page.write_text(updated, encoding="utf-8")
     else:
         assert not wrong, "\n\n".join(wrong)
+
+
+def told_to_install() -> list[tuple[Path, str]]:
+    """What the project says to `pip install`, word by word."""
+    places = ["README.md", "docs", "crates/openjtc-py", "crates/jtc-host/src", "crates/jtc-cli/src", "crates/ucom-cli/src", "references"]
+    kinds = {".md", ".py", ".pyi", ".rs", ".ipynb", ".toml"}
+    files = [file for place in places for file in [ROOT / place, *sorted((ROOT / place).rglob("*"))] if file.suffix in kinds]
+    return [
+        (file, word.lstrip("`'\"\\(").rstrip("`'\"\\),."))
+        for file in files
+        if "target" not in file.parts and file != Path(__file__).resolve() and file.is_file()
+        for command in re.findall(r"pip3? install ([^\n#]*)", file.read_text(encoding="utf-8"))
+        for word in re.split(r"\s+|\\n", command)
+    ]
+
+
+def test_nobody_is_told_to_install_a_name_that_is_not_ours():
+    """The package is on no index: a line that installs it by its name runs what somebody else puts there. A wheel is named by its path."""
+    words = told_to_install()
+    if not (ROOT / "docs").exists():
+        pytest.skip("the package is tested without its repository")
+    assert any(word.startswith("./openjtc-") for _, word in words)
+    wrong = [(str(file), word) for file, word in words if re.match(r"(openjtc|jtc|ucom)\b", word)]
+    assert not wrong

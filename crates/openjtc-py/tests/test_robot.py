@@ -134,6 +134,93 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     assert not (tmp_path / "none.csv").exists()
 
 
+def test_a_move_without_a_speed_is_slow_and_says_so(robot):
+    """Joint positions, a pose of the flange and approaches, with and without a speed."""
+    told = "at 25 % of the limits; `speed=` sets it"
+    way = robot.plan([[0] * 6, HOME])
+    slow = robot.move(HOME)
+    assert f"move {told}" in slow.notes
+    robot.move([0] * 6, speed=100)
+    same = robot.move(HOME, speed=25)
+    assert same.duration == pytest.approx(slow.duration, abs=0.1) and not same.notes
+    robot.move([0] * 6, speed=100)
+    assert slow.duration > 1.7 * robot.move(HOME, speed=100).duration
+    assert f"move {told}" in robot.move(flange=[0.6, -0.3, 0.4, 0, 0, 0]).notes
+    approached = robot.run(way, approach=True)
+    assert f"approach {told}" in approached.notes
+    assert approached.duration == pytest.approx(way.duration, abs=0.3)
+    robot.move(HOME + 0.1, speed=100)
+    assert not robot.run(way, approach=True, speed=100).notes
+    assert not robot.run(robot.plan([HOME, [0] * 6])).notes
+    # Twice the approach, one note.
+    assert robot.run(robot.plan([robot.position, HOME]), approach=True, repeat=3).notes.count(f"approach {told}") == 1
+
+
+@pytest.mark.parametrize(
+    ("length", "blend"), [(60, 5), (60, 10), (30, 5), (30, 1), (90, 20), (45, 28), (10, 3), (80, 0.5), (57, 2), (60, 0)]
+)
+def test_a_blend_is_in_the_unit_of_the_waypoints(robot, length: float, blend: float):
+    corner = np.array([[0] * 6, [length, 0, 0, 0, 0, 0], [length, length / 2, 0, 0, 0, 0]])
+    listed = [{f"q{j}": q for j, q in enumerate(place, 1)} for place in corner]
+    reference = robot.plan(np.radians(corner), blend=np.radians(blend))
+    planner = openjtc.Planner(robot.arm)
+    for plan in (
+        robot.plan(corner, blend=blend, degrees=True),
+        planner.through(corner, blend=blend, degrees=True),
+        planner.through(np.radians(corner), blend=np.radians(blend)),
+        openjtc.Planner(robot.arm, blend=np.radians(blend)).through(corner, degrees=True),
+        robot.plan(listed, blend=blend, degrees=True),
+    ):
+        assert plan.trajectory.position == pytest.approx(reference.trajectory.position, abs=1e-6)
+    missed = np.abs(reference.trajectory.position - np.radians(corner[1])).max(axis=1).min()
+    assert missed <= np.radians(blend) + 0.01
+    assert any("waypoint 2 is missed by" in note for note in reference.notes) == (missed > 0.05)
+
+
+@pytest.mark.parametrize("blend", [0.51, 0.6, 1, 2, 5, 10, 30, 90, 300, 1e9])
+def test_a_blend_in_degrees_is_refused_where_rad_are_meant(robot, blend: float):
+    corner = [[0] * 6, [1, 0, 0, 0, 0, 0], [1, 0.5, 0, 0, 0, 0]]
+    for plan in (
+        lambda: robot.plan(corner, blend=blend),
+        lambda: openjtc.Planner(blend=blend).through(corner),
+        lambda: openjtc.Planner().through(corner, blend=blend),
+        lambda: openjtc.Planner(blend=blend).through(np.degrees(corner), degrees=True),
+        lambda: robot.plan(np.degrees(corner), blend=np.degrees(blend), degrees=True),
+        lambda: robot.plan([{f"q{j}": q for j, q in enumerate(place, 1)} for place in corner], blend=blend),
+    ):
+        with pytest.raises(openjtc.UsageError, match="out of range, expected 0..0.5 rad") as caught:
+            plan()
+        assert caught.value.limit == 0.5 and "degrees=True" in caught.value.next
+        assert caught.value.value >= 0.51
+
+
+def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
+    run = robot.move([0, 30, 0, 0, 0, 0], degrees=True)
+    # A notebook takes every form that an object has, and shows one.
+    forms = [form for form in ("html", "svg", "png", "jpeg", "pdf", "markdown") if hasattr(run, f"_repr_{form}_")]
+    assert forms == ["html"] and len(run._repr_html_()) < 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("package", "act"),
+    [("matplotlib", "plot"), ("pandas", "to_pandas"), ("polars", "to_polars")],
+)
+def test_what_an_optional_package_is_needed_for_says_how_to_install_it(robot, package: str, act: str, monkeypatch):
+    plan = robot.plan([[0] * 6, HOME])
+    # As where it is not installed.
+    for module in [name for name in sys.modules if name.partition(".")[0] == package]:
+        monkeypatch.delitem(sys.modules, module)
+
+    class Missing:
+        def find_spec(self, name, path=None, target=None):
+            if name.partition(".")[0] == package:
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [Missing(), *sys.meta_path])
+    with pytest.raises(ImportError, match=f"pip install {package}$"):
+        getattr(plan, act)()
+
+
 def test_plans_keep_the_limits_and_run(robot):
     waypoints = [HOME, HOME + 0.3, HOME - [0.4, 0.1, 0, 0, 0.2, 0]]
     plan = robot.plan(waypoints, blend=0.05)

@@ -28,13 +28,14 @@ pub struct RunRequest {
     /// Digest of the trajectory that was looked at: where the number has another one by now nothing is sent.
     #[serde(default)]
     pub digest: Option<String>,
-    /// Where the arm stands elsewhere it is moved to the first point, at half of the limits at most.
+    /// Where the arm stands elsewhere it is moved to the first point, at `speed_percent` of the limits and at half of them at most. Without
+    /// `speed_percent` at 10 % of the limits, and at 25 % where the controller is a simulator.
     #[serde(default)]
     pub approach: bool,
-    /// % of the trajectory's own speed.
-    #[serde(default = "hundred")]
+    /// % of the trajectory's own speed; missing: 100.
+    #[serde(default)]
     #[schema(minimum = 1, maximum = 1000)]
-    pub speed_percent: f64,
+    pub speed_percent: Option<f64>,
     /// How often it is run.
     #[serde(default = "one")]
     #[schema(minimum = 1, maximum = 1000000)]
@@ -64,10 +65,10 @@ pub struct MoveRequest {
     /// The flange keeps to a straight line.
     #[serde(default)]
     pub line: bool,
-    /// % of what the limits allow.
-    #[serde(default = "hundred")]
+    /// % of what the limits allow; missing: 10, and 25 where the controller is a simulator.
+    #[serde(default)]
     #[schema(minimum = 1, maximum = 100)]
-    pub speed_percent: f64,
+    pub speed_percent: Option<f64>,
     /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
     #[serde(default)]
     pub policy: Option<Policy>,
@@ -86,10 +87,6 @@ pub struct FlangeObject {
     /// Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad.
     #[schema(min_items = 3, max_items = 3)]
     pub rpy_rad: [f64; 3],
-}
-
-fn hundred() -> f64 {
-    100.0
 }
 
 fn one() -> u32 {
@@ -204,7 +201,7 @@ pub(super) async fn begin_run(
         accept_device_limits,
     } = request;
     within("repeat", f64::from(repeat), 1e6)?;
-    within("speed_percent", speed_percent, 1000.0)?;
+    within("speed_percent", speed_percent.unwrap_or(100.0), 1000.0)?;
     let stored = agent.jobs.store.get(number).ok_or_else(|| {
         let next =
             "keep one with PUT /api/trajectories/{number}; GET /api/trajectories lists those that there are";
@@ -257,7 +254,7 @@ pub(super) async fn begin_move(
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
     let MoveRequest { to_rad, to_pose, to_flange, line, speed_percent, policy, accept_device_limits } =
         request;
-    within("speed_percent", speed_percent, 100.0)?;
+    within("speed_percent", speed_percent.unwrap_or(100.0), 100.0)?;
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, Planner};
+use jtc_host::plan::{self, MoveSpeed, Planner};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
 use jtc_host::session::{Flow, Outcome};
@@ -41,8 +41,9 @@ pub struct Order {
     pub course: Course,
     /// Where the arm stands elsewhere it is moved to the first point.
     pub approach: bool,
-    /// % of the trajectory's own speed, or of what the limits allow.
-    pub speed_percent: f64,
+    /// % of the trajectory's own speed, or of what the limits allow. `None`: the trajectory's own speed, and the default one for a move or
+    /// an approach.
+    pub speed_percent: Option<f64>,
     /// How often.
     pub repeat: u32,
     /// The controller has no extensions, uses other limits than the agent's arm, and these are safe for it.
@@ -90,12 +91,18 @@ impl Run<'_> {
         let ready = self.session.ready_to_move(waits, || task.is_halted());
         let mut status = ready.map_err(|error| self.before_motion(&error))?;
         let site = self.site(order)?;
-        let trajectory = self.trajectory(order, &site, &status)?;
+        let move_speed = self.session.move_speed(order.speed_percent);
+        let move_speed = move_speed.map_err(|error| ErrorObject::of(&error.into()))?;
+        let trajectory = self.trajectory(order, &site, &status, move_speed)?;
         closed(&trajectory, order, &site)?;
         for n in 1..=order.repeat.max(1) {
             let mut checked = site.check(&trajectory, &status);
             if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let way = site.approach(&trajectory, &status, order.speed_percent)?;
+                let way = site.approach(&trajectory, &status, move_speed.percent)?;
+                move_speed
+                    .note("speed_percent")
+                    .into_iter()
+                    .for_each(|words| task.note(format!("approach {words}")));
                 if !self.motion("approach", &way, &site, done)? {
                     return Ok(());
                 }
@@ -144,24 +151,31 @@ impl Run<'_> {
     }
 
     /// What is run.
-    fn trajectory(&self, order: &Order, site: &Site, status: &Status) -> Result<Trajectory, ErrorObject> {
+    fn trajectory(
+        &self,
+        order: &Order,
+        site: &Site,
+        status: &Status,
+        move_speed: MoveSpeed,
+    ) -> Result<Trajectory, ErrorObject> {
         match &order.course {
-            Course::Along(trajectory) if order.speed_percent == 100.0 => Ok(trajectory.clone()),
-            Course::Along(trajectory) => {
-                plan::at_speed(trajectory, order.speed_percent).map_err(|e| plan_error(&e))
-            }
+            Course::Along(trajectory) => match order.speed_percent {
+                None | Some(100.0) => Ok(trajectory.clone()),
+                Some(percent) => plan::at_speed(trajectory, percent).map_err(|e| plan_error(&e)),
+            },
             Course::To(place, line) => {
                 let (config, friction) =
                     (site.arm.config_on_device(&site.options.device), site.arm.friction());
                 let planner = Planner {
                     model: Some(&site.arm.model),
                     friction: friction.as_ref(),
-                    speed_pct: order.speed_percent,
+                    speed_pct: move_speed.percent,
                     ..Planner::new(&config)
                 };
                 let planned = planner.to_target(&site.arm.model, &status.positions(), place, *line);
                 let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
-                planned.notes.into_iter().for_each(|text| self.task.note(text));
+                let of_speed = move_speed.note("speed_percent").map(|words| format!("move {words}"));
+                planned.notes.into_iter().chain(of_speed).for_each(|text| self.task.note(text));
                 Ok(planned.trajectory)
             }
         }

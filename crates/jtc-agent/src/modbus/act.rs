@@ -146,7 +146,8 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(stored.trajectory.clone()),
             approach: order.approach,
-            speed_percent: f64::from(order.speed),
+            // The register always has a number: its default is no speed that was named.
+            speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,
         };

@@ -287,7 +287,7 @@ pub const HOLDINGS: [Holding; holding::COUNT] = [
     Holding { name: "policy", range: (0, 2), default: 1, meaning: "what becomes of a motion then: 0 it goes on, 1 it pauses, 2 it stops" },
     Holding { name: "trajectory", range: (0, NUMBER_MAX), default: 0, meaning: "number of the trajectory to start; 0: none" },
     Holding { name: "speed", range: (1, 1000), default: 100,
-        meaning: "%: for a start, of the trajectory's own speed; for `set speed`, of the speed on the path, 5 to 100" },
+        meaning: "%: for a start, of the trajectory's own speed, and of the limits for an approach (100: an approach runs at 10 % of the limits, 25 % in a simulator); for `set speed`, of the speed on the path, 5 to 100" },
     Holding { name: "repeat", range: (1, u16::MAX), default: 1, meaning: "how often it is run" },
     Holding { name: "approach", range: (0, 1), default: 0, meaning: "1: where the arm stands elsewhere it is moved to the first point" },
     Holding { name: "command", range: (0, super::codes::COMMAND_MAX), default: 0, meaning: "a command of the table of commands" },

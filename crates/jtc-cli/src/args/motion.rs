@@ -12,12 +12,19 @@ pub struct CheckArgs {
     /// Arm whose limits and masses count, TOML or URDF; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
-    #[arg(long, value_name = "PCT", default_value_t = 100.0, allow_hyphen_values = true)]
-    pub speed: f64,
+    /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path; default: 100
+    #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
+    pub speed: Option<f64>,
     /// The numbers of the file are degrees, for files that do not name their unit; a CSV header does with q1_deg..q6_deg
     #[arg(long)]
     pub deg: bool,
+}
+
+impl CheckArgs {
+    /// Percent of the file's own speed.
+    pub fn speed(&self) -> f64 {
+        self.speed.unwrap_or(100.0)
+    }
 }
 
 /// `jtc traj …`
@@ -48,7 +55,9 @@ pub enum TrajCommand {
     },
     /// Check, upload, execute, follow, report
     #[command(
-        after_help = "On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
+        after_help = "The motion runs at 100 % of the file's own speed. An approach runs at --speed, and at half of the limits at most;\n\
+                            without --speed at 10 % of the limits, and at 25 % in a simulator.\n\
+                            On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
                             Ctrl-C stops on the path, then ends; a second one ends at once.\n\
                             Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
                             program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\

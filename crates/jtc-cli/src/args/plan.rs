@@ -15,13 +15,13 @@ pub struct PlanArgs {
     /// Trajectory to write, .csv
     #[arg(short, long, env = "JTC_PLAN_OUT", value_name = "FILE")]
     pub out: PathBuf,
-    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each
+    /// How far from a waypoint its corner may be rounded, up to 0.5 rad (with --deg: degrees) of the joint that is furthest; 0: the arm stops at each
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
     /// The flange keeps to a straight line on each leg of which the file does not say how the arm moves
     #[arg(long)]
     pub line: bool,
-    /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there
+    /// How far from a waypoint the corner between two lines or arcs may be rounded, up to 0.5 m; 0: the arm stops there
     #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Speed in percent of what the limits allow, 1 to 100
@@ -33,7 +33,7 @@ pub struct PlanArgs {
     /// Arm whose limits, masses and poses count, TOML or URDF; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// The numbers of the file are degrees, for files that do not name their unit
+    /// The numbers of the file and --blend are degrees, for files that do not name their unit
     #[arg(long)]
     pub deg: bool,
     /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m
@@ -77,9 +77,9 @@ pub struct MoveArgs {
     /// The positions, or roll, pitch and yaw, are degrees; not for poses by name, whose unit is known
     #[arg(long)]
     pub deg: bool,
-    /// Speed in percent of what the limits allow, 1 to 100
-    #[arg(long, value_name = "PCT", default_value_t = 50.0, allow_hyphen_values = true)]
-    pub speed: f64,
+    /// Speed in percent of what the limits allow, 1 to 100; default: 10, and 25 in a simulator
+    #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
+    pub speed: Option<f64>,
     /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,

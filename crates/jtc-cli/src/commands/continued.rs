@@ -28,14 +28,15 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
         inputs: inputs.into_iter().flatten().cloned().collect(),
         arm_named: args.arm.is_some(),
         approach: true,
-        speed_pct: 50.0,
+        speed: None,
+        speed_option: "",
         points_per_segment: None,
         repeat: 1,
     };
     let arm_words = named_arm::typed_option(args.arm.as_deref());
     let words = format!("traj continue {}{arm_words}", typed(&args.run));
     let mut make =
-        |job: &mut Job, status: &Status| left.make(job, status, out).map_err(Failure::nothing_sent);
+        |job: &mut Job, status: &Status, _| left.make(job, status, out).map_err(Failure::nothing_sent);
     perform(&course, |out| Ok(Job::made(arm, words, out)), Some(&mut make), out)
 }
 

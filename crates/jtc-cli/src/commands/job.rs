@@ -84,10 +84,10 @@ impl Job {
         for note in loaded.notes.iter().chain(&overshoot) {
             out.note(format!("note: {note}"));
         }
-        let trajectory = if args.speed == 100.0 {
+        let trajectory = if args.speed() == 100.0 {
             loaded.trajectory.clone()
         } else {
-            plan::at_speed(&loaded.trajectory, args.speed)?
+            plan::at_speed(&loaded.trajectory, args.speed())?
         };
         let config = arm.config();
         let arm_words = named_arm::typed_option(args.arm.as_deref());
@@ -102,7 +102,7 @@ impl Job {
             identity: None,
             words,
             later: None,
-            speed: args.speed,
+            speed: args.speed(),
             made: false,
         })
     }

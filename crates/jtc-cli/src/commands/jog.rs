@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
+use jtc_host::arm::Arm;
 use jtc_host::words;
 use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
@@ -16,6 +17,8 @@ use jtc_host::session::BRING_UP;
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+/// Index of the highest rate that the keys begin with.
+const FIRST_MAX: usize = 2;
 
 /// Jogs until the keys, the time or a signal ends it; the arm rests then.
 pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
@@ -90,6 +93,19 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
+/// Index of the rate that the keys begin with: for the slowest joint no more than a move's default share of its limit.
+fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
+    let share = 1e-2 * session.move_speed(None)?.percent;
+    let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
+    let limits = arm.config().joints.map(|joint| joint.velocity_max);
+    Ok(rate_within(share * limits.into_iter().fold(f64::INFINITY, f64::min)))
+}
+
+/// Index of the highest rate to begin with up to `most`, rad/s.
+fn rate_within(most: f64) -> usize {
+    RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
+}
+
 /// Which joint the keys move, how fast, and until when.
 struct Held {
     joint: Joint,
@@ -137,7 +153,7 @@ fn with_keys(
         ));
     };
     out.note("1..6 joint, hold ← or → to move it, ↑ ↓ rate, q ends");
-    let mut held = Held { joint: Joint::ALL[0], rate: 2, moving: None };
+    let mut held = Held { joint: Joint::ALL[0], rate: first_rate(session)?, moving: None };
     let (mut shown, mut moved) = (String::new(), false);
     while !over(session) && !keys.gone() {
         let now = session.now();
@@ -230,5 +246,24 @@ mod tests {
         (0..9).for_each(|_| assert!(held.press(Key::Up, ms(0))));
         assert_eq!(RATES[held.rate], 0.5);
         assert!(!held.press(Key::Char('q'), ms(0)) && !held.press(Key::Escape, ms(0)));
+    }
+
+    #[test]
+    fn the_keys_begin_with_a_rate_that_is_slow_for_the_arm() {
+        let first = [
+            (10.0, 0.05),
+            (0.5, 0.05),
+            (0.05, 0.05),
+            (0.049, 0.02),
+            (0.02, 0.02),
+            (0.015, 0.01),
+            (0.01, 0.01),
+            (0.003, 0.01),
+            (0.0, 0.01),
+            (f64::NAN, 0.01),
+        ];
+        for (most, rate) in first {
+            assert_eq!(RATES[rate_within(most)], rate, "{most}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
 use jtc_host::plan::kinematics::{self, Orientation};
-use jtc_host::plan::{COLD, PlanError, Planner};
+use jtc_host::plan::{COLD, MoveSpeed, PlanError, Planner};
 
 use super::job::Job;
 use super::named_arm;
@@ -12,8 +12,8 @@ use crate::args::{MoveArgs, Target};
 
 /// Plans the move once it is known where the arm stands, and runs it.
 pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
-    if !(1.0..=100.0).contains(&args.speed) {
-        return Err(Failure::nothing_sent(PlanError::Speed { percent: args.speed, most: 100.0 }));
+    if let Some(percent) = args.speed.filter(|percent| !(1.0..=100.0).contains(percent)) {
+        return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));
     }
     if args.deg && matches!(args.to, Some(Target::Pose(_))) {
         let message = "--deg is for joint positions and poses of the flange, and the unit of a named pose is known; nothing was sent";
@@ -31,7 +31,8 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         inputs: args.arm.iter().cloned().collect(),
         arm_named: args.arm.is_some(),
         approach: false,
-        speed_pct: args.speed,
+        speed: args.speed,
+        speed_option: "--speed",
         points_per_segment: None,
         repeat: 1,
     };
@@ -39,17 +40,18 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     let words = line.to_owned() + &named_arm::typed_option(args.arm.as_deref());
     let arm = named_arm::load(args.arm.as_deref()).map_err(Failure::nothing_sent)?;
     let target = target(args, &arm)?;
-    let mut make = |job: &mut Job, status: &jtc_wire::Status| {
+    let mut make = |job: &mut Job, status: &jtc_wire::Status, speed: MoveSpeed| {
         let friction = job.arm.friction();
         let temperature = coldest(status);
-        let planner = Planner { speed_pct: args.speed, temperature, ..job.planner(friction.as_ref()) };
+        let planner = Planner { speed_pct: speed.percent, temperature, ..job.planner(friction.as_ref()) };
         // The start is where the arm stands, the end what was asked for.
         let planned = planner.to_target(&job.arm.model, &status.positions(), &target, args.line);
         let planned = planned.map_err(|e| refused(&e, &name))?;
         for note in &planned.notes {
             out.note(format!("note: {note}"));
         }
-        out.note(format!("move to {name}: {:.2} s", planned.trajectory.duration_s()));
+        let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
+        out.note(format!("move to {name}: {:.2} s{of_speed}", planned.trajectory.duration_s()));
         job.take(planned.trajectory);
         Ok(())
     };

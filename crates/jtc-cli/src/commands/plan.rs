@@ -29,7 +29,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
     // Before anything is opened: a line that cannot be leaves no file.
-    let options = WayOptions { line: args.line, blend: args.blend, blend_m: args.blend_m };
+    let blend = if args.deg { args.blend.to_radians() } else { args.blend };
+    let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
     let mut inputs: Vec<&Path> = vec![&args.file];
     inputs.extend(args.arm.as_deref());
@@ -47,7 +48,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         friction: friction.as_ref(),
         temperature: args.temperature,
         speed_pct: args.speed,
-        blend: args.blend,
+        blend,
         jerk: !args.no_jerk_limit,
         ..Planner::new(&config)
     };
@@ -174,7 +175,7 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
     let of_plan = [
         ("Duration", format!("{:.3} s", trajectory.duration_s())),
         ("Points", format!("{} every {} ms", trajectory.points.len(), trajectory.step_ms)),
-        ("Blend", format!("{} rad, lines {} m", args.blend, args.blend_m)),
+        ("Blend", format!("{} {}, lines {} m", args.blend, if args.deg { "°" } else { "rad" }, args.blend_m)),
         ("Speed", format!("{} % of what the limits allow", args.speed)),
         ("Payload", super::payload::words(&planner.config.payload)),
         ("Torque", format!("by the model, with the friction at {} °C", args.temperature)),

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::check::ProblemKind;
-use jtc_host::plan::furthest_joint;
+use jtc_host::plan::{MoveSpeed, furthest_joint};
 use jtc_host::port::Port;
 use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::Summary;
@@ -46,15 +46,17 @@ pub struct Course {
     pub arm_named: bool,
     /// Where the arm stands elsewhere it is moved to the first point.
     pub approach: bool,
-    /// Speed of an approach at most, %.
-    pub speed_pct: f64,
+    /// Speed of a move or an approach, %, where it was named.
+    pub speed: Option<f64>,
+    /// Option that names it; empty: the command has none.
+    pub speed_option: &'static str,
     pub points_per_segment: Option<usize>,
     /// How often the motion is run.
     pub repeat: u32,
 }
 
-/// Makes the trajectory of a job once it is known where the arm stands.
-pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status) -> Result<(), Failure>;
+/// Makes the trajectory of a job once it is known where the arm stands, and how fast a move is on this controller.
+pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
     /// That of a trajectory file.
@@ -66,7 +68,8 @@ impl Course {
             inputs: std::iter::once(args.file.clone()).chain(args.check.arm.clone()).collect(),
             arm_named: args.check.arm.is_some(),
             approach: args.approach,
-            speed_pct: args.check.speed,
+            speed: args.check.speed,
+            speed_option: "--speed",
             points_per_segment: args.points_per_segment,
             repeat: args.repeat,
         }
@@ -183,8 +186,9 @@ fn drive(
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     match_device(&mut session, job, course, out)?;
+    let move_speed = session.move_speed(course.speed)?;
     if let Some(make) = make {
-        make(job, &status)?;
+        make(job, &status, move_speed)?;
     }
     let speed = session.speed()?;
     if speed < 1.0 {
@@ -194,7 +198,7 @@ fn drive(
         ));
     }
     operator.speed = session.has_extensions().then_some((speed * 100.0).round() as u8);
-    let mut stage = Stage { course, job, outputs, out, reel: None };
+    let mut stage = Stage { course, job, move_speed, outputs, out, reel: None };
     let legs = stage.legs(&mut session, &mut operator, status)?;
     drop(operator);
     let Stage { outputs, reel, .. } = stage;
@@ -207,6 +211,8 @@ fn drive(
 struct Stage<'a> {
     course: &'a Course,
     job: &'a mut Job,
+    /// Of an approach.
+    move_speed: MoveSpeed,
     outputs: Outputs,
     out: &'a Output,
     reel: Option<Reel>,
@@ -266,7 +272,7 @@ impl Stage<'_> {
             && course.approach
             && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
         {
-            return Ok((approach::approach(job, status, course, self.out)?, APPROACH));
+            return Ok((approach::approach(job, status, course, self.move_speed, self.out)?, APPROACH));
         }
         Err(job.not_checked(refused, self.out))
     }

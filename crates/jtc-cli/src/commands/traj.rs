@@ -150,7 +150,7 @@ fn figures(verdict: &Verdict) -> String {
 }
 
 fn info(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
-    let args = CheckArgs { arm: None, speed: 100.0, deg };
+    let args = CheckArgs { arm: None, speed: None, deg };
     let job = Job::load(file, &args, out)?;
     let (t, upload) = (&job.trajectory, UploadOptions::default());
     let verdict = job.verdict(t, None, upload);

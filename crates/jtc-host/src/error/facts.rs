@@ -75,6 +75,7 @@ impl Facts {
                 Self { joint: Some(*joint), value: Some(*value), ..Self::default() }
             }
             PlanError::Plan(Of::Flange(error)) => Self::of_pose(error),
+            PlanError::Blend { value, most, .. } => known(None, *value, *most),
             _ => Self::default(),
         }
     }

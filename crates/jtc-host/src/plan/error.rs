@@ -30,6 +30,16 @@ pub enum PlanError {
         /// The most, %.
         most: f64,
     },
+    /// A blend that is meant in another unit.
+    #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
+    Blend {
+        /// As it was given.
+        value: f64,
+        /// The most.
+        most: f64,
+        /// rad, or m of the flange.
+        unit: &'static str,
+    },
     /// More corners than a trajectory has points for.
     #[error(
         "{corners} sharp corners are more than the {POINTS_MAX} points of a trajectory can follow: it has room for {most}"
@@ -130,6 +140,12 @@ impl Diagnose for PlanError {
                     "100 is as fast as the limits allow"
                 },
             ),
+            Self::Blend { unit, .. } => {
+                let of_joints = "is it in degrees? A blend is in rad (5° = 0.0873 rad), and in degrees with `--deg`, as the positions are";
+                let of_flange = "is it in mm? This blend is in m (20 mm = 0.02 m)";
+                let hint = if *unit == "m" { of_flange } else { of_joints };
+                Diagnosis::new(ErrorKind::Usage, "waypoints", hint)
+            }
             Self::TooManyCorners { .. } | Self::TooFine { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-long",

@@ -5,7 +5,7 @@ use jtc_dynamics::ArmModel;
 use jtc_plan::kinematics::{Kinematics, LegKind, Route, RoutePoint, Target};
 use jtc_plan::{Limits, on_route};
 
-use super::{PlanError, Planned, Planner};
+use super::{PlanError, Planned, Planner, corners};
 use crate::trajectory::Trajectory;
 
 /// How far the flange may be from its line between two points of a trajectory, m.
@@ -69,7 +69,8 @@ impl Planner<'_> {
         let motion = on_route(route, times, &limits, arm.as_ref())?;
         let first = route.positions().first().copied().unwrap_or_default();
         let timed = times.iter().skip(1).any(Option::is_some);
-        let planned = self.checked(&motion, &first, start, timed)?;
+        let mut planned = self.checked(&motion, &first, start, timed)?;
+        planned.notes.extend(corners::notes(&planned, route.positions(), self.blend));
         let seconds = planned.trajectory.duration_s();
         let scale = if timed { 1.0 } else { seconds / motion.duration() };
         if let Some(model) = self.model

@@ -18,6 +18,8 @@
 
 mod again;
 mod approach;
+mod corners;
+mod default_speed;
 mod error;
 mod lines;
 mod rest_of;
@@ -36,6 +38,8 @@ use jtc_wire::Joint;
 use serde::Serialize;
 
 pub use approach::{ApproachError, approach};
+pub use corners::{BLEND_M_MAX, BLEND_MAX};
+pub use default_speed::MoveSpeed;
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use rest_of::rest_of;
@@ -111,7 +115,7 @@ pub struct Planned {
     pub binding: Vec<Bound>,
     /// When the motion is nearest to each waypoint, s.
     pub waypoint_times: Vec<f64>,
-    /// What was changed for the check, in words.
+    /// What was changed for the check, and which waypoints rounded corners miss, in words.
     pub notes: Vec<String>,
 }
 
@@ -149,19 +153,23 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`], [`PlanError::TooLong`].
+    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`], [`PlanError::Blend`], [`PlanError::TooLong`].
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
             return Err(PlanError::Nowhere { count: positions.len() });
         }
+        corners::within_reason(self.blend, 0.0)?;
         sampled::fits_corners(&positions, self.blend)?;
         self.fits_time(&positions)?;
         let arm = self.dynamics();
         let motion =
             self.within(&positions, |limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
         let first = positions.first().copied().unwrap_or_default();
-        self.checked(&motion, &first, None, waypoints.iter().skip(1).any(|w| w.time.is_some()))
+        let timed = waypoints.iter().skip(1).any(|w| w.time.is_some());
+        let mut planned = self.checked(&motion, &first, None, timed)?;
+        planned.notes.extend(corners::notes(&planned, &positions, self.blend));
+        Ok(planned)
     }
 
     /// The rest of a trajectory from `from_ms` of its path on, where the arm stands at `start`: on the same path, at its own times once it has

@@ -205,7 +205,7 @@ proptest! {
 
     /// The least time that is known beforehand is no longer than that of the plan, also where most waypoints lie within a blend.
     #[test]
-    fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..0.6f64, speed in 20.0..100.0f64) {
+    fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..BLEND_MAX, speed in 20.0..100.0f64) {
         let config = Config::avena();
         let planner = Planner { blend, speed_pct: speed, ..Planner::new(&config) };
         let size = if dense { 0.1 } else { 1.0 };

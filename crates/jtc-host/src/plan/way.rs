@@ -1,7 +1,7 @@
 //! What the waypoints of a file lead through: places, or lines and arcs of the flange.
 
 use super::kinematics::Route;
-use super::{Aside, PlanError, Planned, Planner, Waypoint, furthest_aside};
+use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
 use crate::arm::Arm;
 use crate::waypoints::{WaypointError, WaypointFile};
 
@@ -39,9 +39,10 @@ impl<'a> Way<'a> {
     ///
     /// # Errors
     ///
-    /// Those of [`WaypointFile::positions`] and [`WaypointFile::route`].
+    /// Those of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`].
     pub fn of(file: &'a WaypointFile, arm: &Arm, options: WayOptions) -> Result<Self, WaypointError> {
         let WayOptions { line, blend, blend_m } = options;
+        corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
             // A stop is within every blend, and beside a sharp corner it may be faster than a small one.

@@ -9,6 +9,10 @@ const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
 /// Points per line: enough for its width in pixels.
 const POINTS: usize = 260;
+/// Fewest and most grid lines of an axis.
+const TICKS: (usize, usize) = (3, 12);
+/// Largest value that is drawn; larger ones are as good as no number.
+const DRAWN_MAX: f64 = 1e30;
 
 /// Light colours here, dark ones by the reader's preference, as the page has them.
 const STYLE: &str = "\
@@ -25,7 +29,9 @@ struct Panel {
     top: f64,
     width: f64,
     height: f64,
+    /// First and last, s; the last one is later.
     time: (f64, f64),
+    /// Lowest and highest; the highest one is higher.
     value: (f64, f64),
 }
 
@@ -42,20 +48,27 @@ impl Panel {
         let mut path = String::new();
         let mut pen_down = false;
         for &(t, v) in points {
-            if v.is_finite() {
+            if is_drawn(v) {
                 let _ = write!(path, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, self.x(t), self.y(v));
             }
-            pen_down = v.is_finite();
+            pen_down = is_drawn(v);
         }
         path
     }
 
-    fn horizontal(&self, svg: &mut String, v: f64, label: &str) {
-        let y = self.y(v);
+    /// The grid lines of the values, with their labels.
+    fn grid(&self, svg: &mut String) {
         let (l, r) = (self.left, self.left + self.width);
-        let _ = writeln!(svg, r#"<path class="g" d="M{l:.1} {y:.1}H{r:.1}"/>"#);
-        let _ =
-            writeln!(svg, r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#, l - 7.0, y + 4.0);
+        for (v, label) in ticks(self.value.0, self.value.1, 1.0) {
+            let y = self.y(v);
+            let _ = writeln!(svg, r#"<path class="g" d="M{l:.1} {y:.1}H{r:.1}"/>"#);
+            let _ = writeln!(
+                svg,
+                r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#,
+                l - 7.0,
+                y + 4.0
+            );
+        }
     }
 }
 
@@ -66,7 +79,7 @@ pub fn picture_svg(input: &ReportInput<'_>) -> String {
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"14\" fill=\"var(--paper)\"/>\n"
     );
     if let Some((first_s, last_s)) = input.digest.span_s() {
-        let time = (first_s, last_s.max(first_s + 1e-3));
+        let time = (first_s, last_s.max(first_s + 1e-3 + margin(first_s)));
         heading(&mut svg, input);
         for j in 0..6 {
             positions(&mut svg, input, j, time);
@@ -103,8 +116,7 @@ fn heading(svg: &mut String, input: &ReportInput<'_>) {
 fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f64)) {
     let measured = thinned(&points(input, Curve::Position, j));
     let set = thinned(&points(input, Curve::SetPosition, j));
-    let (low, high) = bounds(measured.iter().chain(&set)).unwrap_or((-1.0, 1.0));
-    let room = ((high - low) * 0.08).max(0.02);
+    let value = position_axis(bounds(measured.iter().chain(&set)).unwrap_or((-1.0, 1.0)));
     let (column, row) = ((j % 3) as f64, (j / 3) as f64);
     let panel = Panel {
         left: 64.0 + column * 300.0,
@@ -112,7 +124,7 @@ fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f6
         width: 236.0,
         height: 106.0,
         time,
-        value: (low - room, high + room),
+        value,
     };
     let _ = writeln!(
         svg,
@@ -121,12 +133,7 @@ fn positions(svg: &mut String, input: &ReportInput<'_>, j: usize, time: (f64, f6
         panel.top - 8.0,
         j + 1
     );
-    let step = tick_step(high - low);
-    let mut v = ((low - room) / step).ceil() * step;
-    while v <= high + room {
-        panel.horizontal(svg, v, &label(v, step));
-        v += step;
-    }
+    panel.grid(svg);
     let _ = writeln!(svg, r#"<path class="c" style="stroke:var(--j{j})" d="{}"/>"#, panel.path(&set));
     let _ = writeln!(svg, r#"<path class="m" style="stroke:var(--j{j})" d="{}"/>"#, panel.path(&measured));
 }
@@ -138,20 +145,13 @@ fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
     let panel = Panel { left: 64.0, top: 418.0, width: 836.0, height: 88.0, time, value: (-reach, reach) };
     let _ = writeln!(svg, r#"<text class="n" x="64" y="406">Tracking error, mrad</text>"#);
     let _ = writeln!(svg, r#"<text x="900" y="406" text-anchor="end">positions in rad</text>"#);
-    let step = tick_step(2.0 * reach);
-    let most = (reach / step).floor() as i64;
-    for i in -most..=most {
-        panel.horizontal(svg, i as f64 * step, &label(i as f64 * step, step));
-    }
+    panel.grid(svg);
     for (j, line) in lines.iter().enumerate() {
         let _ = writeln!(svg, r#"<path class="e" style="stroke:var(--j{j})" d="{}"/>"#, panel.path(line));
     }
-    let step = tick_step((time.1 - time.0) * 0.6);
-    let mut t = (time.0 / step).ceil() * step;
-    while t <= time.1 + 1e-9 {
-        let text = label(t - time.0, step);
-        let _ = writeln!(svg, r#"<text x="{:.1}" y="530" text-anchor="middle">{text} s</text>"#, panel.x(t));
-        t += step;
+    for (t, text) in ticks(0.0, time.1 - time.0, 0.6) {
+        let x = panel.x(time.0 + t);
+        let _ = writeln!(svg, r#"<text x="{x:.1}" y="530" text-anchor="middle">{text} s</text>"#);
     }
 }
 
@@ -172,7 +172,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let bucket = points.len().div_ceil(2 * POINTS).max(1);
     let pair = |bucket: &[(f64, f64)]| {
-        let values = bucket.iter().map(|point| point.1).filter(|v| v.is_finite());
+        let values = bucket.iter().map(|point| point.1).filter(|v| is_drawn(*v));
         let low = values.clone().reduce(f64::min).unwrap_or(f64::NAN);
         let high = values.reduce(f64::max).unwrap_or(f64::NAN);
         [(bucket[0].0, low), (bucket[bucket.len() / 2].0, high)]
@@ -181,22 +181,141 @@ fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 fn bounds<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<(f64, f64)> {
-    points.filter(|p| p.1.is_finite()).fold(None, |b, &(_, v)| {
+    points.filter(|p| is_drawn(p.1)).fold(None, |b, &(_, v)| {
         let (low, high) = b.unwrap_or((v, v));
         Some((low.min(v), high.max(v)))
     })
 }
 
-/// 1, 2 or 5 times a power of ten, so that some four steps fill `span`.
-fn tick_step(span: f64) -> f64 {
-    let rough = (span / 4.0).max(1e-6);
-    let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|m| m * power >= rough);
-    step.unwrap_or(10.0) * power
+/// A number that has a place in the picture.
+fn is_drawn(v: f64) -> bool {
+    v.abs() < DRAWN_MAX
 }
 
-fn label(v: f64, step: f64) -> String {
-    let digits = (-step.log10()).ceil().max(0.0) as usize;
-    let text = format!("{:.digits$}", v + 0.0);
+/// What an axis around `v` needs at least so that its labels can be told apart.
+fn margin(v: f64) -> f64 {
+    1e-9 * v.abs()
+}
+
+/// The axis of positions from `low` to `high`, with a margin also where a joint stands still.
+fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
+    let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
+    (low - margin, high + margin)
+}
+
+/// Values and labels of the grid lines between `low` and `high`, as many as [`TICKS`] says. Some four steps fill `share` of the span: less
+/// for an axis with more room for labels.
+fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
+    let rough = share * (high - low) / 4.0;
+    if !(rough.is_finite() && rough > 0.0) {
+        return Vec::new();
+    }
+    // 1, 2 or 5 times a power of ten: the first that is enough, or a finer one where that leaves too few lines.
+    let power = 10f64.powf(rough.log10().floor());
+    let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
+    let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);
+    let lines = |step: &f64| ((low / step).ceil(), (high / step).floor());
+    let fits = |step: &&f64| lines(step).1 - lines(step).0 + 1.0 >= TICKS.0 as f64;
+    let Some(step) = steps[enough..].iter().find(fits) else { return Vec::new() };
+    let (first, last) = lines(step);
+    let digits = Digits::of(*step, low.abs().max(high.abs()));
+    let tick = |i: f64| (i * step, label(i * step, digits));
+    (0..TICKS.1).map(|k| first + k as f64).take_while(|i| *i <= last).map(tick).collect()
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy)]
+enum Digits {
+    /// Behind the point.
+    Plain(usize),
+    /// Behind the point, with a power of ten.
+    Power(usize),
+}
+
+impl Digits {
+    /// Enough that numbers up to `most` which are a `step` apart differ.
+    fn of(step: f64, most: f64) -> Self {
+        if (1e-6..1e6).contains(&step) {
+            Self::Plain((-step.log10()).ceil().max(0.0) as usize)
+        } else {
+            Self::Power((most / step).log10().ceil().max(0.0) as usize)
+        }
+    }
+}
+
+fn label(v: f64, digits: Digits) -> String {
+    let v = v + 0.0;
+    let text = match digits {
+        Digits::Plain(digits) => format!("{v:.digits$}"),
+        Digits::Power(digits) => format!("{v:.digits$e}"),
+    };
     text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Distinct labels in rising order, as many as can be read.
+    fn readable(low: f64, high: f64, share: f64) -> Result<(), TestCaseError> {
+        let ticks = ticks(low, high, share);
+        prop_assert!((TICKS.0..=TICKS.1).contains(&ticks.len()), "{low}..{high}: {ticks:?}");
+        for pair in ticks.windows(2) {
+            prop_assert!(pair[0].0 < pair[1].0 && pair[0].1 != pair[1].1, "{low}..{high}: {pair:?}");
+        }
+        let inside = |(v, label): &(f64, String)| (low..=high).contains(v) && label.chars().count() < 24;
+        prop_assert!(ticks.iter().all(inside), "{low}..{high}: {ticks:?}");
+        Ok(())
+    }
+
+    /// A magnitude from 1e-30 to 1e29 with either sign, or zero.
+    fn value() -> impl Strategy<Value = f64> {
+        let magnitude = (-30.0..29.0f64, any::<bool>());
+        prop_oneof![
+            Just(0.0),
+            -10.0..10.0f64,
+            magnitude.prop_map(|(power, minus)| if minus { -10f64.powf(power) } else { 10f64.powf(power) }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn every_axis_has_a_few_lines_with_labels_of_their_own(a in value(), b in value(), still in any::<bool>()) {
+            let b = if still { a } else { b };
+            let (low, high) = position_axis((a.min(b), a.max(b)));
+            readable(low, high, 1.0)?;
+            let reach = a.abs().max(0.1);
+            readable(-reach, reach, 1.0)?;
+            readable(0.0, a.abs().max(1e-3), 0.6)?;
+        }
+    }
+
+    #[test]
+    fn known_ranges_are_readable() {
+        for (low, high) in [
+            (0.0, 0.0),
+            (0.3, 0.3 + 1e-12),
+            (-1e-9, 1e-9),
+            (-1.2, -1.2),
+            (1e6, 1e6),
+            (1e6, 1e6 + 1e-6),
+            (-1e9, 1e9),
+            (1e9, 1e9),
+            (-3.0, 2e-17),
+            (1e17, 1e17),
+            (f64::MIN_POSITIVE, 5e-324),
+            (-1e29, 1e29),
+        ] {
+            let (low, high) = position_axis((low, high));
+            readable(low, high, 1.0).unwrap();
+        }
+        // The lines of a joint that moves stand where they stood.
+        let words: Vec<String> = ticks(-1.08, 1.08, 1.0).into_iter().map(|tick| tick.1).collect();
+        assert_eq!(words, ["−1", "0", "1"]);
+        for none in [(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN)] {
+            assert_eq!(ticks(none.0, none.1, 1.0), Vec::new());
+        }
+    }
 }

@@ -249,3 +249,39 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let of_run = page(None);
     assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }
+
+/// A joint that stands still, moves by next to nothing, is far away or has no numbers: the picture stays small, and each axis readable.
+#[test]
+fn a_picture_is_small_whatever_the_joints_do() {
+    let lead: [(&str, fn(f64) -> f64); 11] = [
+        ("zero", |_| 0.0),
+        ("stands", |_| -0.7),
+        ("by 1e-12", |t| 0.3 + 1e-12 * t),
+        ("by 1e9", |t| 1e9 * t),
+        ("at 1e6", |_| 1e6),
+        ("at -1e6, moving", |t| -1e6 + t),
+        ("at 1e17", |_| 1e17),
+        ("at 1e300", |_| 1e300),
+        ("no number", |_| f64::NAN),
+        ("now and then infinite", |t| if t > 0.5 { f64::INFINITY } else { t }),
+        ("from minus infinity", |t| if t < 0.5 { f64::NEG_INFINITY } else { -t }),
+    ];
+    for (name, position) in lead {
+        for offset_s in [0.0, 1.7e9, 1e17] {
+            let (info, mut samples) = run(1000);
+            for sample in &mut samples {
+                let at = position(sample.time_s);
+                sample.time_s += offset_s;
+                for joint in &mut sample.joints {
+                    (joint.position, joint.set_position) = (at, at);
+                }
+            }
+            let picture = picture_svg(&ReportInput::new(&info, &Digest::of(&samples)));
+            let (lines, labels) = (picture.matches("class=\"g\"").count(), picture.matches("<text").count());
+            assert!(lines <= 7 * 12 && labels < 110, "{name}: {lines} lines, {labels} labels");
+            assert!(lines >= 6 * 2, "{name}: {lines} lines");
+            assert!(picture.len() < 200_000, "{name}: {} bytes", picture.len());
+            assert!(!picture.contains("NaN") && !picture.contains("inf"), "{name}");
+        }
+    }
+}

@@ -11,6 +11,8 @@ use crate::words::{self, Bits};
 pub const INFO_LEN: usize = 136;
 /// Bytes of an [`Info`] as this version writes it.
 pub const INFO_WRITTEN: usize = 144;
+/// Board of a simulator: a device whose drives are simulated (J-52).
+pub const SIMULATOR: &str = "simulator";
 /// Bytes of the firmware's version, and of its revision.
 const SHORT_TEXT: usize = 16;
 

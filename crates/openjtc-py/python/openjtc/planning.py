@@ -28,8 +28,9 @@ class Planner:
     Args:
         arm: The arm; None: the built-in one.
         speed: Percent of what the limits allow, 1 to 100.
-        blend: How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each waypoint.
-        blend_m: The same of corners between lines and arcs of the flange, m.
+        blend: How far from a waypoint its corner may be rounded, rad of the joint that is furthest, 0.5 at most; 0: the arm stops at each
+            waypoint. `through` takes one in degrees.
+        blend_m: The same of corners between lines and arcs of the flange, m, 0.5 at most.
         line: Whether the flange keeps to a straight line where waypoints do not say how the arm gets there.
         jerk: Whether jerk is limited, too.
         temperature: Lowest bearing temperature at which friction has to be overcome, °C; None: that of a cold hall, 20.
@@ -81,29 +82,40 @@ class Planner:
         return Plan(self._native.to_flange(begin, flange_of(flange, degrees)))
 
     def through(
-        self, waypoints: Waypoints, *, times: ArrayLike | None = None, degrees: bool = False
+        self,
+        waypoints: Waypoints,
+        *,
+        times: ArrayLike | None = None,
+        blend: float | None = None,
+        degrees: bool = False,
     ) -> Plan:
         """Through waypoints, from rest to rest.
 
         Args:
             waypoints: An array (N, 6) of joint positions (rad), a file, or a list of pose names and dicts.
             times: When to be at each waypoint of an array, s from the first one; NaN: as soon as the limits allow.
-            degrees: Whether angles are degrees; not for what names its units itself.
+            blend: In the place of the planner's own; in degrees where `degrees` is true, else in rad.
+            degrees: Whether angles are degrees, `blend` among them; not for what names its units itself.
+
+        Returns:
+            The plan. Its `notes` name waypoints that rounded corners miss by more than 0.05 rad.
 
         Raises:
+            UsageError: A blend above 0.5 rad.
             RefusedError: There is no such motion; the message names the waypoint.
         """
+        blend_rad = None if blend is None else float(np.radians(blend) if degrees else blend)
         if isinstance(waypoints, (str, os.PathLike)):
-            return Plan(self._native.through_file(waypoints, degrees))
+            return Plan(self._native.through_file(waypoints, blend_rad, degrees))
         if isinstance(waypoints, Sequence) and any(isinstance(w, (str, Mapping)) for w in waypoints):
             listed = [{"pose": w} if isinstance(w, str) else _plain(w) for w in waypoints]
             text = json.dumps({"waypoints": listed})
-            return Plan(self._native.through_text(text, degrees))
+            return Plan(self._native.through_text(text, blend_rad, degrees))
         positions = np.asarray(waypoints, dtype=float)
         if degrees:
             positions = np.radians(positions)
         given = None if times is None else [float(t) for t in np.asarray(times, dtype=float)]
-        return Plan(self._native.through(positions, given))
+        return Plan(self._native.through(positions, blend_rad, given))
 
     def check(self, trajectory: Trajectory | Plan, *, start: ArrayLike | None = None) -> Check:
         """Checks a trajectory as a run would: limits at and between points, torques, room to stop.

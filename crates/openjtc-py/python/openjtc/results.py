@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openjtc import _native
+from openjtc._optional import needed
 from openjtc._native import Trajectory
 from openjtc.errors import RefusedError, UsageError
 
@@ -94,23 +95,27 @@ class Samples:
         return columns
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A table of all samples: ``time``, ``point``, ``state``, and of each value and joint a column, ``position_1`` to ``position_6``."""
-        import pandas
+        """A table of all samples: ``time``, ``point``, ``state``, and of each value and joint a column, ``position_1`` to ``position_6``.
 
-        return pandas.DataFrame(self._columns())
+        Raises:
+            ImportError: pandas is not installed; the message says how to install it.
+        """
+        table: pandas.DataFrame = needed("pandas").DataFrame(self._columns())
+        return table
 
     def to_polars(self) -> polars.DataFrame:
         """As `to_pandas`, with Polars."""
-        import polars
-
-        return polars.DataFrame(self._columns())
+        table: polars.DataFrame = needed("polars").DataFrame(self._columns())
+        return table
 
     def plot(self) -> Figure:
-        """Commanded and measured positions and their error, by Matplotlib."""
-        from matplotlib.figure import Figure
+        """Commanded and measured positions and their error, by Matplotlib.
 
+        Raises:
+            ImportError: Matplotlib is not installed; the message says how to install it.
+        """
         a = self.arrays()
-        figure = Figure(figsize=(9, 6), layout="constrained")
+        figure: Figure = needed("matplotlib.figure").Figure(figsize=(9, 6), layout="constrained")
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         for j, name in enumerate(self.joint_names):
             (line,) = top.plot(a["time"], a["position"][:, j], label=f"{j + 1} {name}")
@@ -150,9 +155,6 @@ class Samples:
         page = html.escape(self._native.html(), quote=True)
         return f'<iframe srcdoc="{page}" style="width:100%;height:640px;border:0" title="report"></iframe>'
 
-    def _repr_svg_(self) -> str:
-        return self._native.svg()
-
     def _table(self) -> str:
         head = f"{'':<20}{'RMS mrad':>10}{'max mrad':>10}{'rad/s':>8}{'N·m':>8}{'share %':>9}"
         rows = [head]
@@ -189,7 +191,7 @@ class Run(Samples):
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check."""
+        """What was changed for the check, and the speed where none was named."""
         return self._native.notes
 
     def __repr__(self) -> str:
@@ -285,7 +287,7 @@ class Plan(Samples):
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check."""
+        """What was changed for the check, and which waypoints rounded corners miss."""
         return self._plan.notes
 
     @property

@@ -47,11 +47,15 @@ class Robot(Connected):
         line: bool = False,
         degrees: bool = False,
     ) -> Plan:
-        """Plans a motion of the controller's arm with its payload; nothing moves. Arguments are those of `Planner` and `Planner.through`."""
+        """Plans a motion of the controller's arm with its payload; nothing moves.
+
+        Arguments are those of `Planner` and `Planner.through`. `speed` is 100 % of what the limits allow, also on a real arm: `run` and its
+        `speed` decide how fast the plan is run.
+        """
         mass, com, inertia = self._link.payload() if self.info else (0.0, [0.0] * 3, [0.0] * 6)
         payload = Payload(mass, tuple(com), tuple(inertia)) if mass else None
-        planner = Planner(self.arm, speed=speed, blend=blend, line=line, payload=payload)
-        return planner.through(waypoints, times=times, degrees=degrees)
+        planner = Planner(self.arm, speed=speed, line=line, payload=payload)
+        return planner.through(waypoints, times=times, blend=blend, degrees=degrees)
 
     def check(
         self,
@@ -87,7 +91,7 @@ class Robot(Connected):
         trajectory: Trajectory | Plan | FilePath,
         *,
         approach: bool = False,
-        speed: float = 100.0,
+        speed: float | None = None,
         repeat: int = 1,
         record: FilePath | None = None,
         overwrite: bool = False,
@@ -116,7 +120,7 @@ class Robot(Connected):
         trajectory: Trajectory | Plan | FilePath,
         *,
         approach: bool = False,
-        speed: float = 100.0,
+        speed: float | None = None,
         repeat: int = 1,
         record: FilePath | None = None,
         overwrite: bool = False,
@@ -133,7 +137,7 @@ class Robot(Connected):
         trajectory: Trajectory | Plan | FilePath,
         *,
         approach: bool = False,
-        speed: float = 100.0,
+        speed: float | None = None,
         repeat: int = 1,
         record: FilePath | None = None,
         overwrite: bool = False,
@@ -145,8 +149,9 @@ class Robot(Connected):
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
-            approach: Whether an arm that stands elsewhere is moved to the first point, at half speed at most.
-            speed: Percent of the trajectory's own speed, 1 to 100.
+            approach: Whether an arm that stands elsewhere is moved to the first point: at `speed` percent of the limits, 50 at most; without
+                `speed` at 10 %, and at 25 % where the controller is a simulator.
+            speed: Percent of the trajectory's own speed, 1 to 100; None: 100.
             repeat: How often it is run, 1 or more.
             record: A recording that is written while the arm moves, MCAP or CSV by the ending.
             overwrite: Whether a recording that is there is replaced, once the new one is whole.
@@ -202,7 +207,7 @@ class Robot(Connected):
         *,
         flange: ArrayLike | None = None,
         line: bool = False,
-        speed: float = 100.0,
+        speed: float | None = None,
         degrees: bool = False,
         record: FilePath | None = None,
         overwrite: bool = False,
@@ -215,7 +220,7 @@ class Robot(Connected):
             to: Joint positions (6,), rad, or the name of a pose of the arm.
             flange: In its place x, y, z (m) and roll, pitch, yaw (rad) of the flange in the base frame.
             line: Whether the flange keeps to a straight line; else the joints do.
-            speed: Percent of what the limits allow, 1 to 100.
+            speed: Percent of what the limits allow, 1 to 100; None: 10, and 25 where the controller is a simulator. `Run.notes` says which.
             degrees: Whether angles are degrees.
             record, overwrite, accept_device_limits, progress: As of `run`.
 

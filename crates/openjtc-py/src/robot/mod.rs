@@ -53,7 +53,7 @@ pub struct Link {
 struct Options {
     name: String,
     approach: bool,
-    speed: f64,
+    speed: Option<f64>,
     repeat: u32,
     accept_device_limits: bool,
     record: Option<PathBuf>,
@@ -64,7 +64,9 @@ struct Options {
 impl Options {
     fn begin(self, link: &Bound<'_, Link>, course: Course) -> Result<Motion, Failure> {
         let Self { name, approach, speed, repeat, accept_device_limits, record, overwrite, asked } = self;
-        number::within(speed, 1.0..=100.0, "speed", "%")?;
+        if let Some(speed) = speed {
+            number::within(speed, 1.0..=100.0, "speed", "%")?;
+        }
         number::within(repeat.into(), 1.0..=f64::from(u32::MAX), "repeat", "")?;
         let record = record.map(|path| (path, overwrite));
         let progress = Arc::<Mutex<_>>::default();

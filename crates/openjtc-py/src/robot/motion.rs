@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, ApproachError, Planner};
+use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner};
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
@@ -40,8 +40,9 @@ pub struct Order {
     pub name: String,
     /// Where the arm stands elsewhere it is moved to the first point.
     pub approach: bool,
-    /// % of the trajectory's own speed, or of what the limits allow.
-    pub speed: f64,
+    /// % of the trajectory's own speed, or of what the limits allow. `None`: the trajectory's own speed, and the default one for a move or
+    /// an approach.
+    pub speed: Option<f64>,
     /// How often.
     pub repeat: u32,
     /// The controller's limits, gravity and rotor inertia differ from the arm's, and are safe for it.
@@ -58,6 +59,7 @@ struct Way<'a> {
     trajectory: &'a Arc<Trajectory>,
     arm: &'a Arm,
     options: &'a CheckOptions,
+    move_speed: MoveSpeed,
 }
 
 /// What came of it.
@@ -111,7 +113,8 @@ impl Machine {
             device: self.session.device_config()?,
             ..CheckOptions::default()
         };
-        let (trajectory, mut notes) = trajectory(order, &arm, &options, &status)?;
+        let move_speed = self.session.move_speed(order.speed)?;
+        let (trajectory, mut notes) = trajectory(order, &arm, &options, &status, move_speed)?;
         closed(&trajectory, order, &arm, &options)?;
         let speed = options.device.speed;
         *lock(&self.shared.speed) = Some(speed);
@@ -144,7 +147,7 @@ impl Machine {
             baud: self.session.port().baud(),
             notes,
         };
-        let way = Way { order, trajectory: &trajectory, arm: &arm, options: &options };
+        let way = Way { order, trajectory: &trajectory, arm: &arm, options: &options, move_speed };
         let legs = self.legs(&way, asked, &mut ran, recording, status);
         self.tape.pause();
         match legs {
@@ -173,14 +176,16 @@ impl Machine {
         mut recording: Option<&mut Recording>,
         mut status: Status,
     ) -> Result<(), Failure> {
-        let Way { order, trajectory, arm, options } = way;
+        let Way { order, trajectory, arm, options, move_speed } = way;
         for _ in 0..order.repeat {
             let check =
                 |status: &Status| CheckedTrajectory::check(trajectory, arm, &status.positions(), options);
             let mut checked = check(&status);
             if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let approach = plan::approach(trajectory, arm, &status.positions(), order.speed, options);
+                let approach =
+                    plan::approach(trajectory, arm, &status.positions(), move_speed.percent, options);
                 let approach = approach.map_err(|error| no_approach(&error))?;
+                ran.notes.extend(of_speed("approach", *move_speed).filter(|note| !ran.notes.contains(note)));
                 if !self.leg(&approach, (order, "approach"), asked, ran, None)? {
                     return Ok(());
                 }
@@ -335,24 +340,33 @@ fn trajectory(
     arm: &Arm,
     options: &CheckOptions,
     status: &Status,
+    move_speed: MoveSpeed,
 ) -> Result<(Arc<Trajectory>, Vec<String>), Failure> {
     match &order.course {
-        Course::Along(trajectory) if order.speed == 100.0 => Ok((Arc::clone(trajectory), Vec::new())),
-        Course::Along(trajectory) => Ok((Arc::new(plan::at_speed(trajectory, order.speed)?), Vec::new())),
+        Course::Along(trajectory) => match order.speed {
+            None | Some(100.0) => Ok((Arc::clone(trajectory), Vec::new())),
+            Some(percent) => Ok((Arc::new(plan::at_speed(trajectory, percent)?), Vec::new())),
+        },
         Course::To { target, line } => {
             let (config, friction) = (arm.config_on_device(&options.device), arm.friction());
             let planner = Planner {
                 model: Some(&arm.model),
                 friction: friction.as_ref(),
-                speed_pct: order.speed,
+                speed_pct: move_speed.percent,
                 ..Planner::new(&config)
             };
             let planned = planner.to_target(&arm.model, &status.positions(), target, *line);
             let planned =
                 planned.map_err(|error| Failure { message: error.of_move(), ..Failure::from(error) })?;
-            Ok((Arc::new(planned.trajectory), planned.notes))
+            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).collect();
+            Ok((Arc::new(planned.trajectory), notes))
         }
     }
+}
+
+/// A default speed in words.
+fn of_speed(what: &str, speed: MoveSpeed) -> Option<String> {
+    speed.note("`speed=`").map(|words| format!("{what} {words}"))
 }
 
 /// A motion that is repeated leads back to its start, or an approach does.

@@ -3,7 +3,7 @@
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::CheckError;
 use jtc_host::check::CheckedTrajectory;
-use jtc_host::plan::{self, ApproachError};
+use jtc_host::plan::{self, ApproachError, MoveSpeed};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -15,10 +15,11 @@ pub fn approach(
     job: &Job,
     status: &Status,
     course: &Course,
+    speed: MoveSpeed,
     out: &Output,
 ) -> Result<CheckedTrajectory, Failure> {
     let (here, options) = (status.positions(), job.options(course));
-    let checked = plan::approach(&job.trajectory, &job.arm, &here, course.speed_pct, &options);
+    let checked = plan::approach(&job.trajectory, &job.arm, &here, speed.percent, &options);
     let checked = checked.map_err(|error| {
         let verdict = match error {
             ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
@@ -36,7 +37,8 @@ pub fn approach(
         Failure::printed(failure.kind)
     })?;
     let duration_s = checked.trajectory().duration_s();
-    out.note(format!("approach: {duration_s:.1} s to the first point"));
+    let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
+    out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
     Ok(checked)
 }
 

@@ -80,6 +80,12 @@
     grid: { stroke: () => colour("--grid"), width: 1 }, ticks: { show: false }, ...more,
   });
 
+  // A number on an axis, with enough digits that numbers a step apart differ.
+  const label = (v, step, digits) => {
+    const needed = Math.ceil(-Math.log10(step || 1));
+    return String(+v.toFixed(Math.min(Math.max(digits, needed), 20))).replace("-", "−");
+  };
+
   // Where the run failed, in every plot.
   const failureLine = (u) => {
     const { ctx, bbox } = u;
@@ -110,8 +116,8 @@
       },
       scales: { x: { time: false }, y: range ? { range } : {} },
       axes: [
-        axis({ size: 30, space: 90, values: (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`.replace("-", "−")), show: !axisless }),
-        axis({ size: 52, values: (u, ticks) => ticks.map((t) => String(+t.toFixed(6)).replace("-", "−")), show: !axisless || !!lines.length }),
+        axis({ size: 30, space: 90, values: (u, ticks, i, space, step) => ticks.map((t) => `${label(t, step, 3)} s`), show: !axisless }),
+        axis({ size: 52, values: (u, ticks, i, space, step) => ticks.map((t) => label(t, step, 6)), show: !axisless || !!lines.length }),
       ],
       series: [{}, ...lines.map((l) => ({
         stroke: () => colour(l.stroke), width: l.width || 1.4, dash: l.dash, points: { show: false }, show: true, alpha: l.alpha ?? 1,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openjtc._native import ChainSamples
+from openjtc._optional import needed
 from openjtc.ucom.boards import Value, _array
 
 __all__ = ["Monitor", "OutputTable", "Sample", "to_numpy", "to_pandas"]
@@ -111,8 +111,8 @@ def to_pandas(samples: Iterable[Sample]) -> Any:
     Boards with different outputs have NaN in the columns of others.
 
     Raises:
-        ImportError: pandas is not installed: ``pip install openjtc[pandas]``.
+        ImportError: pandas is not installed; the message says how to install it.
     """
-    pandas = importlib.import_module("pandas")
+    pandas = needed("pandas")
     rows = [{"time_s": one.time_s, "board": one.board, **one.outputs} for one in samples]
     return pandas.DataFrame(rows, columns=None if rows else ["time_s", "board"])

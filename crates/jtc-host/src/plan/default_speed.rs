@@ -1,0 +1,88 @@
+//! The speed of a motion for which the user names none.
+
+use jtc_wire::{Info, SIMULATOR};
+
+use crate::error::LinkError;
+use crate::port::Port;
+use crate::session::Session;
+
+/// Default where the controller is a simulator, % of the limits.
+const SIMULATED_PCT: f64 = 25.0;
+/// Default on every other controller, % of the limits.
+const DEFAULT_PCT: f64 = 10.0;
+
+/// The speed of a move or an approach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoveSpeed {
+    /// % of the limits.
+    pub percent: f64,
+    /// The user named none.
+    pub is_default: bool,
+}
+
+impl MoveSpeed {
+    /// The speed that the user named, or the default one for the controller with this identity: 25 % of the limits for a simulator, and
+    /// 10 % for every other controller, also for one that reports no identity.
+    pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
+        let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
+        let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };
+        Self { percent: named.unwrap_or(default), is_default: named.is_none() }
+    }
+
+    /// What the user is told of a default speed; `option` (empty: none) sets another one. `None` for a speed that the user named.
+    pub fn note(&self, option: &str) -> Option<String> {
+        let sets = if option.is_empty() { String::new() } else { format!("; {option} sets it") };
+        self.is_default.then(|| format!("at {} % of the limits{sets}", self.percent))
+    }
+}
+
+impl<P: Port> Session<P> {
+    /// The speed of a move or an approach on this controller: the one that the user named, or the default.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::info`], when the user named no speed.
+    pub fn move_speed(&mut self, named: Option<f64>) -> Result<MoveSpeed, LinkError> {
+        let info = if named.is_none() { self.info()? } else { None };
+        Ok(MoveSpeed::of(named, info.as_ref()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_wire::Name;
+
+    use super::*;
+
+    /// Ten controllers: those that do not say that they are simulators are taken for real.
+    #[test]
+    fn the_default_speed_is_low_unless_the_controller_is_known_to_be_a_simulator() {
+        let boards = [
+            ("simulator", 25.0),
+            ("", 10.0),
+            ("nucleo-h743zi2", 10.0),
+            ("Simulator", 10.0),
+            ("simulator 2", 10.0),
+            ("simulator ", 10.0),
+            ("not a simulator", 10.0),
+            ("emulator", 10.0),
+            ("sim", 10.0),
+        ];
+        let of = |board: &str, named| {
+            let info = Info { board: Name::new(board).unwrap_or_default(), ..Info::default() };
+            MoveSpeed::of(named, Some(&info))
+        };
+        for (board, percent) in boards {
+            assert_eq!(of(board, None), MoveSpeed { percent, is_default: true }, "{board}");
+            // A speed that was named counts everywhere.
+            for named in [1.0, 5.0, 60.0, 100.0] {
+                assert_eq!(of(board, Some(named)), MoveSpeed { percent: named, is_default: false });
+            }
+        }
+        let silent = MoveSpeed::of(None, None);
+        assert_eq!(silent.percent, 10.0);
+        assert_eq!(silent.note("--speed").unwrap(), "at 10 % of the limits; --speed sets it");
+        assert_eq!(silent.note("").unwrap(), "at 10 % of the limits");
+        assert_eq!(MoveSpeed::of(Some(10.0), None).note("--speed"), None);
+    }
+}

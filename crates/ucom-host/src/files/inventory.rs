@@ -6,13 +6,19 @@
 //! flash_number = 0x0021
 //! description = "UCoM2 head pan"
 //! name = "head pan"
+//! program = { flash_number = 0x0021, sha256 = "…", address = 0x0, program_id = 0x4B3F, date = 0x3AC1 }
 //! ```
+//!
+//! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key alone: everything else in
+//! the file stays as it is, comments included.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, TableLike, Value};
 
+use super::FlashRecord;
 use crate::master::InitReport;
 
 /// Longest file that is read, bytes.
@@ -32,6 +38,16 @@ pub struct InventoryBoard {
     /// What people call it.
     #[serde(default)]
     pub name: String,
+    /// What updates wrote to it.
+    #[serde(default)]
+    pub program: Option<FlashRecord>,
+}
+
+impl InventoryBoard {
+    /// What updates wrote to this board; a record of another board is none.
+    pub fn record(&self) -> Option<FlashRecord> {
+        self.program.filter(|record| record.flash_number == self.flash_number)
+    }
 }
 
 /// Boards by position.
@@ -207,7 +223,7 @@ impl Inventory {
         self.boards.values()
     }
 
-    /// The boards of an init, with the names that people gave them in an older inventory.
+    /// The boards of an init, with the names and flash records of an older inventory.
     ///
     /// # Errors
     /// Two boards have one flash number.
@@ -218,22 +234,72 @@ impl Inventory {
                 number: board.number,
                 flash_number: board.info.flash_number,
                 description: board.description.clone().unwrap_or_default(),
-                name: String::new(),
+                ..InventoryBoard::default()
             })?;
         }
         if let Some(older) = older {
-            inventory.keep_names(older);
+            inventory.keep(older);
         }
         Ok(inventory)
     }
 
-    /// Takes over the names that people gave in an older inventory, by flash number.
-    pub fn keep_names(&mut self, older: &Self) {
-        for board in self.boards.values_mut().filter(|b| b.name.is_empty()) {
-            if let Some(known) = older.boards.values().find(|b| b.flash_number == board.flash_number) {
+    /// Takes over names and flash records of an older inventory, by flash number.
+    pub fn keep(&mut self, older: &Self) {
+        for board in self.boards.values_mut() {
+            let Some(known) = older.boards.values().find(|b| b.flash_number == board.flash_number) else {
+                continue;
+            };
+            if board.name.is_empty() {
                 board.name.clone_from(&known.name);
             }
+            board.program = board.program.or(known.record());
         }
+    }
+
+    /// The boards without their flash records: those of a file that is not there any more prove nothing.
+    #[must_use]
+    pub fn without_records(mut self) -> Self {
+        self.boards.values_mut().for_each(|board| board.program = None);
+        self
+    }
+
+    /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
+    ///
+    /// # Errors
+    /// The file cannot be read or written. A board that the file does not list is no error: nothing is kept of it.
+    pub fn set_record(
+        path: &Path,
+        flash_number: u16,
+        record: Option<FlashRecord>,
+    ) -> Result<(), InventoryError> {
+        let io = |source| InventoryError::Io { path: path.into(), source };
+        let wrong = |text: String| InventoryError::Form(format!("{}: {text}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(io)?;
+        let mut document: DocumentMut = text.parse().map_err(|e| wrong(format!("{e}")))?;
+        let item = match record {
+            None => None,
+            Some(record) => {
+                let value: Value = record.to_toml().parse().map_err(|e| wrong(format!("{e}")))?;
+                Some(Item::Value(value))
+            }
+        };
+        let boards: Vec<&mut dyn TableLike> = match document.get_mut("board") {
+            Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|t| t as &mut dyn TableLike).collect(),
+            Some(Item::Value(Value::Array(array))) => {
+                let tables = array.iter_mut().filter_map(Value::as_inline_table_mut);
+                tables.map(|table| table as &mut dyn TableLike).collect()
+            }
+            _ => Vec::new(),
+        };
+        let is_meant = |board: &&mut dyn TableLike| {
+            board.get("flash_number").and_then(Item::as_integer) == Some(i64::from(flash_number))
+        };
+        match (boards.into_iter().find(is_meant), item) {
+            (Some(board), Some(item)) => drop(board.insert("program", item)),
+            (Some(board), None) if board.contains_key("program") => drop(board.remove("program")),
+            (Some(_), None) | (None, _) => return Ok(()),
+        }
+        write_whole(path, document.to_string().as_bytes()).map_err(io)
     }
 
     /// The file's text.
@@ -246,6 +312,9 @@ impl Inventory {
                 if !value.is_empty() {
                     text += &format!("{key} = {}\n", quoted(value));
                 }
+            }
+            if let Some(record) = board.program {
+                text += &format!("program = {}\n", record.to_toml());
             }
         }
         text
@@ -294,9 +363,78 @@ mod tests {
         let mut new = Inventory::default();
         new.insert(board(1, 0x42)).unwrap();
         new.insert(board(2, 0x21)).unwrap();
-        new.keep_names(&old);
+        new.keep(&old);
         assert_eq!(new.get(2).unwrap().name, "head pan");
         assert_eq!(new.get(1).unwrap().name, "");
+    }
+
+    fn record(flash_number: u16) -> FlashRecord {
+        FlashRecord { flash_number, sha256: [0xA5; 32], address: 0x200, program_id: 0x4B3F, date: 0x3AC1 }
+    }
+
+    /// D-62: a record is set and removed in the text of the file, and nothing else changes.
+    #[test]
+    fn d62_a_record_changes_one_key_of_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("inventory.toml");
+        let texts = [
+            "# left arm, cabinet 3\n[[board]] # first\nnumber = 1\nflash_number = 0x21 # new since May\n\n[[board]]\nflash_number = 0x42\nnumber = 2\nname = 'pan'\n",
+            "[[board]]\nnumber = 1\nflash_number = 33\n# behind it\n",
+            "board = [\n  { number = 1, flash_number = 0x0021 }, # in line\n  { number = 2, flash_number = 0x42 },\n]\n",
+        ];
+        for text in texts {
+            std::fs::write(&path, text).unwrap();
+            Inventory::set_record(&path, 0x21, Some(record(0x21))).unwrap();
+            let read = Inventory::read(&path).unwrap();
+            assert_eq!(read.get(1).unwrap().record(), Some(record(0x21)));
+            assert!(read.get(2).is_none_or(|board| board.record().is_none()));
+            // Set again, and kept by an init.
+            Inventory::set_record(&path, 0x21, Some(FlashRecord { address: 0, ..record(0x21) })).unwrap();
+            let again = Inventory::read(&path).unwrap();
+            assert_eq!(again.get(1).unwrap().record().map(|r| r.address), Some(0));
+            assert_eq!(Inventory::parse(&again.to_toml()).unwrap(), again);
+            let mut made = Inventory::default();
+            made.insert(board(7, 0x21)).unwrap();
+            made.keep(&again);
+            assert!(made.get(7).unwrap().record().is_some());
+            assert!(made.without_records().get(7).unwrap().record().is_none());
+            // Removed, as often as it may be.
+            for _ in 0..2 {
+                Inventory::set_record(&path, 0x21, None).unwrap();
+                let left = std::fs::read_to_string(&path).unwrap();
+                let plain = |text: &str| text.replace([' ', '\n'], "");
+                assert_eq!(plain(&left), plain(text));
+            }
+            // A board that is not listed: nothing is kept.
+            Inventory::set_record(&path, 0x77, Some(record(0x77))).unwrap();
+            assert!(!std::fs::read_to_string(&path).unwrap().contains("sha256"));
+        }
+        assert!(Inventory::set_record(&dir.path().join("nowhere"), 0x21, None).is_err());
+    }
+
+    /// D-62: a record that was copied to another board is none, and a damaged one is refused.
+    #[test]
+    fn d62_a_record_belongs_to_one_board() {
+        let with = |record: &str| format!("[[board]]\nnumber = 1\nflash_number = 0x42\nprogram = {record}\n");
+        let of = |flash_number| with(&record(flash_number).to_toml());
+        assert_eq!(Inventory::parse(&of(0x42)).unwrap().get(1).unwrap().record(), Some(record(0x42)));
+        assert_eq!(Inventory::parse(&of(0x21)).unwrap().get(1).unwrap().record(), None);
+        let good = record(0x42).to_toml();
+        let damaged = [
+            good.replace("a5a5", "a5"),
+            good.replacen("a5", "xy", 1),
+            good.replacen("a5", "+5", 1),
+            good.replace("a5a5", "a5a5a5"),
+            good.replace("sha256", "sha1"),
+            good.replace("0x200", "-1"),
+            good.replace("0x200", "0x100000000"),
+            good.replace("0x4B3F", "0x14B3F"),
+            good.replace("date", "day"),
+            "7".into(),
+        ];
+        for damaged in damaged {
+            assert!(Inventory::parse(&with(&damaged)).is_err(), "{damaged}");
+        }
     }
 
     proptest! {

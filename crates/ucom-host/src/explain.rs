@@ -25,7 +25,7 @@ const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
 /// Status bits stand first, bit 7 before all others.
-const WORDS: [Fixed; 37] = [
+const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The application has been started by the exloader.", "ucom stop N ends it"),
     (
         BIT,

@@ -129,6 +129,22 @@ def test_samples_become_tables(numbered: ucom.SimulatedChain) -> None:
         assert len(frame) == 5 and len(ucom.to_pandas([])) == 0
 
 
+def test_d62_what_nobody_has_written_here_is_not_verified(numbered: ucom.SimulatedChain, tmp_path: Path) -> None:
+    image = bytes((37 * i + 11) % 256 for i in range(1000))
+    with ucom.connect(numbered) as chain:
+        assert chain.update(image, 2).boards[0].outcome == "verified"
+    with ucom.connect(numbered) as chain:
+        report = chain.update(image, 2, check=False)
+        assert (report.boards[0].outcome, report.verified) == ("program-up-to-date", False)
+        with pytest.raises(ucom.RefusedError, match="nothing was sent"):
+            chain.update(image, 2)
+        accepted = chain.update(image, 2, unverified=True)
+        assert (accepted.boards[0].outcome, accepted.verified) == ("program-up-to-date", False)
+        assert chain.update(image, 2, rewrite=True).boards[0].outcome == "verified"
+        with pytest.raises(ucom.UsageError, match="its characters are no program"):
+            chain.update(b":00000001FF\n", 2, raw=True)
+
+
 def test_an_update_is_proved_by_the_board(numbered: ucom.SimulatedChain, numbered_bus: Bus, tmp_path: Path) -> None:
     image = tmp_path / "image.bin"
     image.write_bytes(bytes((37 * i + 11) % 256 for i in range(1000)))
@@ -143,7 +159,8 @@ def test_an_update_is_proved_by_the_board(numbered: ucom.SimulatedChain, numbere
         assert (result.outcome, result.after[0], result.error) == ("verified", 0x4B3F, "")
         assert result.before[0] != 0x4B3F and result.flash_number == chain.boards[2].flash_number
         assert steps[-1].bytes == steps[-1].total_bytes and {step.cycle for step in steps} == {1, 2}
-        assert chain.update(image, 2).boards[0].outcome == "up-to-date"
+        again = chain.update(image, 2).boards[0]
+        assert (again.outcome, again.verified, again.note) == ("up-to-date", True, "same Program ID and date")
         before = len(numbered_bus.frames)
         assert numbered_bus.status(2) is not None
         answer = next(data for identifier, data in numbered_bus.frames[before:] if identifier == 0x142)

@@ -63,6 +63,48 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
 }
 
+/// D-62: the same bytes at another address are written, and what the agent knows nothing of is not called verified. U-3: without a
+/// date the board keeps the one it has.
+#[test]
+fn d62_what_the_agent_wrote_is_what_it_knows() {
+    let (served, key) = Served::numbered(1);
+    let record = |address: u8, sum: &str| {
+        let text = format!(":04{address:02X}000001020304{sum}\n:00000001FF\n");
+        json!({ "boards": [{ "board": 1 }], "image": STANDARD.encode(text), "date": "2009-06-01" })
+    };
+    let update = |body: Value| {
+        let job = served.job("POST /api/updates", &key, Some(body));
+        let board = &job["update"]["boards"][0];
+        let outcome = board["outcome"].as_str().unwrap_or_default().to_owned();
+        (outcome, board["verified"] == true, job["stage"].as_str().unwrap_or_default().to_owned())
+    };
+    let is = |outcome: &str, verified: bool, stage: &str| (outcome.to_owned(), verified, stage.to_owned());
+    let (low, high) = (record(0, "F2"), record(4, "EE"));
+    assert_eq!(update(low.clone()), is("verified", true, "finished"));
+    assert_eq!(update(low.clone()), is("up-to-date", true, "finished"));
+    assert_eq!(update(high.clone()), is("verified", true, "finished"));
+    let mut today = high.clone();
+    today.as_object_mut().expect("an object").remove("date");
+    assert_eq!(update(today), is("up-to-date", true, "finished"));
+    let mut again = high;
+    again["rewrite"] = json!(true);
+    assert_eq!(update(again), is("verified", true, "finished"));
+}
+
+/// D-46: raw bytes are asked for, and the file holds records: nothing is begun.
+#[test]
+fn d46_records_are_no_raw_bytes() {
+    let (served, key) = Served::numbered(1);
+    for text in
+        [":00000001FF\n", ":0400000001020304F3\n", "S9030000FC\n", "dear reader, this is no firmware\n"]
+    {
+        let mut body = request(json!([{ "board": 1 }]), 1000);
+        body["image"] = json!(STANDARD.encode(text));
+        let (status, error) = served.api("POST /api/updates", Some(&key), Some(body));
+        assert_eq!(status, 422, "{text}: {error}");
+    }
+}
+
 /// D-46: an image for another board than the one that has the number is not sent.
 #[test]
 fn d46_the_wrong_board_and_what_is_no_image_are_refused() {

@@ -22,7 +22,9 @@ fn d40_a_text_is_never_flashed() {
     for (name, content, place) in &files {
         let file = sim.file(name, content.as_bytes());
         let output = sim.ucom(&["--json", "update", "1", &file, "--flash-id", "0x21"]).ends(2);
-        assert!(output.out.contains(place) && output.out.contains("--raw"), "{name}: {}", output.out);
+        assert!(output.out.contains(place), "{name}: {}", output.out);
+        assert!(output.out.contains("make the file again"), "{name}: {}", output.out);
+        assert!(!output.out.contains("--raw"), "{name}: {}", output.out);
     }
     let other = sim.file("app.img", &image(500, 1));
     let output = sim.ucom(&["update", "1", &other, "--flash-id", "0x21"]).ends(2);
@@ -35,6 +37,66 @@ fn d40_a_text_is_never_flashed() {
     let file = sim.file("good.hex", hex.as_bytes());
     let output = sim.ucom(&["update", "1", &file, "--flash-id", "0x21"]).ends(0);
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
+}
+
+/// Nothing that a damaged file of records is answered with leads to its characters on the board; `--raw` does not either.
+#[test]
+fn d46_raw_does_not_flash_records() {
+    let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
+    let hex = ":0400000001020304F2\n:00000001FF\n";
+    let srec = "S107000001020304EE\nS9030000FC\n";
+    let files: [(&str, Vec<u8>); 10] = [
+        ("checksum.hex", hex.replace("F2", "F3").into()),
+        ("checksum.s19", srec.replace("EE", "EF").into()),
+        ("cut.hex", ":0400000001020304F2\n".into()),
+        ("z.hex", [hex.as_bytes(), b"\x1A"].concat()),
+        ("nul.hex", [hex.as_bytes(), &[0; 16]].concat()),
+        ("colon.hex", hex.replace(':', "").into()),
+        ("odd.hex", hex.replace("0102", "012").into()),
+        ("mark.hex", format!("\u{feff}{hex}").into()),
+        ("wide.hex", hex.encode_utf16().flat_map(u16::to_le_bytes).collect()),
+        ("behind.s19", format!("{srec}made by hand\n").into()),
+    ];
+    let mut peer = sim.peer();
+    for (name, content) in &files {
+        for name in [(*name).to_owned(), format!("{name}.bin")] {
+            let file = sim.file(&name, content);
+            for raw in [&[][..], &["--raw"]] {
+                let words = [&["update", "1", &file, "--flash-id", "0x21"], raw].concat();
+                let output = sim.ucom(&words).ends(2);
+                assert!(output.err.contains("make the file again"), "{name} {raw:?}: {}", output.err);
+                for word in ["--raw", "rename", "--force"] {
+                    assert!(!output.err.contains(word), "{name} {raw:?}: {}", output.err);
+                }
+            }
+        }
+    }
+    let renamed = sim.file("bytes.hex", &image(500, 1));
+    let output = sim.ucom(&["update", "1", &renamed, "--flash-id", "0x21", "--raw"]).ends(2);
+    assert!(output.err.contains("rename the file to .bin"), "{}", output.err);
+    assert!(peer.all(50).is_empty(), "nothing was sent");
+}
+
+/// A right count record ends a file of S-records; gaps are filled where that is asked for, and the hint names the option.
+#[test]
+fn count_records_and_gaps() {
+    let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
+    let data = "S10700000102030EE4\n";
+    let data = data.replace("0102030EE4", "01020304EE");
+    let dry = |name: &str, text: String, more: &[&str], code: i32| {
+        let file = sim.file(name, text.as_bytes());
+        sim.ucom(&[&["update", "1", &file, "--flash-id", "0x21", "--dry-run"], more].concat()).ends(code).err
+    };
+    let output = dry("count.s19", format!("{data}S5030001FB\n"), &[], 0);
+    assert!(output.contains("the count record shows that all 1 data records are there"), "{output}");
+    let output = dry("wrong.s19", format!("{data}S5030002FA\n"), &[], 2);
+    assert!(output.contains("line 2") && output.contains("make the file again"), "{output}");
+    let hole = ":0400000001020304F2\n:0400100001020304E2\n:00000001FF\n";
+    let output = dry("hole.hex", hole.into(), &[], 2);
+    assert!(output.contains("12 bytes at word address 0x2") && output.contains("--fill-gaps"), "{output}");
+    assert!(!output.contains("--addresses"), "{output}");
+    let output = dry("hole.hex", hole.into(), &["--fill-gaps"], 0);
+    assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
 /// S-records of the boards' tool chain count words, those of other tools bytes: the records show which, or `--addresses` does.

@@ -25,7 +25,7 @@ const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
 /// Status bits stand first, bit 7 before all others.
-const WORDS: [Fixed; 37] = [
+const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The application has been started by the exloader.", "ucom stop N ends it"),
     (
         BIT,
@@ -96,7 +96,18 @@ const WORDS: [Fixed; 37] = [
     ),
     (OUTCOME, &["not-started"], "The board was not touched.", "the error beside it names the cause"),
     (OUTCOME, &["cancelled"], "Ended by a person before anything was erased.", "ucom update again"),
-    (OUTCOME, &["up-to-date"], "The board holds this image already.", "nothing"),
+    (
+        OUTCOME,
+        &["up-to-date"],
+        "Same Program ID and date, and by the inventory this image was written to this address; nothing was sent.",
+        "nothing",
+    ),
+    (
+        OUTCOME,
+        &["program-up-to-date"],
+        "Same Program ID, but nothing shows content, load address and other memories; nothing was sent.",
+        "ucom update --rewrite writes it, --unverified accepts it",
+    ),
     (
         OUTCOME,
         &["incomplete"],

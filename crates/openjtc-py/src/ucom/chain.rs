@@ -308,16 +308,17 @@ impl Chain {
         date: (Option<Day>, Day),
         addresses: Option<String>,
         expect_program_id: Option<u16>,
-        flags: [bool; 8],
+        flags: [bool; 10],
         progress: Option<Bound<'py, PyAny>>,
     ) -> Object<'py> {
         let source = |(file, bytes): (Option<PathBuf>, Option<Vec<u8>>)| {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
-        let [raw, name_target, group, start, dry_run, unverified, force, check] = flags;
+        let [raw, fill_gaps, name_target, group, start, dry_run, unverified, force, rewrite, check] = flags;
         let first = source(image).ok_or_else(|| BoardFailure::usage("there is no image"))?;
         let (second, profile) = (source(second), &self.profile);
-        let read = Read { raw, addresses, name_target, date: date.0, today: date.1 };
+        let any_date = date.0.is_none();
+        let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };
         // Here, as the thread of the session waits for no disk.
         let (image, second, date) = py.detach(|| read.read(&first, second.as_ref(), profile))?;
         let update = Update {
@@ -325,6 +326,7 @@ impl Chain {
             image,
             second,
             date,
+            any_date,
             flash_number,
             expect_program_id,
             name_target,
@@ -333,6 +335,7 @@ impl Chain {
             dry_run,
             unverified,
             force,
+            rewrite,
             check,
         };
         let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, update, report);

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use ucom::Profile;
 use ucom_host::files::{Inventory, SignalTable};
-use ucom_host::session::{Cache, CleanupList, Driver, Held, Link, Session, SessionError};
+use ucom_host::session::{Cache, CleanupList, Driver, FlashRecords, Held, Link, Session, SessionError};
 
 use super::operator::Hand;
 use super::shared::Shared;
@@ -43,6 +43,8 @@ pub struct Hands {
     pub session: Session,
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
+    /// What updates wrote to boards.
+    pub records: FlashRecords,
     pub shared: Arc<Shared>,
     deadline: Option<Duration>,
     /// Behind the session: it goes when the bus is closed.
@@ -72,7 +74,8 @@ impl Hands {
         let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
         // Heartbeats and stops of this thread wait for no disk.
         let session = Session { driver, cache: cache.in_memory(), signals, held };
-        Self { session, inventory, inventory_file, shared, deadline, _simulated: simulated }
+        let records = FlashRecords::new(inventory_file.clone());
+        Self { session, inventory, inventory_file, records, shared, deadline, _simulated: simulated }
     }
 
     /// Does what is asked for until the bus is gone or the session ends.

@@ -81,7 +81,7 @@ pub fn init(
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), BoardFailure> {
     // What another program has written there since is compared with, as well.
-    hands.inventory = listed.or(hands.inventory.take());
+    hands.inventory = listed.or_else(|| hands.inventory.take().map(Inventory::without_records));
     let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
     let options = InitOptions { expected: expected.unwrap_or_default(), force };

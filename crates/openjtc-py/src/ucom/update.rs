@@ -6,15 +6,14 @@ use host_kit::{Diagnose as _, ErrorKind};
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Profile};
 use ucom_host::date_text;
-use ucom_host::files::image::{AddressUnit, Format};
+use ucom_host::files::image::{AddressUnit, Format, Gaps, ImageAdvice};
 use ucom_host::files::inventory::IdentifyError;
-use ucom_host::files::{Image, ImageOptions};
+use ucom_host::files::{Image, ImageError, ImageOptions};
+use ucom_host::master::Event;
 use ucom_host::master::update::{
-    Progress, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult,
-    UpdateTarget, has_header,
+    Progress, UpdateImage, UpdateMode, UpdateOptions, UpdateReport, UpdateResult, UpdateTarget, has_header,
 };
-use ucom_host::master::{Event, Outcome, Request};
-use ucom_host::session::{Boards, SessionError};
+use ucom_host::session::Boards;
 
 use super::failure::BoardFailure;
 use super::hands::Hands;
@@ -31,6 +30,7 @@ pub enum Source {
 pub struct Read {
     pub raw: bool,
     pub addresses: Option<String>,
+    pub fill_gaps: bool,
     pub name_target: bool,
     /// Year, month and day that were asked for; `None`: today.
     pub date: Option<(u16, u8, u8)>,
@@ -44,6 +44,8 @@ pub struct Update {
     pub second: Option<UpdateImage>,
     /// The flash date in the profile's form.
     pub date: u16,
+    /// No date was asked for.
+    pub any_date: bool,
     pub flash_number: Option<u16>,
     pub expect_program_id: Option<u16>,
     pub name_target: bool,
@@ -52,6 +54,7 @@ pub struct Update {
     pub dry_run: bool,
     pub unverified: bool,
     pub force: bool,
+    pub rewrite: bool,
     pub check: bool,
 }
 
@@ -71,8 +74,9 @@ impl Read {
                 return Err(BoardFailure::usage(format!("addresses: {other:?} is neither byte nor word")));
             }
         };
-        let options =
-            ImageOptions { format: self.raw.then_some(Format::Bin), address_unit, ..Default::default() };
+        let gaps = if self.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+        let format = self.raw.then_some(Format::Bin);
+        let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
         if self.name_target && !has_header(profile) {
             let text = "name_target: the name goes into the header, and the profile sends none";
             return Err(BoardFailure::usage(text));
@@ -108,16 +112,31 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFa
             Source::Bytes(_) => "image".into(),
         };
         // Some mistakes name the file themselves.
-        Failure::usage(if text.contains(&name) { text.clone() } else { format!("{name}: {text}") }).next(
-            match e.is_of_addresses() {
-                true => "addresses=\"byte\" or \"word\" defines what the addresses of records count",
-                false => {
-                    "formats are Intel HEX, S-record, and raw bytes in a .bin; raw=True sends it as it is"
-                }
-            },
-        )
+        Failure::usage(if text.contains(&name) { text.clone() } else { format!("{name}: {text}") })
+            .next(advice(&e))
     })?;
     Ok(image.into())
+}
+
+/// What helps against a file that is no image. It never leads past a check of what the file holds.
+fn advice(error: &ImageError) -> &'static str {
+    match error.advice() {
+        ImageAdvice::None => "",
+        ImageAdvice::NameRaw => {
+            "are these the raw bytes of a program? name the file .bin, or take any name with raw=True"
+        }
+        ImageAdvice::Rename => "if these are the raw bytes of a program, rename the file to .bin",
+        ImageAdvice::FillGaps => "fill_gaps=True fills them with FF, if the board may get FF there",
+        ImageAdvice::OtherUnit(AddressUnit::Byte) => {
+            "addresses=\"byte\" if the tool chain counts bytes, fill_gaps=True if the gap is meant"
+        }
+        ImageAdvice::OtherUnit(AddressUnit::Word) => {
+            "addresses=\"word\" if the tool chain counts words, fill_gaps=True if the gap is meant"
+        }
+        ImageAdvice::MakeAgain | ImageAdvice::Addresses => {
+            "make the file again with the tool chain; images are Intel HEX, S-record, and raw bytes in a .bin"
+        }
+    }
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
@@ -177,6 +196,8 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
     let options = UpdateOptions {
         dry_run: update.dry_run,
         force: update.force,
+        rewrite: update.rewrite,
+        any_date: update.any_date,
         start: update.start,
         accept_unverified: update.unverified,
         mode: if update.group { UpdateMode::Group } else { UpdateMode::OneByOne },
@@ -187,15 +208,12 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
         keep_going: several,
         ..UpdateOptions::new(targets, update.image, update.date)
     };
-    let outcome = hands.driver.run_with(Request::Update(options), &mut |event| {
+    let mut see = |event: &Event| {
         if let Event::Progress { progress, .. } = event {
             report(step(progress));
         }
-    })?;
-    let done = match outcome {
-        Outcome::Update(done) => done,
-        other => return Err(SessionError::from(other).into()),
     };
+    let done = hands.session.driver.update(options, &mut hands.records, &mut see)?;
     hands.updated(&done, update.start);
     note_outcomes(hands, &done);
     match done.failure().filter(|_| update.check) {
@@ -234,15 +252,11 @@ fn failed(report: &UpdateReport, kind: ErrorKind) -> BoardFailure {
         failures.iter().map(|(board, failure)| format!("board {board}: {failure}")).collect();
     let gravest = failures.iter().find(|(_, failure)| failure.kind() == kind);
     let Some((board, failure)) = gravest else {
-        let hint = report.unverifiable.map_or("", |why| why.hint());
-        return Failure {
-            kind,
-            code: "not-verified".into(),
-            message: "what was written could not be verified".into(),
-            next: format!("{hint}; or accept it: unverified=True"),
-            facts: Default::default(),
-        }
-        .into();
+        let (message, next) = report.unproven();
+        let next =
+            [next.replace("`rewrite`", "rewrite=True"), "or accept it: unverified=True".into()].join("; ");
+        return Failure { kind, code: "not-verified".into(), message, next, facts: Default::default() }
+            .into();
     };
     let mut own = BoardFailure::about(*failure, Some(*board));
     own.failure.kind = kind;
@@ -267,13 +281,12 @@ fn result(one: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value
         let info = info.filter(BoardInfo::has_application);
         json!([info.map(|i| i.program_id), info.map(|i| date_text(profile, i.date))])
     };
-    let done = matches!(one.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
-    let taken_on_trust = report.unverifiable.is_some() && done && one.failure.is_none();
     json!({
         "board": one.board,
         "flash_number": one.flash_number,
         "outcome": one.outcome.name(),
-        "verified": one.outcome.is_done() && !taken_on_trust,
+        "note": report.shown_already(one, profile).unwrap_or_default(),
+        "verified": one.verified,
         "before": shown(one.before),
         "after": shown(one.after),
         "attempts": one.attempts,

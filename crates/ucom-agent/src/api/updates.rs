@@ -12,12 +12,11 @@ use base64::engine::general_purpose::STANDARD;
 use host_kit::ErrorKind;
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
-use ucom_host::files::image::{AddressUnit, Format};
-use ucom_host::files::{Image, ImageOptions};
+use ucom_host::files::image::{AddressUnit, Format, Gaps, ImageAdvice};
+use ucom_host::files::{Image, ImageError, ImageOptions};
 use ucom_host::master::update::{
     UpdateImage, UpdateMode, UpdateOptions, UpdateReport, UpdateTarget, has_header,
 };
-use ucom_host::master::{Outcome, Request as BusRequest};
 use utoipa::ToSchema;
 
 use super::boards::numbers;
@@ -70,11 +69,14 @@ pub struct UpdateRequest {
     image: String,
     /// What the other cycle carries, as base64, where the profile's plan sends two images.
     second: Option<String>,
-    /// Form of the images; missing: seen by their content, which text is taken for raw bytes by never.
+    /// Form of the images; missing: seen by their content. Text and records are never taken for raw bytes.
     format: Option<ImageFormat>,
     /// What their addresses count; missing: seen by their records.
     addresses: Option<Unit>,
-    /// Flash date, as `2009-06-01`; missing: today.
+    /// Gaps between records are filled with FF.
+    #[serde(default)]
+    fill_gaps: bool,
+    /// Flash date, as `2009-06-01`; missing: today, and a board that shows the program keeps its date.
     date: Option<String>,
     /// Program ID that the boards must show at the end.
     expect_program_id: Option<u16>,
@@ -87,10 +89,13 @@ pub struct UpdateRequest {
     /// Only the checks.
     #[serde(default)]
     dry_run: bool,
-    /// Also when boards run, or the image is there already.
+    /// Also when boards run, another PC is on the bus, or the board shows the program already.
     #[serde(default)]
     force: bool,
-    /// What cannot be verified is as good as what was.
+    /// Also when the board shows the program already; lifts no check.
+    #[serde(default)]
+    rewrite: bool,
+    /// What cannot be verified is as good as what was: also a board that shows the program, of whose flash nothing is known.
     #[serde(default)]
     accept_unverified: bool,
 }
@@ -112,14 +117,27 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
         Unit::Byte => AddressUnit::Byte,
         Unit::Word => AddressUnit::Word,
     });
-    let options = ImageOptions { format, address_unit, ..ImageOptions::default() };
-    let image = Image::parse(&bytes, &options).map_err(|e| {
-        usage(
-            e.to_string(),
-            "forms are hex, srec and bin; addresses defines what the addresses of records count",
-        )
-    })?;
+    let gaps = if request.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+    let options = ImageOptions { format, address_unit, gaps, ..ImageOptions::default() };
+    let image = Image::parse(&bytes, &options).map_err(|e| usage(e.to_string(), advice(&e)))?;
     Ok(image.into())
+}
+
+/// What helps against a file that is no image. It never leads past a check of what the file holds.
+fn advice(error: &ImageError) -> &'static str {
+    match error.advice() {
+        ImageAdvice::None => "",
+        ImageAdvice::FillGaps => "fill_gaps fills them with FF, if the board may get FF there",
+        ImageAdvice::OtherUnit(AddressUnit::Byte) => {
+            "addresses byte if the tool chain counts bytes, fill_gaps if the gap is meant"
+        }
+        ImageAdvice::OtherUnit(AddressUnit::Word) => {
+            "addresses word if the tool chain counts words, fill_gaps if the gap is meant"
+        }
+        ImageAdvice::MakeAgain | ImageAdvice::NameRaw | ImageAdvice::Rename | ImageAdvice::Addresses => {
+            "make the file again with the tool chain; forms are hex, srec and bin"
+        }
+    }
 }
 
 /// The flash date: as asked, else today (UTC); 0 where no header carries it.
@@ -163,6 +181,8 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
         mode: if request.group { UpdateMode::Group } else { UpdateMode::OneByOne },
         dry_run: request.dry_run,
         force: request.force,
+        rewrite: request.rewrite,
+        any_date: request.date.is_none(),
         start: request.start,
         accept_unverified: request.accept_unverified,
         keep_going: request.boards.len() > 1,
@@ -194,11 +214,11 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
         .iter()
         .any(|b| matches!(b.failure, Some(ucom_host::master::update::UpdateFailure::Cancelled { .. })));
     let code = if cancelled { "cancelled" } else { "update" };
-    let message = match texts.is_empty() {
-        true => "what was written could not be verified".into(),
-        false => texts.join("; "),
+    let (message, next) = match texts.is_empty() {
+        true => report.unproven(),
+        false => (texts.join("; "), "the job's update has what became of each board"),
     };
-    Some(Problem::new(code, message, "the job's update has what became of each board").kind(kind))
+    Some(Problem::new(code, message, next).kind(kind))
 }
 
 /// Programs boards: checked, transferred twice, verified by reading back. Never two at once.
@@ -223,13 +243,9 @@ pub(super) async fn update(
     drop(room);
     agent.begin((&asker, Some(after)), (Kind::Update, "update"), |hands| {
         let start = options.start;
-        match hands.driver.run(BusRequest::Update(options))? {
-            Outcome::Update(report) => {
-                hands.updated(&report, start);
-                let error = failed(&report);
-                Ok((Done::Update(report), error))
-            }
-            other => Err(other.into()),
-        }
+        let report = hands.session.driver.update(options, &mut hands.records, &mut |_| {})?;
+        hands.updated(&report, start);
+        let error = failed(&report);
+        Ok((Done::Update(report), error))
     })
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use agent_kit::api::Problem;
 use host_kit::{Diagnose as _, ErrorKind};
 use ucom_host::master::Request;
-use ucom_host::session::{Driver, Held, Known, Link, Session, SessionError};
+use ucom_host::session::{Driver, FlashRecords, Held, Known, Link, Session, SessionError};
 
 use super::Config;
 use super::operator::{Hand, Local};
@@ -27,6 +27,8 @@ const LEFT_ALONE: Duration = Duration::from_secs(3);
 /// The session, and what belongs to it.
 pub(crate) struct Hands {
     pub session: Session,
+    /// What updates wrote to boards.
+    pub records: FlashRecords,
     shared: Arc<Shared>,
     pub(super) local: Rc<RefCell<Local>>,
 }
@@ -48,12 +50,13 @@ impl DerefMut for Hands {
 impl Hands {
     /// Those of a session on this link.
     pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
-        let Config { profile, signals, cache, cleanup } = config;
+        let Config { profile, signals, cache, cleanup, inventory } = config;
         let local = Rc::default();
         let held = Rc::new(RefCell::new(Held::new(shared.runs.clone())));
         let hand = Hand { shared: shared.clone(), held: Rc::clone(&held), local: Rc::clone(&local) };
         let driver = Driver::new(profile, link, Box::new(hand), cleanup);
-        Self { session: Session { driver, cache, signals, held }, shared, local }
+        let (session, records) = (Session { driver, cache, signals, held }, FlashRecords::new(inventory));
+        Self { session, records, shared, local }
     }
 
     /// Does what is asked for until the bus is gone or the agent ends.

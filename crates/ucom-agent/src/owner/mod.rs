@@ -5,6 +5,7 @@ mod operator;
 mod shared;
 mod stop;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -27,6 +28,8 @@ pub struct Config {
     pub cache: Cache,
     /// What would be left undone if the process ended now, for those who end it.
     pub cleanup: CleanupList,
+    /// The inventory file, which has what updates wrote to boards; `None`: the agent remembers it for as long as it runs.
+    pub inventory: Option<PathBuf>,
 }
 
 /// The thread that owns a bus.

@@ -26,17 +26,20 @@ pub struct UpdateArgs {
     /// Image: Intel HEX, S-record, or raw bytes in a .bin (anything else raw needs --raw)
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
-    /// Send the files as they are, whatever they hold: text and files not named .bin are refused otherwise
+    /// Take files of any name as raw bytes; never records, and text only from a .bin
     #[arg(long)]
     pub raw: bool,
     /// What the addresses of Intel HEX and S-records count; default: words in S-records and bytes in Intel HEX, unless the records
     /// follow each other in the other unit alone
     #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
+    /// Fill gaps between records with FF, the erased state of flash
+    #[arg(long)]
+    pub fill_gaps: bool,
     /// The flash number that the board must have
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
-    /// Flash date to write, or its 16 bits as 0x3AC1; default: today
+    /// Flash date to write, or its 16 bits as 0x3AC1; default: today, and a board that shows the program keeps its date
     #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Option<String>,
     /// Check everything, send nothing that changes a board
@@ -63,10 +66,14 @@ pub struct UpdateArgs {
     /// Program ID that the board must show at the end, where the image does not contain it
     #[arg(long, value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
-    /// Accept an image that cannot be verified as done: exit code 0 where the profile leaves nothing to compare
+    /// Accept as done what cannot be verified: exit code 0 for `program-up-to-date`, and where the profile leaves nothing to
+    /// compare
     #[arg(long)]
     pub unverified: bool,
-    /// Flash numbers of the boards, as `ucom init` wrote them
+    /// Write also where the board shows this program already; lifts no check
+    #[arg(long)]
+    pub rewrite: bool,
+    /// Flash numbers of the boards, as `ucom init` wrote them; updates keep there what they wrote
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

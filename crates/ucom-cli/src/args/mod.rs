@@ -133,11 +133,16 @@ pub enum Command {
                             of records count, bytes or words, is seen from records that follow each other; --addresses names it. Whether two\n\
                             files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
                             `all` are the boards that answer and those of the inventory: one that is missing is reported.\n\
+                            A board shows Program ID and date only, not its load address or other memories. It is up to date if the\n\
+                            inventory says, too, that an update wrote the same bytes to the same address; the date may be another one\n\
+                            unless --date names it. Without such an entry it is program-up-to-date: nothing is sent, and nothing is\n\
+                            verified; --rewrite writes it, --unverified accepts it. With --data, --exloader or --second it is always written.\n\
                             Exit codes: 0 verified, or already up to date (or written where the profile leaves nothing to verify,\n\
                             with --unverified; 5 without it); 1 the board reported an error before anything was erased; 3 no answer;\n\
-                            4 refused, or cancelled before anything was erased; 5 failed or cancelled after something was erased.\n\
+                            4 refused, program-up-to-date, or cancelled before anything was erased; 5 failed or cancelled after\n\
+                            something was erased.\n\
                             A bus that fails is 3 before and 5 after that. The outcome of each board is in the report:\n\
-                            not-started, cancelled, up-to-date, incomplete, unknown, written, verified or running."
+                            not-started, cancelled, up-to-date, program-up-to-date, incomplete, unknown, written, verified or running."
     )]
     Update(UpdateArgs),
     /// Give one board its number back when it no longer answers, without a reset of the others

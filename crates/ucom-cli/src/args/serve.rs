@@ -32,6 +32,9 @@ pub struct ServeArgs {
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
+    /// Flash numbers of the boards, as `ucom init` wrote them; updates keep there what they wrote
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
     /// Certificate chain, PEM: the agent speaks TLS
     #[arg(long, env = "UCOM_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,

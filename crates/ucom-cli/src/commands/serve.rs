@@ -41,6 +41,8 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         signals: link.signal_table()?,
         cache: args.cache.cache(),
         cleanup: CleanupList::default(),
+        // Simulated boards begin anew each time: the inventory of real ones is not theirs.
+        inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
     let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {

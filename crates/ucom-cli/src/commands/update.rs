@@ -7,8 +7,7 @@ use ucom_host::files::inventory::flash_number_of;
 use ucom_host::master::update::{
     UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
 };
-use ucom_host::master::{Outcome, Request};
-use ucom_host::session::SessionError;
+use ucom_host::session::{FlashRecords, SessionError};
 
 use super::update_bar::Bar;
 use super::update_files::{Files, day};
@@ -33,6 +32,8 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let options = UpdateOptions {
         dry_run: args.dry_run,
         force: args.force.force,
+        rewrite: args.rewrite,
+        any_date: args.date.is_none(),
         start: args.start,
         accept_unverified: args.unverified,
         mode: if args.group { UpdateMode::Group } else { UpdateMode::OneByOne },
@@ -44,12 +45,10 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         ..UpdateOptions::new(targets, files.image, day)
     };
     let mut bar = Bar::new(out)?;
-    let outcome = driver.run_with(Request::Update(options), &mut |event| bar.see(event));
+    let mut records = FlashRecords::new(Some(args.inventory.clone()));
+    let report = driver.update(options, &mut records, &mut |event| bar.see(event));
     bar.end();
-    let report = match outcome? {
-        Outcome::Update(report) => report,
-        other => return Err(SessionError::from(other).into()),
-    };
+    let report = report?;
     print(&report, &files.names, &profile, out);
     match report.failure() {
         None => Ok(()),
@@ -89,6 +88,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
         before: None,
         after: None,
         outcome: left,
+        verified: false,
         attempts: 0,
         failure: Some(UpdateFailure::Cancelled { left }),
         time_us: 0,

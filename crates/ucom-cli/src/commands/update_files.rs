@@ -6,8 +6,8 @@ use cli_kit::{Failure, Output};
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
 use ucom::profile::Plan;
-use ucom_host::files::image::{AddressUnit, Format};
-use ucom_host::files::{Image, ImageOptions};
+use ucom_host::files::image::{AddressUnit, Format, Gaps, ImageAdvice};
+use ucom_host::files::{Image, ImageError, ImageOptions};
 use ucom_host::master::update::{UpdateImage, has_header};
 
 use crate::args::{Addresses, UpdateArgs};
@@ -47,18 +47,14 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         Addresses::Byte => AddressUnit::Byte,
         Addresses::Word => AddressUnit::Word,
     });
-    let options =
-        ImageOptions { format: args.raw.then_some(Format::Bin), address_unit, ..Default::default() };
+    let gaps = if args.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+    let format = args.raw.then_some(Format::Bin);
+    let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
         // Some mistakes name the file themselves.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
-        failure.hint(if e.is_of_addresses() {
-            "--addresses byte or --addresses word defines what the addresses count: S-records of the boards' tool chain count words, \
-             those of objcopy and srec_cat bytes"
-        } else {
-            "formats are Intel HEX, S-record, and raw bytes in a .bin; --raw sends a file as it is"
-        })
+        failure.hint(advice(&e))
     })?;
     for note in image.notes() {
         out.note(format!("note: {}: {note}", file.display()));
@@ -73,6 +69,29 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         image.address_words()
     );
     Ok((image.into(), note))
+}
+
+/// What helps against a file that is no image. It never leads past a check of what the file holds.
+fn advice(error: &ImageError) -> String {
+    match error.advice() {
+        ImageAdvice::None => String::new(),
+        ImageAdvice::MakeAgain => {
+            "make the file again with the tool chain; images are Intel HEX, S-record, and raw bytes in a .bin"
+                .into()
+        }
+        ImageAdvice::NameRaw => {
+            "are these the raw bytes of a program? name the file .bin, or take any name with --raw".into()
+        }
+        ImageAdvice::Rename => "if these are the raw bytes of a program, rename the file to .bin".into(),
+        ImageAdvice::FillGaps => "--fill-gaps fills them with FF, if the board may get FF there".into(),
+        ImageAdvice::OtherUnit(unit) => format!(
+            "--addresses {unit} if the tool chain counts {unit}s: then the records follow each other. --fill-gaps if the gap is meant: it \
+             is filled with FF"
+        ),
+        ImageAdvice::Addresses => {
+            "make the file again: its addresses fit neither as those of bytes nor as those of words".into()
+        }
+    }
 }
 
 /// The file beside the image that the plan takes.

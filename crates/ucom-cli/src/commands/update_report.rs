@@ -40,19 +40,20 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
             };
             text += &format!("program 0x{id:04X}{day}\n");
         }
-        text += &boards(report);
+        text += &boards(report, profile);
         let failed = report.boards.iter().filter_map(|b| b.failure.as_ref().map(|f| (b.board, f)));
         text += &failed.map(|(board, f)| format!("board {board}: {}\n", f.hint())).collect::<String>();
-        text + &unverified(report, profile)
+        text + &unverified(report, profile) + &not_known(report)
     });
 }
 
-fn boards(report: &UpdateReport) -> String {
+fn boards(report: &UpdateReport, profile: &Profile) -> String {
     let row = |b: &UpdateResult| {
-        let why = b.failure.as_ref().map_or_else(String::new, ToString::to_string);
+        let shown = report.shown_already(b, profile);
+        let why = b.failure.as_ref().map(ToString::to_string).or(shown).unwrap_or_default();
         let flash = b.flash_number.map_or_else(|| "?".into(), |f| format!("0x{f:04X}"));
         let time = if b.time_us > 0 { format!("{:.1} s", b.time_us as f64 * 1e-6) } else { "-".into() };
-        vec![b.board.to_string(), flash, b.outcome.name().into(), b.attempts.to_string(), time, why]
+        vec![b.board.to_string(), flash, report.outcome_words(b, profile), b.attempts.to_string(), time, why]
     };
     let rows: Vec<Vec<String>> = report.boards.iter().map(row).collect();
     table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
@@ -62,6 +63,17 @@ fn boards(report: &UpdateReport) -> String {
 fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
     let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
     report.unverifiable.is_some() && done && b.failure.is_none()
+}
+
+/// What to do with boards whose answer alone says that they have the program.
+fn not_known(report: &UpdateReport) -> String {
+    match report.boards.iter().any(|b| b.outcome == UpdateOutcome::ProgramUpToDate) {
+        true if report.accept_unverified => "program-up-to-date is accepted, NOT verified\n".into(),
+        true => "nothing was sent: a board cannot show load address and content, and the inventory has no record of this image; \
+                 --rewrite writes it, --unverified accepts it\n"
+            .into(),
+        false => String::new(),
+    }
 }
 
 /// In words what could not be verified, why, and how it can be.
@@ -144,7 +156,8 @@ fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
         "board": b.board,
         "flash_number": b.flash_number,
         "outcome": b.outcome.name(),
-        "verified": b.outcome.is_done() && !taken_on_trust(b, report),
+        "note": report.shown_already(b, profile),
+        "verified": b.verified,
         "before": shown(b.before),
         "after": shown(b.after),
         "changed": changed(b),

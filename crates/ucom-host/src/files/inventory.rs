@@ -6,13 +6,19 @@
 //! flash_number = 0x0021
 //! description = "UCoM2 head pan"
 //! name = "head pan"
+//! program = { flash_number = 0x0021, sha256 = "…", address = 0x0, program_id = 0x4B3F, date = 0x3AC1 }
 //! ```
+//!
+//! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key alone: everything else in
+//! the file stays as it is, comments included.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, TableLike, Value};
 
+use super::FlashRecord;
 use crate::master::InitReport;
 
 /// Longest file that is read, bytes.
@@ -32,6 +38,16 @@ pub struct InventoryBoard {
     /// What people call it.
     #[serde(default)]
     pub name: String,
+    /// What updates wrote to it.
+    #[serde(default)]
+    pub program: Option<FlashRecord>,
+}
+
+impl InventoryBoard {
+    /// What updates wrote to this board; a record of another board is none.
+    pub fn record(&self) -> Option<FlashRecord> {
+        self.program.filter(|record| record.flash_number == self.flash_number)
+    }
 }
 
 /// Boards by position.
@@ -207,7 +223,7 @@ impl Inventory {
         self.boards.values()
     }
 
-    /// The boards of an init, with the names that people gave them in an older inventory.
+    /// The boards of an init, with the names and flash records of an older inventory.
     ///
     /// # Errors
     /// Two boards have one flash number.
@@ -218,22 +234,72 @@ impl Inventory {
                 number: board.number,
                 flash_number: board.info.flash_number,
                 description: board.description.clone().unwrap_or_default(),
-                name: String::new(),
+                ..InventoryBoard::default()
             })?;
         }
         if let Some(older) = older {
-            inventory.keep_names(older);
+            inventory.keep(older);
         }
         Ok(inventory)
     }
 
-    /// Takes over the names that people gave in an older inventory, by flash number.
-    pub fn keep_names(&mut self, older: &Self) {
-        for board in self.boards.values_mut().filter(|b| b.name.is_empty()) {
-            if let Some(known) = older.boards.values().find(|b| b.flash_number == board.flash_number) {
+    /// Takes over names and flash records of an older inventory, by flash number.
+    pub fn keep(&mut self, older: &Self) {
+        for board in self.boards.values_mut() {
+            let Some(known) = older.boards.values().find(|b| b.flash_number == board.flash_number) else {
+                continue;
+            };
+            if board.name.is_empty() {
                 board.name.clone_from(&known.name);
             }
+            board.program = board.program.or(known.record());
         }
+    }
+
+    /// The boards without their flash records: those of a file that is not there any more prove nothing.
+    #[must_use]
+    pub fn without_records(mut self) -> Self {
+        self.boards.values_mut().for_each(|board| board.program = None);
+        self
+    }
+
+    /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
+    ///
+    /// # Errors
+    /// The file cannot be read or written. A board that the file does not list is no error: nothing is kept of it.
+    pub fn set_record(
+        path: &Path,
+        flash_number: u16,
+        record: Option<FlashRecord>,
+    ) -> Result<(), InventoryError> {
+        let io = |source| InventoryError::Io { path: path.into(), source };
+        let wrong = |text: String| InventoryError::Form(format!("{}: {text}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(io)?;
+        let mut document: DocumentMut = text.parse().map_err(|e| wrong(format!("{e}")))?;
+        let item = match record {
+            None => None,
+            Some(record) => {
+                let value: Value = record.to_toml().parse().map_err(|e| wrong(format!("{e}")))?;
+                Some(Item::Value(value))
+            }
+        };
+        let boards: Vec<&mut dyn TableLike> = match document.get_mut("board") {
+            Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|t| t as &mut dyn TableLike).collect(),
+            Some(Item::Value(Value::Array(array))) => {
+                let tables = array.iter_mut().filter_map(Value::as_inline_table_mut);
+                tables.map(|table| table as &mut dyn TableLike).collect()
+            }
+            _ => Vec::new(),
+        };
+        let is_meant = |board: &&mut dyn TableLike| {
+            board.get("flash_number").and_then(Item::as_integer) == Some(i64::from(flash_number))
+        };
+        match (boards.into_iter().find(is_meant), item) {
+            (Some(board), Some(item)) => drop(board.insert("program", item)),
+            (Some(board), None) if board.contains_key("program") => drop(board.remove("program")),
+            (Some(_), None) | (None, _) => return Ok(()),
+        }
+        write_whole(path, document.to_string().as_bytes()).map_err(io)
     }
 
     /// The file's text.
@@ -246,6 +312,9 @@ impl Inventory {
                 if !value.is_empty() {
                     text += &format!("{key} = {}\n", quoted(value));
                 }
+            }
+            if let Some(record) = board.program {
+                text += &format!("program = {}\n", record.to_toml());
             }
         }
         text
@@ -266,48 +335,4 @@ fn quoted(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    fn board(number: u8, flash_number: u16) -> InventoryBoard {
-        InventoryBoard { number, flash_number, ..Default::default() }
-    }
-
-    #[test]
-    fn what_cannot_be_is_refused() {
-        let refused = |text: &str| Inventory::parse(text).unwrap_err().to_string();
-        assert!(refused("[[board]]\nnumber = 32\nflash_number = 1").contains("above 31"));
-        let twice = "[[board]]\nnumber = 1\nflash_number = 1\n[[board]]\nnumber = 1\nflash_number = 2";
-        assert!(refused(twice).contains("board 1 is given twice"));
-        let same = "[[board]]\nnumber = 1\nflash_number = 7\n[[board]]\nnumber = 2\nflash_number = 7";
-        assert!(refused(same).contains("0x0007") && refused(same).contains("boards 1 and 2"));
-        assert!(refused("[[board]]\nnumber = 1\nflash_number = 1\nposition = 2").contains("position"));
-        assert!(refused("[[bord]]").contains("line 1"));
-    }
-
-    #[test]
-    fn names_stay_with_their_board() {
-        let mut old = Inventory::default();
-        old.insert(InventoryBoard { name: "head pan".into(), ..board(1, 0x21) }).unwrap();
-        let mut new = Inventory::default();
-        new.insert(board(1, 0x42)).unwrap();
-        new.insert(board(2, 0x21)).unwrap();
-        new.keep_names(&old);
-        assert_eq!(new.get(2).unwrap().name, "head pan");
-        assert_eq!(new.get(1).unwrap().name, "");
-    }
-
-    proptest! {
-        #[test]
-        fn round_trip(boards in prop::collection::btree_map(0_u8..32, (any::<u16>(), any::<String>()), 0..32)) {
-            let mut inventory = Inventory::default();
-            for (number, (flash, text)) in boards {
-                let flash = flash & 0xFFE0 | u16::from(number);
-                inventory.insert(InventoryBoard { description: text, ..board(number, flash) }).unwrap();
-            }
-            prop_assert_eq!(Inventory::parse(&inventory.to_toml()).unwrap(), inventory);
-        }
-    }
-}
+mod tests;

@@ -1,6 +1,7 @@
 //! Files of the PC side: images, recordings, inventories, meanings of words, parameters, signal databases.
 
 pub mod dbc;
+mod flash_record;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
@@ -12,6 +13,7 @@ pub mod signals;
 mod text;
 
 pub use dbc::{DbcBoard, NamedSignal, dbc};
+pub use flash_record::FlashRecord;
 pub use image::{Image, ImageError, ImageOptions};
 pub use inventory::{IdentifyError, Inventory, InventoryBoard, InventoryError};
 pub use params::{ParamsError, ParamsFile};

@@ -93,7 +93,7 @@ impl Driver {
         request: Request,
         see: &mut dyn FnMut(&Event),
     ) -> Result<Outcome, SessionError> {
-        self.drive(request, true, see)
+        self.drive(request, true, &mut |_, event| see(event))
     }
 
     /// What a board reports of itself.
@@ -107,7 +107,7 @@ impl Driver {
     }
 
     fn ask(&mut self, board: u8, can_be_cancelled: bool) -> Result<BoardSeen, SessionError> {
-        match self.drive(Request::Info { board }, can_be_cancelled, &mut |_| {})? {
+        match self.drive(Request::Info { board }, can_be_cancelled, &mut |_, _| {})? {
             Outcome::Info(seen) => Ok(seen),
             other => Err(other.into()),
         }
@@ -121,14 +121,14 @@ impl Driver {
     /// Stops a board, also after Ctrl-C: what was started is not left alone.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
-        self.drive(request, false, &mut |_| {}).map(drop)
+        self.drive(request, false, &mut |_, _| {}).map(drop)
     }
 
-    fn drive(
+    pub(super) fn drive(
         &mut self,
         request: Request,
         can_be_cancelled: bool,
-        see: &mut dyn FnMut(&Event),
+        see: &mut dyn FnMut(&mut Master, &Event),
     ) -> Result<Outcome, SessionError> {
         self.cleanup.begin(&request);
         let times_off = self.link.times_bus_off();
@@ -149,7 +149,7 @@ impl Driver {
         &mut self,
         id: ProcedureId,
         can_be_cancelled: bool,
-        see: &mut dyn FnMut(&Event),
+        see: &mut dyn FnMut(&mut Master, &Event),
     ) -> Result<Outcome, SessionError> {
         let mut waits_for_cancel = can_be_cancelled;
         loop {
@@ -159,7 +159,7 @@ impl Driver {
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
-                see(&event);
+                see(&mut self.master, &event);
                 match event {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {

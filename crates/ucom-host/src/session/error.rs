@@ -3,6 +3,7 @@ use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 use super::bus_off;
+use crate::files::InventoryError;
 use crate::files::signals::ValueError;
 use crate::master::io::Kind;
 use crate::master::{Error, ExchangeError, MasterError, Outcome, SignalError};
@@ -17,6 +18,9 @@ pub enum SessionError {
     /// Values do not fit the boards, or what became of them is not known.
     #[error(transparent)]
     Values(#[from] ValuesError),
+    /// The inventory cannot be read.
+    #[error(transparent)]
+    Inventory(#[from] InventoryError),
     /// The bus cannot be opened.
     #[error("{0}")]
     Open(Box<OpenError>),
@@ -185,6 +189,7 @@ impl Diagnose for SessionError {
             Self::BusOff { failure, url } => {
                 return Diagnosis { next: bus_off::next(url), ..failure.diagnosis() };
             }
+            Self::Inventory(_) => (Usage, "usage", ""),
             Self::Open(e) if matches!(**e, OpenError::Url(_)) => {
                 (Usage, "usage", "ucom --help shows the forms of --bus")
             }

@@ -260,6 +260,7 @@ impl Session {
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate
+                | UpdateOutcome::ProgramUpToDate
                 | UpdateOutcome::Unknown => {}
                 UpdateOutcome::Incomplete
                 | UpdateOutcome::Written

@@ -6,6 +6,7 @@
 //! - [`CleanupList`]: what would be left undone if the process ended now.
 //! - [`Cache`], [`History`]: what is remembered of boards from session to session.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
+//! - [`FlashRecords`]: what this tool wrote to boards, for [`Driver::update`].
 //! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
 //! - [`Session`], [`Held`]: what has been started and is known, for who owns a bus for others.
@@ -16,6 +17,7 @@ mod cleanup;
 mod driver;
 mod error;
 mod examine;
+mod flash_records;
 mod followed;
 mod held;
 mod history;
@@ -38,6 +40,7 @@ pub use cleanup::CleanupList;
 pub use driver::{Driver, Operator, event_text, nothing_shared};
 pub use error::{SessionError, ValuesError};
 pub use examine::Examination;
+pub use flash_records::FlashRecords;
 pub use followed::{Change, Followed, Notice};
 pub use held::{Held, Session};
 pub use history::{History, Written};

@@ -25,4 +25,5 @@ mod stopping;
 mod update;
 mod update_ends;
 mod update_group;
+mod update_known;
 mod update_plans;

@@ -5,7 +5,7 @@ use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
 
 use crate::bench::{Bench, Fault};
 use crate::chain::initialised;
-use crate::update::{options, update};
+use crate::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
@@ -132,5 +132,5 @@ fn u4_an_update_gives_a_number_to_one_board_only() {
     let Ok(Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
     assert_eq!((report.exit(), numbers(&mut bench)), (0, vec![1, 2, 3, 0]), "{report:?}");
     assert!(bench.count("282#") > 1, "it was repaired");
-    assert_eq!(update(&mut bench, options(&[2], 128)).exit(), 0);
+    assert_eq!(update(&mut bench, recorded(options(&[2], 128), &report)).exit(), 0);
 }

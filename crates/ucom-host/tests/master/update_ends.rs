@@ -11,7 +11,7 @@ use crate::answering::Answering;
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;
 use crate::loader::{Loader, loader};
-use crate::update::{check_program, options, outcomes, update};
+use crate::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
@@ -157,8 +157,9 @@ fn p12_cancelled_while_it_starts() {
 #[test]
 fn a_board_that_is_up_to_date_is_started() {
     let mut bench = initialised(&[0x21, 0x42]);
-    update(&mut bench, options(&[1], 128));
+    let first = update(&mut bench, options(&[1], 128));
     let start = UpdateOptions { start: true, keep_going: true, ..options(&[1, 2], 128) };
+    let start = recorded(start, &first);
     let mut cancelled = initialised(&[0x21, 0x42]);
     update(&mut cancelled, options(&[1], 128));
     let begun = |b: &Bench| b.beginning("2C2#") >= 3;
@@ -172,7 +173,9 @@ fn a_board_that_is_up_to_date_is_started() {
     assert_eq!(bench.beginning("2C1#"), blocks);
     // All are up to date and run: nothing is left to do.
     let sent = bench.beginning("301#");
-    assert_eq!((update(&mut bench, start).exit(), bench.beginning("301#")), (0, sent));
+    let mut all = recorded(start.clone(), &report);
+    all.records.extend(start.records);
+    assert_eq!((update(&mut bench, all).exit(), bench.beginning("301#")), (0, sent));
 }
 
 /// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
@@ -286,28 +289,28 @@ fn d08_a_dry_run_looks_for_another_pc() {
 fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let left = || {
         let mut bench = initialised(&[0x21, 0x42]);
-        update(&mut bench, options(&[1], 128));
+        let report = update(&mut bench, options(&[1], 128));
         bench.go(Request::XReset { board: 1, force: false }, 20).unwrap();
         assert!(bench.board(0).status().has(Status::PROG));
-        bench
+        (bench, recorded(options(&[1], 128), &report))
     };
     for start in [false, true] {
-        let mut bench = left();
+        let (mut bench, again) = left();
         let from = bench.log.len();
-        let report = update(&mut bench, UpdateOptions { start, ..options(&[1], 128) });
+        let report = update(&mut bench, UpdateOptions { start, ..again });
         let wanted = if start { UpdateOutcome::Running } else { UpdateOutcome::UpToDate };
         assert_eq!((report.boards[0].outcome, report.exit()), (wanted, 0), "{report:?}");
         assert!(!bench.board(0).status().has(Status::PROG));
         assert!(bench.log[from..].iter().all(|(.., f)| !f.to_string().starts_with("2C1#")), "not programmed");
     }
-    let mut bench = left();
-    let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 128) });
+    let (mut bench, again) = left();
+    let report = update(&mut bench, UpdateOptions { dry_run: true, ..again });
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
     // It cannot be ended: that is reported.
-    let mut bench = left();
+    let (mut bench, again) = left();
     bench.lose = vec![("< 1C1#", u32::MAX)];
-    let report = update(&mut bench, options(&[1], 128));
+    let report = update(&mut bench, again);
     let code = report.boards[0].failure.as_ref().map(UpdateFailure::code);
     assert_eq!((code, report.boards[0].outcome), (Some("still-programming"), UpdateOutcome::UpToDate));
     assert_ne!(report.exit(), 0);
@@ -319,24 +322,25 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {
         let mut bench = initialised(&[0x21, 0x42]);
-        update(&mut bench, options(&[1, 2], 64));
+        let report = update(&mut bench, options(&[1, 2], 64));
         for board in [1, 2] {
             bench.go(Request::XReset { board, force: false }, 20).unwrap();
         }
         // A tool that starts anew listens for another PC before it sends what changes anything (D-08).
         bench.master = Master::new(ucom::Profile::default());
-        bench
+        (bench, recorded(options(&[1, 2], 64), &report))
     };
-    let (mut whole, since) = (left(), left().now);
-    update(&mut whole, options(&[1, 2], 64));
+    let (mut whole, again) = left();
+    let since = whole.now;
+    update(&mut whole, again);
     let took = whole.now - since;
     let cancel: fn(&mut Bench, ucom_host::master::ProcedureId) = |bench, id| bench.master.cancel(id);
     for end in [cancel, unplugged] {
         let (mut taken_out, mut named) = (0, 0);
         for after in (0..=took).step_by(10_000) {
-            let mut bench = left();
+            let (mut bench, again) = left();
             let at = bench.now + after;
-            let report = ended(&mut bench, options(&[1, 2], 64), |b| b.now >= at, end);
+            let report = ended(&mut bench, again, |b| b.now >= at, end);
             for (i, result) in report.boards.iter().enumerate() {
                 let code = result.failure.as_ref().map(UpdateFailure::code);
                 if !bench.board(i).status().has(Status::PROG) {

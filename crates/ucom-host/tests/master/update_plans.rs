@@ -119,9 +119,9 @@ fn u10_a_named_program_id_is_verified() {
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
     assert_eq!(report.exit(), 5);
-    // There already (U-3).
+    // There already (U-3), by the board's word alone (D-62).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
-    assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::UpToDate, 0));
+    assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::ProgramUpToDate, 0));
     // An image whose Program ID is known must have it.
     let mut bench = Bench::new(Profile::default(), vec![Box::new(Loader::new(34))]);
     let other = UpdateOptions { expect_program_id: Some(0x4B40), ..options(&[1], 1000) };

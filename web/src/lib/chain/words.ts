@@ -156,12 +156,13 @@ export function jobWords(what: string): string {
 export const OUTCOMES: Record<string, string> = {
   'not-started': 'Not started: nothing was erased',
   cancelled: 'Cancelled before anything was erased',
-  'up-to-date': 'Up to date: the image was there already',
+  'up-to-date': 'Up to date: same program ID, and this image was written there before',
+  'program-up-to-date': 'Same program ID, nothing sent: no record shows content and address',
   incomplete: 'Incomplete: erased or half written. Update it again; it has no program until then',
   unknown: 'Not known: nothing was received at the end. Scan, and look at its program ID',
   written: 'Written; nothing to verify it by',
   verified: 'Verified by reading back',
-  running: 'Verified by reading back, and running',
+  running: 'The application runs',
 };
 
 /** What came of a job, in one sentence. */

@@ -232,6 +232,7 @@ class Chain(ValuesByName):
         second: _Path | bytes | None = None,
         raw: bool = False,
         addresses: Literal["byte", "word"] | None = None,
+        fill_gaps: bool = False,
         date: datetime.date | None = None,
         expect_program_id: int | None = None,
         name_target: bool = False,
@@ -240,30 +241,35 @@ class Chain(ValuesByName):
         dry_run: bool = False,
         unverified: bool = False,
         force: bool = False,
+        rewrite: bool = False,
         check: bool = True,
         progress: Callable[[Progress], None] | bool = True,
     ) -> UpdateReport:
         """Updates the firmware of boards: the image is checked, transferred twice, and read back by its Program ID and date.
 
-        Boards that have the image are skipped: after a failure the same call goes on where it ended. Ctrl-C and an exception of
-        ``progress`` cancel it; what became of each board is in the notes of the exception (Python 3.11), and in `events`
-        (``updated``).
+        A board shows Program ID and date only. It is skipped as ``up-to-date`` if the inventory file (without one: this chain)
+        also has it that the same bytes were written to the same address. Without that it is ``program-up-to-date``: nothing is
+        sent, and an error is raised unless ``unverified``. After a failure the same call goes on where it ended. Ctrl-C and an
+        exception of ``progress`` cancel it; what became of each board is in the notes of the exception (Python 3.11), and in
+        `events` (``updated``).
 
         Args:
             image: Intel HEX, S-record or raw bytes of a ``.bin``, as a file; or the content of such a file.
             boards: One board by its number, several by an inventory (`init`, or a file in `connect`).
             flash_number: The flash number that the one board must have.
             second: What the other cycle carries, where the profile's ``prog.plan`` sends two images.
-            raw: Send the file as it is, whatever it holds.
+            raw: Take a file of any name as raw bytes; never records, and text only from a ``.bin``.
             addresses: What addresses of records count, where that cannot be seen.
-            date: Flash date; None: today, UTC.
+            fill_gaps: Fill gaps between records with FF.
+            date: Flash date; None: today, UTC, and a board that shows the program keeps its date.
             expect_program_id: Program ID that the boards must show at the end.
             name_target: The header names the board: another one refuses the image.
             group: All boards with one transfer, by broadcast.
             start: Start the application at the end; like what `start` has started it is stopped when the chain is closed.
             dry_run: Only the checks; nothing is sent that changes a board.
-            unverified: What cannot be read back is as good as what was.
-            force: Also when boards run, another PC is on the bus, or the image is there already.
+            unverified: What cannot be verified is as good as what was: also ``program-up-to-date``.
+            force: Also when boards run, another PC is on the bus, or the board shows the program already.
+            rewrite: Also when the board shows the program already; lifts no check.
             check: Raise an error where a board was not updated; otherwise it is in the report.
             progress: Called with each `Progress`; True: a line on a terminal's stderr.
 
@@ -273,7 +279,7 @@ class Chain(ValuesByName):
         """
         today = datetime.datetime.now(datetime.timezone.utc).date()
         asked = None if date is None else (date.year, date.month, date.day)
-        flags = [raw, name_target, group, start, dry_run, unverified, force, check]
+        flags = [raw, fill_gaps, name_target, group, start, dry_run, unverified, force, rewrite, check]
         value = self._native.update(
             self._list(boards),
             _image(image),

@@ -160,9 +160,11 @@ class UpdateResult:
     Attributes:
         board: Its number.
         flash_number: Its flash number; None: it did not answer.
-        outcome: ``not-started``, ``cancelled``, ``up-to-date``, ``incomplete``, ``unknown``, ``written``, ``verified`` or
-            ``running``.
-        verified: The proof: the board itself shows the Program ID and the date of the image.
+        outcome: ``not-started``, ``cancelled``, ``up-to-date``, ``program-up-to-date``, ``incomplete``, ``unknown``, ``written``,
+            ``verified`` or ``running``.
+        note: What is to be said of a board that showed the program already; empty: of any other.
+        verified: The board shows the Program ID and date of the image, and exactly this image was written to this address:
+            now, or before by the inventory.
         before: Program ID and flash date that it showed before; None each: no valid application, or no answer.
         after: Program ID and flash date that it shows now.
         attempts: Attempts that were made.
@@ -173,6 +175,7 @@ class UpdateResult:
     board: int
     flash_number: int | None
     outcome: str
+    note: str
     verified: bool
     before: tuple[int | None, str | None]
     after: tuple[int | None, str | None]

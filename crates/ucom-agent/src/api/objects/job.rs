@@ -1,7 +1,7 @@
 //! Jobs, and what they brought about.
 use agent_kit::api::Problem;
 use host_kit::{Diagnose as _, Finding, Severity};
-use ucom_host::master::update::{UpdateOutcome, UpdateReport, UpdateResult};
+use ucom_host::master::update::{UpdateReport, UpdateResult};
 use utoipa::ToSchema;
 
 use super::FoundObject;
@@ -50,9 +50,10 @@ pub struct UpdatedObject {
     /// Who it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
-    /// `not-started`, `cancelled`, `up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`.
+    /// `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`.
     pub outcome: String,
-    /// What the board showed when it was read back is what was sent.
+    /// The board shows the Program ID and date of the image, and the agent or its inventory has it that exactly this image was
+    /// written to this address: now, or before.
     pub verified: bool,
     /// Program ID that it had, and that was read back.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,11 +93,7 @@ impl UpdateObject {
             board: result.board,
             flash_number: result.flash_number,
             outcome: result.outcome.name().into(),
-            verified: match result.outcome {
-                UpdateOutcome::Verified | UpdateOutcome::UpToDate => true,
-                UpdateOutcome::Running => report.unverifiable.is_none(),
-                _ => false,
-            },
+            verified: result.verified,
             program_id_before: result.before.filter(|i| i.has_application()).map(|info| info.program_id),
             program_id_after: result.after.filter(|i| i.has_application()).map(|info| info.program_id),
             attempts: result.attempts,

@@ -1,13 +1,17 @@
 //! The format of a file that no option names: records by their first line, raw bytes only where they cannot be text.
 //!
 //! A text that is taken for raw bytes is flashed, read back and called verified, and the board has no program any more.
-//! So raw bytes are only taken from a `.bin` without printable text, or when an option names them.
+//! So raw bytes are only taken from a `.bin` without printable text. Where an option asks for raw bytes, other names are taken
+//! as well, and a text from a `.bin`; records never are, damaged ones neither.
 
-use super::{Format, ImageError};
+use super::{Format, ImageError, segments::lines};
 use std::path::Path;
 
 /// Of so many bytes in a hundred that can be printed, it is a text.
 const TEXT_PERCENT: usize = 90;
+/// Of so many hexadecimal digits in a hundred characters, a line is or was a record.
+const HEX_PERCENT: usize = 80;
+const MARKED_PERCENT: usize = 50;
 /// So much of a text is shown, characters.
 const SHOWN: usize = 24;
 
@@ -23,12 +27,8 @@ impl Format {
 
     /// What a file of this name holds, where no option names it: raw bytes only from a `.bin`, and never text.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
-        let by_name = name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        let expected = by_name.as_deref().and_then(|extension| match extension {
-            "hex" | "ihex" | "ihx" | "h86" => Some(Self::IntelHex),
-            "s19" | "s28" | "s37" | "srec" | "srecord" | "mot" | "mhx" => Some(Self::SRecord),
-            _ => None,
-        });
+        let by_name = extension(name);
+        let expected = by_name.as_deref().and_then(Self::by_extension);
         if content.starts_with(b"\x7fELF") {
             return Err(ImageError::Elf);
         }
@@ -44,11 +44,71 @@ impl Format {
         if is_text(content) {
             return Err(ImageError::Text { starts: start(content) });
         }
+        if let Some(place) = record_place(content) {
+            return Err(ImageError::WasRecords { place });
+        }
         match (name, by_name.as_deref()) {
             (None, _) | (Some(_), Some("bin")) => Ok(Self::Bin),
             (Some(name), _) => Err(ImageError::NotBin { name: name.display().to_string() }),
         }
     }
+
+    /// Raw bytes, because an option asks for them: never an executable or records, and a text only from a `.bin`.
+    pub(super) fn raw(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
+        if content.starts_with(b"\x7fELF") {
+            return Err(ImageError::Elf);
+        }
+        if let Some(place) = record_place(content) {
+            return Err(ImageError::WasRecords { place });
+        }
+        let extension = extension(name);
+        match (name, extension.as_deref()) {
+            (_, extension) if is_text(content) && extension != Some("bin") => {
+                Err(ImageError::RawText { starts: start(content) })
+            }
+            (Some(name), Some(extension)) if Self::by_extension(extension).is_some() => {
+                Err(ImageError::RawName { name: name.display().to_string() })
+            }
+            _ => Ok(Self::Bin),
+        }
+    }
+
+    /// The form of files whose names end so.
+    fn by_extension(extension: &str) -> Option<Self> {
+        match extension {
+            "hex" | "ihex" | "ihx" | "h86" => Some(Self::IntelHex),
+            "s19" | "s28" | "s37" | "srec" | "srecord" | "mot" | "mhx" => Some(Self::SRecord),
+            _ => None,
+        }
+    }
+}
+
+fn extension(name: Option<&Path>) -> Option<String> {
+    name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
+}
+
+/// The place of the first line that is a record or may have been one, as a text shows it: in any encoding, with characters
+/// missing or damaged. `None`: it is no text, or no such line is in it.
+fn record_place(content: &[u8]) -> Option<String> {
+    // Two bytes a character, padding and ends of old systems.
+    let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
+    let letters = MARKS.iter().find_map(|(mark, _)| letters.strip_prefix(*mark)).unwrap_or(&letters);
+    let mut lines = lines(letters);
+    let first = lines.clone().next();
+    let found = if is_text(letters) { lines.find(|(_, line)| was_record(line)) } else { first };
+    let (line, _) = found.filter(|(_, line)| was_record(line))?;
+    Some(format!("line {line}"))
+}
+
+/// Nearly all of the line are hexadecimal digits, as of the shortest records at least; of a line with the mark of a record half
+/// of them are.
+fn was_record(line: &[u8]) -> bool {
+    let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
+    let percent = match line {
+        [b':' | b'S', rest @ ..] if rest.iter().all(u8::is_ascii_alphanumeric) => MARKED_PERCENT,
+        _ => HEX_PERCENT,
+    };
+    digits >= 8 && digits * 100 >= line.len() * percent
 }
 
 /// The form of the first line that is a record, whatever stands before it.

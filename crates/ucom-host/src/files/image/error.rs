@@ -1,6 +1,6 @@
 //! Why a file is no image.
 
-use super::Format;
+use super::{AddressUnit, Format};
 use std::path::PathBuf;
 
 /// Why a file cannot be used as an image.
@@ -41,6 +41,34 @@ pub enum ImageError {
         /// The file.
         name: String,
     },
+    /// The file would be taken for raw bytes, and it holds records, whole or damaged.
+    #[error(
+        "{place}: a record of Intel HEX or S-record, or what is left of one; its characters are no program"
+    )]
+    WasRecords {
+        /// Where the first one stands.
+        place: String,
+    },
+    /// Raw bytes were asked for, and the file is a text.
+    #[error("a text is no program, raw bytes were asked for: \"{starts}…\"")]
+    RawText {
+        /// How it begins.
+        starts: String,
+    },
+    /// Raw bytes were asked for, and the file has the name of a file of records.
+    #[error("{name}: raw bytes were asked for, but the name is that of a file of records")]
+    RawName {
+        /// The file.
+        name: String,
+    },
+    /// The addresses do not fit in the usual unit, but they do in the other one.
+    #[error("{error}")]
+    OtherUnit {
+        /// What is wrong in the usual unit.
+        error: Box<Self>,
+        /// The other one.
+        unit: AddressUnit,
+    },
     /// No such form.
     #[error("unknown image format `{name}`: one of bin, hex, srec")]
     UnknownFormat {
@@ -74,10 +102,7 @@ pub enum ImageError {
         lines: usize,
     },
     /// Records leave addresses out.
-    #[error(
-        "{bytes} bytes at word address 0x{address_words:X} are in no record; \
-         fill gaps with FF if the loader may write them"
-    )]
+    #[error("{bytes} bytes at word address 0x{address_words:X} are in no record")]
     Gap {
         /// First address without data, words.
         address_words: u32,
@@ -165,7 +190,48 @@ pub enum LineProblem {
     },
 }
 
+/// What helps against an [`ImageError`]. None of it leads past a check of the file's content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageAdvice {
+    /// The error says all.
+    None,
+    /// The file is damaged or is no image: make it again.
+    MakeAgain,
+    /// Bytes that are no text: `.bin` is the name of raw bytes, or an option takes them as raw.
+    NameRaw,
+    /// The file has the name of a file of records and holds none: give it the name of what it is.
+    Rename,
+    /// Gaps between records can be filled.
+    FillGaps,
+    /// The records follow each other where addresses count this unit.
+    OtherUnit(AddressUnit),
+    /// Addresses overlap, are no whole words, or go too far.
+    Addresses,
+}
+
 impl ImageError {
+    /// What helps.
+    pub fn advice(&self) -> ImageAdvice {
+        match self {
+            Self::OtherUnit { unit, .. } => ImageAdvice::OtherUnit(*unit),
+            Self::Gap { .. } => ImageAdvice::FillGaps,
+            Self::NotBin { .. } => ImageAdvice::NameRaw,
+            Self::RawName { .. } => ImageAdvice::Rename,
+            Self::Io { .. } | Self::Elf | Self::UnknownFormat { .. } | Self::TooLarge { .. } => {
+                ImageAdvice::None
+            }
+            error if error.is_of_addresses() => ImageAdvice::Addresses,
+            Self::Empty
+            | Self::Text { .. }
+            | Self::ByteOrderMark { .. }
+            | Self::WasRecords { .. }
+            | Self::RawText { .. }
+            | Self::Line { .. }
+            | Self::NoEnd { .. }
+            | Self::AddressRange { .. } => ImageAdvice::MakeAgain,
+        }
+    }
+
     /// The records are sound, but their addresses leave gaps, overlap or go too far: perhaps they count something else.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
@@ -173,6 +239,7 @@ impl ImageError {
             self,
             Self::Gap { .. }
                 | Self::AddressRange { .. }
+                | Self::OtherUnit { .. }
                 | Self::Line { problem: HalfWord { .. } | Overlap { .. } | TooLarge { .. }, .. }
         )
     }

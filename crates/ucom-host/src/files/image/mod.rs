@@ -1,5 +1,5 @@
-//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; a text never does
-//! unless it is asked for.
+//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; the characters of a
+//! file of records never do.
 //!
 //! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
 //! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are recognised by
@@ -16,7 +16,7 @@ mod tests;
 use core::fmt;
 use core::str::FromStr;
 
-pub use error::{ImageError, LineProblem};
+pub use error::{ImageAdvice, ImageError, LineProblem};
 use segments::Segments;
 
 /// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
@@ -94,7 +94,8 @@ pub enum Gaps {
 /// How to read an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Form of the file, whatever it holds; `None` decides by content and name, and takes no text for raw bytes.
+    /// Form of the file; `None` decides by content and name. Raw bytes never hold records, and text only from a `.bin`
+    /// when the form is given.
     pub format: Option<Format>,
     /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other one where at least three records
     /// follow each other in that one alone.
@@ -134,6 +135,11 @@ pub enum ImageNote {
     },
     /// The last word had one byte; 0xFF was added.
     LastWordPadded,
+    /// The file has no end record, but the count record at its end has the right number of data records.
+    EndedByCount {
+        /// The data records.
+        records: u32,
+    },
     /// The records follow each other only if their addresses count this, which is not what their form usually counts.
     AddressesCount(AddressUnit),
 }
@@ -143,6 +149,9 @@ impl fmt::Display for ImageNote {
         match self {
             Self::GapFilled { address_words, bytes } => {
                 write!(f, "gap of {bytes} bytes at word address 0x{address_words:X} filled with FF")
+            }
+            Self::EndedByCount { records } => {
+                write!(f, "no end record; the count record shows that all {records} data records are there")
             }
             Self::LastWordPadded => f.write_str("odd number of bytes: FF added to fill the last word"),
             Self::AddressesCount(unit) => {
@@ -175,7 +184,11 @@ impl Image {
         if content.is_empty() {
             return Err(ImageError::Empty);
         }
-        let format = options.format.map_or_else(|| Format::of(name, content), Ok)?;
+        let format = match options.format {
+            None => Format::of(name, content)?,
+            Some(Format::Bin) => Format::raw(name, content)?,
+            Some(format) => format,
+        };
         let mut image = match format {
             Format::Bin => Self::raw(content, options)?,
             Format::IntelHex | Format::SRecord => Self::records(content, format, options)?,
@@ -223,12 +236,12 @@ impl Image {
             _ => (AddressUnit::Byte, AddressUnit::Word),
         };
         let read = |unit, gaps| {
-            let mut segments = Segments::new(unit, options.max_bytes);
+            let (mut segments, mut notes) = (Segments::new(unit, options.max_bytes), Vec::new());
             match format {
-                Format::SRecord => srec::read(content, &mut segments)?,
+                Format::SRecord => srec::read(content, &mut segments, &mut notes)?,
                 _ => hex::read(content, &mut segments)?,
             }
-            let (records, mut notes) = (segments.records(), Vec::new());
+            let records = segments.records();
             let (address_words, bytes) = segments.join(gaps, &mut notes)?;
             Ok((Self { bytes, address_words, format, notes }, records))
         };
@@ -247,6 +260,10 @@ impl Image {
                     Ok(image)
                 }
                 _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
+                // Too few records to be sure: the user decides.
+                Ok(_) if e.is_of_addresses() => {
+                    Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
+                }
                 _ => Err(e),
             },
         }

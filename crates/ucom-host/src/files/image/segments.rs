@@ -126,7 +126,7 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
 }
 
 /// Lines with their number from 1, without line ends and surrounding blanks; empty ones are left out.
-pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     let lines = content.split(|b| *b == b'\n').enumerate();
     lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())
 }

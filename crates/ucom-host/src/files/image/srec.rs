@@ -1,10 +1,17 @@
 //! Motorola S-records: `S` type, length, address, data, checksum.
 use super::segments::{Segments, hex_bytes, lines};
-use super::{Format, ImageError, LineProblem};
+use super::{Format, ImageError, ImageNote, LineProblem};
 
-pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageError> {
+/// A count record at the end proves the file whole, too: some tools write no end record.
+pub(super) fn read(
+    content: &[u8],
+    segments: &mut Segments,
+    notes: &mut Vec<ImageNote>,
+) -> Result<(), ImageError> {
     let mut records = 0_u32;
     let mut ended = false;
+    // The record before this line was a count record with exactly this number.
+    let mut counted_to = None;
     let mut last = 0;
     for (number, line) in lines(content) {
         last = number;
@@ -39,6 +46,8 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
         if ended {
             return Err(at(0, LineProblem::AfterEnd));
         }
+        let is_count = matches!(kind, 5 | 6);
+        counted_to = (is_count && address == u64::from(records) && data.is_empty()).then_some(records);
         match kind {
             1..=3 => {
                 records = records.saturating_add(1);
@@ -55,5 +64,10 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             _ => {}
         }
     }
-    if ended { Ok(()) } else { Err(ImageError::NoEnd { format: Format::SRecord, lines: last }) }
+    match counted_to {
+        _ if ended => {}
+        Some(records) => notes.push(ImageNote::EndedByCount { records }),
+        None => return Err(ImageError::NoEnd { format: Format::SRecord, lines: last }),
+    }
+    Ok(())
 }

@@ -10,7 +10,11 @@ fn parse(text: &str) -> Result<Image, ImageError> {
 }
 
 fn problem(text: &str) -> (usize, usize, LineProblem) {
-    match parse(text) {
+    let read = parse(text).map_err(|error| match error {
+        ImageError::OtherUnit { error, .. } => *error,
+        error => error,
+    });
+    match read {
         Err(ImageError::Line { line, column, problem }) => (line, column, problem),
         other => panic!("{other:?}"),
     }
@@ -89,9 +93,13 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
     // A hole that is meant, or one unit or the other: it is not guessed.
-    assert!(matches!(read(&file(2, 16, 16)), Err(ImageError::Gap { address_words: 0x108, bytes: 16 })));
+    let other = |text: &str| match read(text) {
+        Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(other(&file(2, 16, 16)), "16 bytes at word address 0x108 are in no record");
     // A table of vectors: two words in each place of four.
-    assert!(matches!(read(&file(16, 4, 4)), Err(ImageError::Gap { address_words: 0x102, bytes: 4 })));
+    assert_eq!(other(&file(16, 4, 4)), "4 bytes at word address 0x102 are in no record");
     // Intel HEX whose addresses count words: their bytes lie over each other otherwise.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
@@ -139,9 +147,9 @@ fn raw_bytes_are_whole_words() {
     assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
     let options = ImageOptions { load_address_words: Some(u32::MAX), ..Default::default() };
     assert!(matches!(Image::parse(&[1, 2], &options), Err(ImageError::AddressRange { .. })));
-    // Forced: a text of records may be taken as it stands.
+    // Asked for: records are no raw bytes all the same.
     let forced = ImageOptions { format: Some(Format::Bin), ..Default::default() };
-    assert_eq!(Image::parse(b":00000001FF\n", &forced).unwrap().bytes(), b":00000001FF\n");
+    assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
 /// A text is never raw bytes, whatever its name; what is wrong is named with its place.
@@ -178,8 +186,6 @@ fn a_text_is_no_image() {
         ];
         for text in texts {
             assert!(read(name, text).is_err(), "{name}: {text:?}");
-            let raw = ImageOptions { format: Some(Format::Bin), ..Default::default() };
-            assert!(Image::parse(text, &raw).is_ok());
         }
     }
     // By its name the file has records: their first mistake is reported.
@@ -190,6 +196,139 @@ fn a_text_is_no_image() {
     for name in ["a", "a.img", "a.txt"] {
         assert!(matches!(read(name, &bytes), Err(ImageError::NotBin { .. })), "{name}");
     }
+}
+
+/// A count record at the end ends a file of S-records, if it is right and nothing follows it.
+#[test]
+fn a_count_record_ends_a_file() {
+    let data: Vec<String> = (0..4).map(|i| s_line(1, 2, i * 8, &[i as u8 + 1; 16])).collect();
+    let whole = data.concat();
+    let count = |kind: u8, records: u32| s_line(kind, if kind == 5 { 2 } else { 3 }, records, &[]);
+    for kind in [5, 6] {
+        let image = parse(&(s_line(0, 2, 0, b"name") + &whole + &count(kind, 4))).unwrap();
+        assert_eq!((image.bytes().len(), image.notes()), (64, &[ImageNote::EndedByCount { records: 4 }][..]));
+        // With an end record there is nothing to note.
+        let image = parse(&(whole.clone() + &count(kind, 4) + &s_line(9, 2, 0, &[]))).unwrap();
+        assert!(image.notes().is_empty());
+        for wrong in [0, 1, 3, 5, 0x104] {
+            let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
+            assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
+        }
+        // Cut behind it, or what it does not count: the file is not whole.
+        for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
+            let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
+            assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
+        }
+    }
+    assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
+}
+
+/// Damaged files of records, of both forms: each is refused by its content, with and without the option that asks for raw
+/// bytes, whatever the name is, and what is advised takes no check away.
+#[test]
+fn characters_of_records_are_never_an_image() {
+    let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
+    let hex =
+        data.chunks(16).zip(0..).map(|(d, i)| hex_line(i * 16, 0, d)).collect::<String>() + ":00000001FF\n";
+    let srec =
+        data.chunks(16).zip(0..).map(|(d, i)| s_line(1, 2, i * 8, d)).collect::<String>() + "S9030000FC\n";
+    let wide = |text: &str, big: bool| {
+        text.encode_utf16()
+            .flat_map(|c| if big { c.to_be_bytes() } else { c.to_le_bytes() })
+            .collect::<Vec<u8>>()
+    };
+    let dir = tempfile::tempdir().unwrap();
+    for (text, kind) in [(hex, ':'), (srec, 'S')] {
+        let bytes = text.clone().into_bytes();
+        let with = |change: fn(&mut Vec<u8>)| {
+            let mut copy = bytes.clone();
+            change(&mut copy);
+            copy
+        };
+        let lines: Vec<&str> = text.lines().collect();
+        let variants: Vec<(&str, Vec<u8>)> = vec![
+            ("checksum", with(|b| b[20] = if b[20] == b'0' { b'1' } else { b'0' })),
+            ("cut between lines", text.as_bytes()[..text.len() / 2].to_vec()),
+            ("no end record", lines[..lines.len() - 1].join("\n").into_bytes()),
+            ("^Z", with(|b| b.push(0x1A))),
+            ("^Z and text", with(|b| b.extend(b"\x1Atext"))),
+            ("NULs in the middle", with(|b| b.splice(60..60, [0; 4]).for_each(drop))),
+            ("more NULs than text", with(|b| b[60..].fill(0))),
+            ("no mark", text.replace(kind, "").into_bytes()),
+            ("one mark is missing", text.replacen(kind, "", 2).into_bytes()),
+            ("odd digits", with(|b| drop(b.remove(9)))),
+            ("UTF-8 mark", [b"\xEF\xBB\xBF", bytes.as_slice()].concat()),
+            ("UTF-16", wide(&text, false)),
+            ("UTF-16 with a mark", [b"\xFE\xFF".to_vec(), wide(&text, true)].concat()),
+            (
+                "other types",
+                text.replacen(
+                    if kind == ':' { ":1000" } else { "S113" },
+                    if kind == ':' { ":1010" } else { "S913" },
+                    1,
+                )
+                .into_bytes(),
+            ),
+            ("text behind the end", with(|b| b.extend(b"made by hand\n"))),
+            ("text before the start", [b"made by hand\n", bytes.as_slice()].concat()),
+            ("quoted", text.lines().map(|l| format!("> {l}\n")).collect::<String>().into_bytes()),
+            ("letters for digits", text.replace('0', "O").replace('1', "l").into_bytes()),
+        ];
+        for (what, content) in &variants {
+            for name in ["a.hex", "a.s19", "a.bin", "a.txt", "a"] {
+                let path = dir.path().join(name);
+                std::fs::write(&path, content).unwrap();
+                for format in [None, Some(Format::Bin)] {
+                    let options = ImageOptions { format, ..Default::default() };
+                    let read = Image::read(&path, &options);
+                    let Err(error) = read else { panic!("{kind} {what} {name} {format:?}: {read:?}") };
+                    assert_eq!(
+                        error.advice(),
+                        ImageAdvice::MakeAgain,
+                        "{kind} {what} {name} {format:?}: {error}"
+                    );
+                    let read = Image::parse(content, &options);
+                    assert!(read.is_err(), "{kind} {what} without a name: {read:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Raw bytes on request: any name that is not one of records, and a text only from a `.bin`.
+#[test]
+fn raw_bytes_on_request_are_looked_at() {
+    let dir = tempfile::tempdir().unwrap();
+    let raw = ImageOptions { format: Some(Format::Bin), ..Default::default() };
+    let read = |name: &str, content: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        Image::read(&path, &raw)
+    };
+    let bytes: Vec<u8> = (0..=255).collect();
+    for name in ["a", "a.img", "a.bin", "a.BIN", "a.dat"] {
+        assert_eq!(read(name, &bytes).unwrap().bytes(), bytes, "{name}");
+    }
+    for name in ["a.hex", "a.HEX", "a.ihex", "a.s19", "a.srec", "a.mot"] {
+        let error = read(name, &bytes).unwrap_err();
+        assert_eq!(error.advice(), ImageAdvice::Rename, "{name}: {error}");
+    }
+    let texts: [&[u8]; 5] = [
+        b"dear reader, this is no firmware\n",
+        b"par.kp = 3\n",
+        "Gr\u{fc}\u{df}e aus der Werkstatt\n".as_bytes(),
+        b"h\0a\0l\0l\0o\0 \0w\0e\0l\0t\0",
+        b"U",
+    ];
+    for text in texts {
+        for name in ["a", "a.img", "a.txt", "a.hex"] {
+            let error = read(name, text).unwrap_err();
+            assert_eq!(error.advice(), ImageAdvice::MakeAgain, "{name}: {error}");
+        }
+        assert!(Image::parse(text, &raw).is_err());
+        assert!(read("a.bin", text).is_ok(), "two deliberate steps");
+    }
+    assert!(matches!(read("a.bin", b"\x7fELF.."), Err(ImageError::Elf)));
 }
 
 proptest! {

@@ -3,7 +3,7 @@ use crate::master::error::Error;
 use crate::master::io::Snapshot;
 use crate::master::reports::update::Progress;
 use crate::master::reports::{ConformanceTest, Outcome, ProcedureId};
-use ucom::{Admin, ErrorCode, Foreign, Function};
+use ucom::{Admin, BoardInfo, ErrorCode, Foreign, Function};
 
 /// Something happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +22,21 @@ pub enum Event {
         id: ProcedureId,
         /// How far.
         progress: Progress,
+    },
+    /// An update is about to reset this board for programming: its flash record does not hold any more (D-62). Nothing is
+    /// erased before the board has answered to the reset.
+    FlashBegins {
+        /// Which procedure.
+        id: ProcedureId,
+        /// Its flash number.
+        flash_number: u16,
+    },
+    /// A board showed the program that an update wrote (D-62).
+    FlashVerified {
+        /// Which procedure.
+        id: ProcedureId,
+        /// What it shows.
+        info: BoardInfo,
     },
     /// A conformance test was done.
     Tested {

@@ -42,7 +42,7 @@ impl Diagnose for MasterError {
             Self::CompetingMaster { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "foreign-master",
-                "end the other program, or force this one if you know that it does not matter",
+                "end the other program; then the same again",
             ),
             Self::Busy { .. } => Diagnosis::new(ErrorKind::Refused, "busy", "wait for it, or cancel it"),
             Self::Bus { .. } => Diagnosis::new(

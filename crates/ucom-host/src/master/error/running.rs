@@ -34,7 +34,7 @@ impl Diagnose for RunningError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Running { .. } | Self::LoopRuns { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "running", "`ucom stop all` first, or force it")
+                Diagnosis::new(ErrorKind::Refused, "running", "`ucom stop all` first")
             }
             Self::Load(_) => Diagnosis::new(
                 ErrorKind::Refused,

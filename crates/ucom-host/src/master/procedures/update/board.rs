@@ -1,5 +1,5 @@
 //! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
-use crate::master::engine::Link;
+use crate::master::engine::{Event, Link};
 use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
 use crate::master::procedures::exchange::{confirmed, identity, info, numbers};
@@ -69,6 +69,9 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
         }
     }
     one_board_each(link, &[board]).await?;
+    if let Some(flash_number) = flash_number {
+        link.with(|core| core.event(Event::FlashBegins { id: link.id, flash_number }));
+    }
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
         // Whoever took the XRESET must not take the program data of another board's update.
@@ -168,6 +171,8 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
     let outcome = match plan.expected {
         Some(_) if has(&known, plan) => {
             session.reach(board, Stage::Verified);
+            session.prove(board);
+            link.with(|core| core.event(Event::FlashVerified { id: link.id, info: known }));
             UpdateOutcome::Verified
         }
         Some(wanted) => {

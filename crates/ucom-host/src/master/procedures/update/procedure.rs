@@ -6,13 +6,13 @@ use crate::master::procedures::byte_order::right_order;
 use crate::master::procedures::exchange::{confirmed, numbers, set_status};
 use crate::master::procedures::one_board::one_board_each;
 use crate::master::procedures::survey::board_states;
-use crate::master::procedures::update::board::{has, one, start};
+use crate::master::procedures::update::board::{one, start};
 use crate::master::procedures::update::group::group;
 use crate::master::procedures::update::session::{Stage, UpdateSession};
 use crate::master::reports::Outcome;
 use crate::master::reports::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use std::collections::BTreeSet;
-use ucom::Status;
+use ucom::{BoardInfo, Status};
 
 /// Updates all boards that need it.
 pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome, Error> {
@@ -101,7 +101,7 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
     Ok(())
 }
 
-/// A board that has the image already may still be in programming mode, as after an update whose tool was killed: it would take
+/// A board that shows the program already may still be in programming mode, as after an update whose tool was killed: it would take
 /// program data that are meant for others.
 async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.programming.first().copied() {
@@ -135,7 +135,7 @@ async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error
 
 fn leave_programming_to_user(session: &mut UpdateSession, board: u8, why: &Error) {
     let failure = UpdateFailure::StillProgramming(Box::new(why.clone()));
-    session.end(board, UpdateOutcome::UpToDate, Some(failure));
+    session.end(board, session.outcome(board), Some(failure));
     session.to_start.retain(|b| *b != board);
 }
 
@@ -191,7 +191,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     start_rest(link, session).await
 }
 
-/// Starts the boards that had the image already.
+/// Starts the boards that showed the program already.
 async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.to_start.first().copied() {
         // PC_INFO has shown the program.
@@ -204,6 +204,30 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
         }
     }
     Ok(())
+}
+
+/// U-3 and D-62: the outcome of a board that needs no transfer; `None`: it is written.
+///
+/// PC_INFO shows Program ID and date of program memory. It covers neither the load address nor any other image.
+fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
+    let options = &session.options;
+    let expected = session.plan(link, None).ok()?.expected?;
+    let other_date = expected.date.is_some_and(|date| date != known.date);
+    let shown = known.has_application() && known.program_id == expected.program_id;
+    if options.force || options.rewrite || !shown || options.second.is_some() {
+        return None;
+    }
+    let record = options.records.get(&known.flash_number);
+    let image = &options.image;
+    if record.is_some_and(|record| !record.is_of(&image.bytes, image.address_words)) {
+        return None;
+    }
+    if other_date && !options.any_date {
+        return None;
+    }
+    // Another program has been on the board since where it shows something else than after that update.
+    let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
+    Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }
 
 /// U-1 and U-3, by questions only.
@@ -231,13 +255,18 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             session.fail(board, UpdateFailure::Refused(Box::new(error)));
             continue;
         }
-        let there = session.plan(link, Some(board)).is_ok_and(|plan| has(&known, &plan));
-        if there && !session.options.force {
-            session.end(board, UpdateOutcome::UpToDate, None);
+        if let Some(outcome) = already(link, session, &known) {
+            session.end(board, outcome, None);
+            let proven = outcome == UpdateOutcome::UpToDate;
+            if proven {
+                session.prove(board);
+            }
             if known.status.has(Status::PROG) && !session.options.dry_run {
                 session.programming.push(board);
             }
-            if session.options.start && !session.options.dry_run {
+            // What nothing proves is started only for a user who accepts that.
+            let trusted = proven || session.options.accept_unverified;
+            if session.options.start && trusted && !session.options.dry_run {
                 session.to_start.push(board);
             }
         }

@@ -19,7 +19,7 @@ pub(super) enum Stage {
     Erased,
     /// It reported that it is done.
     Written,
-    /// PC_INFO showed the new program.
+    /// PC_INFO showed the program.
     Verified,
 }
 
@@ -31,9 +31,9 @@ pub(super) struct UpdateSession {
     pub active: Vec<u8>,
     /// The board that is commanded to start its application.
     pub starting: Option<u8>,
-    /// Boards that have the image already and are still to be started.
+    /// Boards that show the program already and are still to be started.
     pub to_start: Vec<u8>,
-    /// Boards that have the image already and are in programming mode.
+    /// Boards that show the program already and are in programming mode.
     pub programming: Vec<u8>,
     stages: BTreeMap<u8, Stage>,
 }
@@ -77,6 +77,17 @@ impl UpdateSession {
         }
     }
 
+    /// The board shows the program, and it is known that this tool wrote it there.
+    pub fn prove(&mut self, board: u8) {
+        if let Some(result) = self.result(board) {
+            result.verified = true;
+        }
+    }
+
+    fn is_proven(&self, board: u8) -> bool {
+        self.results.iter().any(|r| r.board == board && r.verified)
+    }
+
     pub fn end(&mut self, board: u8, outcome: UpdateOutcome, failure: Option<UpdateFailure>) {
         self.active.retain(|b| *b != board);
         if let Some(result) = self.result(board) {
@@ -95,7 +106,8 @@ impl UpdateSession {
             Stage::MaybeErased => UpdateOutcome::Unknown,
             Stage::Erased => UpdateOutcome::Incomplete,
             Stage::Written => UpdateOutcome::Written,
-            Stage::Verified => UpdateOutcome::Verified,
+            Stage::Verified if self.is_proven(board) => UpdateOutcome::Verified,
+            Stage::Verified => UpdateOutcome::ProgramUpToDate,
         };
         self.end(board, outcome, Some(failure));
     }
@@ -127,10 +139,14 @@ impl UpdateSession {
 
     /// Boards that were done but for their start.
     pub fn cancel_starts(&mut self) {
-        let left = UpdateOutcome::UpToDate;
         for board in core::mem::take(&mut self.to_start) {
+            let left = self.outcome(board);
             self.end(board, left, Some(UpdateFailure::Cancelled { left }));
         }
+    }
+
+    pub fn outcome(&self, board: u8) -> UpdateOutcome {
+        self.results.iter().find(|r| r.board == board).map(|r| r.outcome).unwrap_or_default()
     }
 
     /// Boards whose turn has not come.

@@ -73,11 +73,11 @@ pub enum UpdateFailure {
         /// Of the board.
         status: Status,
     },
-    /// The image is on the board, but the application did not start.
-    #[error("the image is on the board, but: {0}")]
+    /// The board shows the program, but the application did not start.
+    #[error("the board shows the program, but: {0}")]
     NotRunning(Box<Error>),
-    /// The image was on the board already, but programming mode, in which it was found, could not be ended.
-    #[error("the image is on the board already, but it may still be in programming mode: {0}")]
+    /// The board showed the program already, but programming mode, in which it was found, could not be ended.
+    #[error("the board shows the program already, but it may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
     /// A step after something was erased failed.
     #[error("{0}")]
@@ -116,9 +116,9 @@ impl UpdateFailure {
             Self::NoAnswer(_) | Self::Timeout { erased: false, .. } => ErrorKind::NoLink,
             Self::Device { erased: false, .. } | Self::Reported(_) => ErrorKind::Device,
             Self::Skipped { .. }
-            | Self::Cancelled { left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate } => {
-                ErrorKind::Refused
-            }
+            | Self::Cancelled {
+                left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate | UpdateOutcome::ProgramUpToDate,
+            } => ErrorKind::Refused,
             Self::Device { .. }
             | Self::Timeout { .. }
             | Self::NotVerified { .. }
@@ -184,6 +184,9 @@ fn left_behind(outcome: UpdateOutcome) -> &'static str {
         UpdateOutcome::Unknown => "the old application may be erased",
         UpdateOutcome::Written => "the board reported that it is done, nobody has read it back",
         UpdateOutcome::UpToDate => "the image was there already, its application was not started",
+        UpdateOutcome::ProgramUpToDate => {
+            "nothing was sent to a board that shows this program already, and it was not started"
+        }
         UpdateOutcome::Running => "the new application is on the board, and it may be started",
         UpdateOutcome::Verified => "the new application is on the board, but not started",
         _ => "nothing was erased, the board has what it had",

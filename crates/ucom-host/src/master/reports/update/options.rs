@@ -1,7 +1,8 @@
 //! Which boards are updated with what, and how.
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::files::Image;
+use crate::files::{FlashRecord, Image};
 
 /// An image with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,18 +52,25 @@ pub struct UpdateOptions {
     pub expect_program_id: Option<u16>,
     /// Flash date as 16 bits, see [`DateForm`](ucom::DateForm).
     pub date: u16,
+    /// A board that shows the program with another date is up to date (U-3): the date was not asked for.
+    pub any_date: bool,
+    /// What is known of the boards' flash, by flash number (D-62). Boards without a record are not known.
+    pub records: BTreeMap<u16, FlashRecord>,
     /// The header names the board's flash number: another board then refuses the image.
     pub name_target: bool,
     /// One after the other, or all at once.
     pub mode: UpdateMode,
     /// Only the checks, the look for another PC among them: nothing but PC_INFO is sent.
     pub dry_run: bool,
-    /// Also when boards run (U-2), another PC is on the bus, or the image is there already (U-3).
+    /// Also when boards run (U-2), another PC is on the bus, or the board shows the program already (U-3).
     pub force: bool,
+    /// Also when the board shows the program already (U-3), and nothing else.
+    pub rewrite: bool,
     /// Start the application at the end.
     pub start: bool,
     /// An image that cannot be verified is as good as one that was: no failure (plan `raw`, `prog.header` or
-    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)).
+    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)). The same holds for a board that
+    /// shows the program, but whose flash is not known (D-62).
     pub accept_unverified: bool,
     /// Go on with the next board after one has failed.
     pub keep_going: bool,
@@ -77,10 +85,13 @@ impl UpdateOptions {
             second: None,
             expect_program_id: None,
             date,
+            any_date: false,
+            records: BTreeMap::new(),
             name_target: false,
             mode: UpdateMode::OneByOne,
             dry_run: false,
             force: false,
+            rewrite: false,
             start: false,
             accept_unverified: false,
             keep_going: false,

@@ -10,8 +10,11 @@ pub enum UpdateOutcome {
     NotStarted,
     /// The user ended it before anything was erased: the board has what it had.
     Cancelled,
-    /// The image was there already (U-3); nothing was sent.
+    /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62); nothing was
+    /// sent.
     UpToDate,
+    /// The board shows the program, but no flash record covers load address and content (D-62); nothing was sent.
+    ProgramUpToDate,
     /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
     Incomplete,
     /// The board may have lost what it had, and does not report it.
@@ -21,7 +24,8 @@ pub enum UpdateOutcome {
     Written,
     /// PC_INFO shows the new Program ID and date (U-10).
     Verified,
-    /// Written, and the application runs; verified unless [`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable) gives the reason against it.
+    /// The application runs. [`UpdateResult::verified`](crate::master::update::UpdateResult::verified) shows whether the image
+    /// is proven.
     Running,
 }
 
@@ -32,16 +36,12 @@ impl UpdateOutcome {
             Self::NotStarted => "not-started",
             Self::Cancelled => "cancelled",
             Self::UpToDate => "up-to-date",
+            Self::ProgramUpToDate => "program-up-to-date",
             Self::Incomplete => "incomplete",
             Self::Unknown => "unknown",
             Self::Written => "written",
             Self::Verified => "verified",
             Self::Running => "running",
         }
-    }
-
-    /// The board has the image.
-    pub const fn is_done(self) -> bool {
-        matches!(self, Self::UpToDate | Self::Verified | Self::Running)
     }
 }

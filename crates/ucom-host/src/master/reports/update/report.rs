@@ -1,9 +1,10 @@
 //! How an update ended, named, with the kind of failure.
+use crate::date_text;
 use crate::master::reports::update::failure::UpdateFailure;
 use crate::master::reports::update::outcome::UpdateOutcome;
-use crate::master::reports::update::plan::{PlannedImage, Unverifiable};
+use crate::master::reports::update::plan::{PlannedImage, Unverifiable, has_header};
 use host_kit::{Diagnose, ErrorKind};
-use ucom::BoardInfo;
+use ucom::{BoardInfo, Profile};
 
 /// What became of one board.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +19,9 @@ pub struct UpdateResult {
     pub after: Option<BoardInfo>,
     /// How far it got.
     pub outcome: UpdateOutcome,
+    /// PC_INFO shows the Program ID and date of the image, and this tool wrote exactly this image to this address: now, or
+    /// earlier by the flash record.
+    pub verified: bool,
     /// Attempts that were made.
     pub attempts: u32,
     /// Why it failed.
@@ -34,6 +38,7 @@ impl UpdateResult {
             before: None,
             after: None,
             outcome: UpdateOutcome::NotStarted,
+            verified: false,
             attempts: 0,
             failure: None,
             time_us: 0,
@@ -66,12 +71,54 @@ impl UpdateReport {
     /// What kind of failure it is: the gravest of any board. `None`: all is done.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
-        // Done by the board's report, which nothing can confirm.
-        let trusted = |b: &&UpdateResult| {
-            let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
-            self.unverifiable.is_some() && !self.accept_unverified && done && b.failure.is_none()
+        let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
+        let unproven = unproven.filter_map(|b| match b.outcome {
+            UpdateOutcome::ProgramUpToDate => Some(ErrorKind::Refused),
+            UpdateOutcome::Written | UpdateOutcome::Running if !b.verified => Some(ErrorKind::Fault),
+            _ => None,
+        });
+        kinds.chain(unproven).max()
+    }
+
+    /// What a report without a failed board ends with, and what helps: something is not proven.
+    pub fn unproven(&self) -> (String, &'static str) {
+        let is_shown = |b: &&UpdateResult| b.outcome == UpdateOutcome::ProgramUpToDate;
+        let boards: Vec<String> = self.boards.iter().filter(is_shown).map(|b| b.board.to_string()).collect();
+        if boards.is_empty() {
+            let next = self.unverifiable.map_or("", |why| why.hint());
+            return ("what was written could not be verified".into(), next);
+        }
+        let message = format!(
+            "nothing was sent: board {} shows this program, but nothing shows its content and load address",
+            boards.join(", ")
+        );
+        (message, "`rewrite` writes it")
+    }
+
+    /// The flash date of a board that shows the program already, if it is not that of the image.
+    fn flashed(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
+        let before = result.before.filter(|before| has_header(profile) && before.date != self.date)?;
+        let is_shown = matches!(result.outcome, UpdateOutcome::UpToDate | UpdateOutcome::ProgramUpToDate);
+        is_shown.then(|| format!("flashed {}", date_text(profile, before.date)))
+    }
+
+    /// The outcome of a board in words: `up-to-date (flashed 2026-11-25)` where the board keeps another date (U-3).
+    pub fn outcome_words(&self, result: &UpdateResult, profile: &Profile) -> String {
+        let name = result.outcome.name();
+        self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
+    }
+
+    /// What the outcome goes by, of a board that shows the program already; `None`: of any other.
+    pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
+        let same = match self.flashed(result, profile) {
+            Some(flashed) => format!("same Program ID, {flashed}"),
+            None => "same Program ID and date".into(),
         };
-        kinds.chain(self.boards.iter().filter(trusted).map(|_| ErrorKind::Fault)).max()
+        match result.outcome {
+            UpdateOutcome::UpToDate => Some(same),
+            UpdateOutcome::ProgramUpToDate => Some(format!("{same}; content and address are not known")),
+            _ => None,
+        }
     }
 }
 

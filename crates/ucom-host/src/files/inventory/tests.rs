@@ -1,0 +1,113 @@
+//! What inventories take and refuse, and how flash records are kept in them.
+use proptest::prelude::*;
+
+use super::*;
+
+fn board(number: u8, flash_number: u16) -> InventoryBoard {
+    InventoryBoard { number, flash_number, ..Default::default() }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let refused = |text: &str| Inventory::parse(text).unwrap_err().to_string();
+    assert!(refused("[[board]]\nnumber = 32\nflash_number = 1").contains("above 31"));
+    let twice = "[[board]]\nnumber = 1\nflash_number = 1\n[[board]]\nnumber = 1\nflash_number = 2";
+    assert!(refused(twice).contains("board 1 is given twice"));
+    let same = "[[board]]\nnumber = 1\nflash_number = 7\n[[board]]\nnumber = 2\nflash_number = 7";
+    assert!(refused(same).contains("0x0007") && refused(same).contains("boards 1 and 2"));
+    assert!(refused("[[board]]\nnumber = 1\nflash_number = 1\nposition = 2").contains("position"));
+    assert!(refused("[[bord]]").contains("line 1"));
+}
+
+#[test]
+fn names_stay_with_their_board() {
+    let mut old = Inventory::default();
+    old.insert(InventoryBoard { name: "head pan".into(), ..board(1, 0x21) }).unwrap();
+    let mut new = Inventory::default();
+    new.insert(board(1, 0x42)).unwrap();
+    new.insert(board(2, 0x21)).unwrap();
+    new.keep(&old);
+    assert_eq!(new.get(2).unwrap().name, "head pan");
+    assert_eq!(new.get(1).unwrap().name, "");
+}
+
+fn record(flash_number: u16) -> FlashRecord {
+    FlashRecord { flash_number, sha256: [0xA5; 32], address: 0x200, program_id: 0x4B3F, date: 0x3AC1 }
+}
+
+/// D-62: a record is set and removed in the text of the file, and nothing else changes.
+#[test]
+fn d62_a_record_changes_one_key_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("inventory.toml");
+    let texts = [
+        "# left arm, cabinet 3\n[[board]] # first\nnumber = 1\nflash_number = 0x21 # new since May\n\n[[board]]\nflash_number = 0x42\nnumber = 2\nname = 'pan'\n",
+        "[[board]]\nnumber = 1\nflash_number = 33\n# behind it\n",
+        "board = [\n  { number = 1, flash_number = 0x0021 }, # in line\n  { number = 2, flash_number = 0x42 },\n]\n",
+    ];
+    for text in texts {
+        std::fs::write(&path, text).unwrap();
+        Inventory::set_record(&path, 0x21, Some(record(0x21))).unwrap();
+        let read = Inventory::read(&path).unwrap();
+        assert_eq!(read.get(1).unwrap().record(), Some(record(0x21)));
+        assert!(read.get(2).is_none_or(|board| board.record().is_none()));
+        // Set again, and kept by an init.
+        Inventory::set_record(&path, 0x21, Some(FlashRecord { address: 0, ..record(0x21) })).unwrap();
+        let again = Inventory::read(&path).unwrap();
+        assert_eq!(again.get(1).unwrap().record().map(|r| r.address), Some(0));
+        assert_eq!(Inventory::parse(&again.to_toml()).unwrap(), again);
+        let mut made = Inventory::default();
+        made.insert(board(7, 0x21)).unwrap();
+        made.keep(&again);
+        assert!(made.get(7).unwrap().record().is_some());
+        assert!(made.without_records().get(7).unwrap().record().is_none());
+        // Removed, as often as it may be.
+        for _ in 0..2 {
+            Inventory::set_record(&path, 0x21, None).unwrap();
+            let left = std::fs::read_to_string(&path).unwrap();
+            let plain = |text: &str| text.replace([' ', '\n'], "");
+            assert_eq!(plain(&left), plain(text));
+        }
+        // A board that is not listed: nothing is kept.
+        Inventory::set_record(&path, 0x77, Some(record(0x77))).unwrap();
+        assert!(!std::fs::read_to_string(&path).unwrap().contains("sha256"));
+    }
+    assert!(Inventory::set_record(&dir.path().join("nowhere"), 0x21, None).is_err());
+}
+
+/// D-62: a record that was copied to another board is none, and a damaged one is refused.
+#[test]
+fn d62_a_record_belongs_to_one_board() {
+    let with = |record: &str| format!("[[board]]\nnumber = 1\nflash_number = 0x42\nprogram = {record}\n");
+    let of = |flash_number| with(&record(flash_number).to_toml());
+    assert_eq!(Inventory::parse(&of(0x42)).unwrap().get(1).unwrap().record(), Some(record(0x42)));
+    assert_eq!(Inventory::parse(&of(0x21)).unwrap().get(1).unwrap().record(), None);
+    let good = record(0x42).to_toml();
+    let damaged = [
+        good.replace("a5a5", "a5"),
+        good.replacen("a5", "xy", 1),
+        good.replacen("a5", "+5", 1),
+        good.replace("a5a5", "a5a5a5"),
+        good.replace("sha256", "sha1"),
+        good.replace("0x200", "-1"),
+        good.replace("0x200", "0x100000000"),
+        good.replace("0x4B3F", "0x14B3F"),
+        good.replace("date", "day"),
+        "7".into(),
+    ];
+    for damaged in damaged {
+        assert!(Inventory::parse(&with(&damaged)).is_err(), "{damaged}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn round_trip(boards in prop::collection::btree_map(0_u8..32, (any::<u16>(), any::<String>()), 0..32)) {
+        let mut inventory = Inventory::default();
+        for (number, (flash, text)) in boards {
+            let flash = flash & 0xFFE0 | u16::from(number);
+            inventory.insert(InventoryBoard { description: text, ..board(number, flash) }).unwrap();
+        }
+        prop_assert_eq!(Inventory::parse(&inventory.to_toml()).unwrap(), inventory);
+    }
+}

@@ -1,0 +1,94 @@
+//! Updates with flash records: what is known of the boards' flash goes into an update, and what became of it comes back.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use super::driver::Driver;
+use super::error::SessionError;
+use crate::files::{FlashRecord, Inventory, InventoryError};
+use crate::master::update::{UpdateOptions, UpdateReport};
+use crate::master::{Event, Outcome, Request};
+
+/// What this tool wrote to boards (D-62): in the inventory file for boards that it lists, else for as long as the session lasts.
+#[derive(Debug, Default)]
+pub struct FlashRecords {
+    inventory: Option<PathBuf>,
+    records: BTreeMap<u16, FlashRecord>,
+    listed: BTreeSet<u16>,
+}
+
+impl FlashRecords {
+    /// Those of an inventory file, which need not exist; `None`: they are kept by the session alone.
+    pub fn new(inventory: Option<PathBuf>) -> Self {
+        Self { inventory, ..Self::default() }
+    }
+
+    /// Reads the inventory again: other programs and people write it, too.
+    fn read(&mut self) -> Result<(), InventoryError> {
+        self.listed.clear();
+        let Some(path) = self.inventory.as_ref().filter(|path| path.exists()) else { return Ok(()) };
+        for board in Inventory::read(path)?.boards() {
+            self.listed.insert(board.flash_number);
+            match board.record() {
+                Some(record) => self.records.insert(board.flash_number, record),
+                None => self.records.remove(&board.flash_number),
+            };
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, flash_number: u16, record: Option<FlashRecord>) -> Result<(), InventoryError> {
+        match record {
+            Some(record) => self.records.insert(flash_number, record),
+            None => self.records.remove(&flash_number),
+        };
+        match &self.inventory {
+            Some(path) if self.listed.contains(&flash_number) => {
+                Inventory::set_record(path, flash_number, record)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Driver {
+    /// Updates boards. The record of a board is removed before the board is reset for programming, and made anew when the board
+    /// has been read back. Where it cannot be removed the update is cancelled before anything is erased.
+    ///
+    /// # Errors
+    /// As [`Driver::run`]; and the inventory cannot be read.
+    pub fn update(
+        &mut self,
+        mut options: UpdateOptions,
+        records: &mut FlashRecords,
+        see: &mut dyn FnMut(&Event),
+    ) -> Result<UpdateReport, SessionError> {
+        records.read()?;
+        options.records.clone_from(&records.records);
+        let image = options.image.clone();
+        let mut notes = Vec::new();
+        let outcome = self.drive(Request::Update(options), true, &mut |master, event| {
+            match event {
+                Event::FlashBegins { id, flash_number } => {
+                    if let Err(error) = records.set(*flash_number, None) {
+                        notes.push(format!("{error}; the update ends before anything more is erased"));
+                        master.cancel(*id);
+                    }
+                }
+                Event::FlashVerified { info, .. } => {
+                    let record = FlashRecord::new(&image.bytes, image.address_words, info);
+                    if let Err(error) = records.set(info.flash_number, Some(record)) {
+                        notes.push(format!("what was written is not kept in the inventory: {error}"));
+                    }
+                }
+                _ => {}
+            }
+            see(event);
+        });
+        notes.into_iter().for_each(|note| self.note(note));
+        match outcome? {
+            Outcome::Update(report) => Ok(report),
+            other => Err(other.into()),
+        }
+    }
+}

@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde_json::json;
 
-use crate::access::{self, Access, Entry, Refusal, Role, looks};
+use crate::access::{self, Access, Entry, Refusal, Role, halts, looks};
 use crate::api::Problem;
 use crate::lease::key_of;
 use crate::log::CommandLog;
@@ -145,11 +145,10 @@ pub async fn let_in(
         peer: peer.ip(),
         host: text_of(headers, header::HOST),
         origin: text_of(headers, header::ORIGIN),
-        token: text_of(headers, header::AUTHORIZATION)
-            .map(|value| value.strip_prefix("Bearer ").unwrap_or(""))
-            .or_else(|| protocol_token(headers)),
+        token: text_of(headers, header::AUTHORIZATION).map(bearer_token).or_else(|| protocol_token(headers)),
         address_token: address_token.as_deref(),
         looks: looks(method, request.uri().path()),
+        halts: halts(method, request.uri().path()),
     };
     // A browser asks without a token whether its page may ask with one.
     let origin = headers.get(header::ORIGIN).cloned();
@@ -186,6 +185,14 @@ pub async fn let_in(
 /// What is asked for, without what may be behind the question mark.
 fn line_of(request: &Request<Body>) -> String {
     format!("{} {}", request.method(), request.uri().path())
+}
+
+/// The token of `Authorization: Bearer TOKEN`; the scheme has no case (RFC 9110, 11.1). Empty, which is nobody's, for any other.
+fn bearer_token(value: &str) -> &str {
+    match value.split_once(' ') {
+        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => token.trim(),
+        _ => "",
+    }
 }
 
 /// A page of this origin may read it.
@@ -238,5 +245,25 @@ impl IntoResponse for Refusal {
             Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
         };
         (status, Json(Problem::new("not-let-in", self.to_string(), next))).into_response()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scheme_of_a_token_has_no_case() {
+        for scheme in ["Bearer", "bearer", "BEARER", "bEaReR"] {
+            assert_eq!(bearer_token(&format!("{scheme} abc")), "abc");
+            assert_eq!(bearer_token(&format!("{scheme}   abc ")), "abc");
+            assert_eq!(bearer_token(scheme), "");
+            assert_eq!(bearer_token(&format!("{scheme} ")), "");
+        }
+        for value in
+            ["", "abc", "Basic abc", "Bearerabc", "Bearer\tabc", "bearer.abc", "Token abc", " Bearer abc"]
+        {
+            assert_eq!(bearer_token(value), "", "{value:?}");
+        }
     }
 }

@@ -106,6 +106,11 @@ fn tokens_cannot_be_tried_without_end_and_a_stop_is_taken_meanwhile() {
 }
 
 #[test]
+fn a_wrong_token_keeps_no_stop_of_this_computer_away() {
+    http::a_wrong_token_keeps_no_stop_away(&Served::start(921_600), &["POST /api/stop", "POST /api/pause"]);
+}
+
+#[test]
 fn what_is_long_or_wrong_changes_nothing() {
     let requests = [
         ("POST /api/stop", "Content-Type: text/plain"),

@@ -187,6 +187,17 @@ fn line_of(request: &Request<Body>) -> String {
     format!("{} {}", request.method(), request.uri().path())
 }
 
+/// In front of every handler behind [`let_in`]: who may not command is refused before anything of the body is read, however slowly it comes.
+pub async fn may_command(request: Request<Body>, next: Next) -> Response {
+    let (method, path) = (request.method(), request.uri().path());
+    let commands = !method.is_safe() && !halts(method.as_str(), path);
+    let refused = request.extensions().get::<Caller>().filter(|_| commands).map(Caller::operator);
+    match refused {
+        Some(Err(problem)) => problem.into_response(),
+        _ => next.run(request).await,
+    }
+}
+
 /// The token of `Authorization: Bearer TOKEN`; the scheme has no case (RFC 9110, 11.1). Empty, which is nobody's, for any other.
 fn bearer_token(value: &str) -> &str {
     match value.split_once(' ') {

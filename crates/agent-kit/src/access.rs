@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 use subtle::ConstantTimeEq as _;
 
+use crate::cut::cut;
+
 pub use paths::{halts, looks, stops};
 pub use tokens::{TokenError, Tokens, default_token_file, random, token_file};
 
@@ -164,8 +166,11 @@ impl Access {
     ///
     /// [`Refusal::Host`], [`Refusal::Origin`].
     pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
+        let site = request.origin.map(str::to_lowercase);
         match self.is_own(request.host, request.origin) {
-            Err(Refusal::Origin(site)) if request.looks && self.origins.contains(&site.to_lowercase()) => {
+            Err(Refusal::Origin(_))
+                if request.looks && site.is_some_and(|site| self.origins.contains(&site)) =>
+            {
                 Ok(true)
             }
             own => own.map(|()| false),
@@ -180,14 +185,18 @@ impl Access {
     pub fn is_own(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
         let host = host.unwrap_or_default().to_lowercase();
         if !self.hosts.contains(&host) {
-            return Err(Refusal::Host(if host.is_empty() { "named".into() } else { host }));
+            return Err(Refusal::Host(if host.is_empty() {
+                "named".into()
+            } else {
+                cut(&host).into_owned()
+            }));
         }
         let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
         // Its own page, not one of another agent on this computer.
         match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
             Some(own) if own == host => Ok(()),
-            _ => Err(Refusal::Origin(origin.to_owned())),
+            _ => Err(Refusal::Origin(cut(origin).into_owned())),
         }
     }
 
@@ -376,5 +385,36 @@ mod tests {
             assert!(enter("10.0.0.9", None, token, true).is_err(), "{token:?}");
         }
         assert_eq!(enter("127.0.0.1", None, (Some(&operator), None), true), Ok(Role::Operator));
+    }
+
+    #[test]
+    fn foreign_names_in_refusals_are_cut() {
+        let access = access();
+        for length in [1, 199, 200, 201, 65_000] {
+            let evil = "e".repeat(length);
+            let host = role(&access, "127.0.0.1", Some(&evil), None, None).expect_err("it is another name");
+            let origin = role(&access, "127.0.0.1", Some(HERE), Some(&evil), None).expect_err("another site");
+            for refusal in [host, origin] {
+                let text = refusal.to_string();
+                assert!(text.len() < 320 && text.contains(&evil[..length.min(200)]), "{text}");
+            }
+        }
+        // An allowed origin is compared whole.
+        let long = format!("https://{}.example", "a".repeat(300));
+        let access = access.allowing(std::slice::from_ref(&long));
+        let peer = "127.0.0.1".parse().expect("an address");
+        let enter = |origin: &str| {
+            access.enter(&Request {
+                peer,
+                host: Some(HERE),
+                origin: Some(origin),
+                token: None,
+                address_token: None,
+                looks: true,
+                halts: false,
+            })
+        };
+        assert_eq!(enter(&long), Ok(Entry { role: Role::Viewer, looks_only: true }));
+        assert!(enter(&format!("{long}x")).is_err());
     }
 }

@@ -14,6 +14,7 @@ use serde_json::json;
 
 use crate::access::{self, Access, Entry, Refusal, Role, halts, looks};
 use crate::api::Problem;
+use crate::cut::cut;
 use crate::lease::key_of;
 use crate::log::CommandLog;
 use crate::problem::Denial;
@@ -49,6 +50,12 @@ impl Gate {
     /// Writes a line to the log of commands.
     pub fn note(&self, what: &str, facts: serde_json::Value) {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+    }
+
+    /// Writes a line to the log of commands about an address that can cause many: the first, then how many there were.
+    pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
+        let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
+        log.write_repeated(what, &from.ip().to_string(), facts);
     }
 
     /// Lines that the log of commands lost.
@@ -162,7 +169,10 @@ pub async fn let_in(
             let response = next.run(request).await;
             if let Some((asked, Denial { code, why })) = command.zip(response.extensions().get()) {
                 let facts = json!({ "from": peer.to_string(), "asked": asked, "code": code, "why": why });
-                gate.note("denied", facts);
+                match role {
+                    Role::Operator => gate.note("denied", facts),
+                    Role::Viewer => gate.note_repeated("denied", peer, facts),
+                }
             }
             let mut response = if looks_only { may_read(response, origin) } else { response };
             let headers = response.headers_mut();
@@ -172,11 +182,9 @@ pub async fn let_in(
             response
         }
         Err(refusal) => {
-            let path = request.uri().path().to_owned();
-            gate.note(
-                "refused",
-                json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() }),
-            );
+            let path = cut(request.uri().path());
+            let facts = json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() });
+            gate.note_repeated("refused", peer, facts);
             refusal.into_response()
         }
     }
@@ -184,7 +192,7 @@ pub async fn let_in(
 
 /// What is asked for, without what may be behind the question mark.
 fn line_of(request: &Request<Body>) -> String {
-    format!("{} {}", request.method(), request.uri().path())
+    format!("{} {}", cut(request.method().as_str()), cut(request.uri().path()))
 }
 
 /// In front of every handler behind [`let_in`]: who may not command is refused before anything of the body is read, however slowly it comes.

@@ -264,6 +264,49 @@ pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     }
 }
 
+/// Requests that are refused are sent without end; what is answered is short. [`refusals_cost_few_short_lines`] looks at the log then.
+pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
+    let (own, bearer) = (format!("Host: {}", http.address), "Authorization: Bearer 0123456789abcdefghij");
+    for length in [100, 1_000, 12_000, 15_000, 65_000, 380_000] {
+        let long = "B".repeat(length);
+        let (host, origin) = (format!("Host: {long}"), format!("Origin: http://{long}"));
+        let (path, asked) = (format!("GET /{long}"), format!("GET /api/status?{long}={long}"));
+        let name = format!("GET /api/explain/{long}");
+        let post = format!("POST /api/{long}");
+        let method = format!("{long} /api/status");
+        let cases: [(&str, &[&str]); 10] = [
+            (&path, &["Host: evil"]),
+            (&path, &[&own, bearer]),
+            ("GET /api/status", &[&host]),
+            ("GET /api/status", &[&own, &origin]),
+            (&asked, &["Host: evil"]),
+            (&name, &[&own]),
+            (&post, &[&own, &origin]),
+            (&method, &["Host: evil"]),
+            (command, &[&own]),
+            (&format!("GET /api/events?after={long}"), &[&own]),
+        ];
+        for (request, lines) in cases {
+            for _ in 0..20 {
+                let (status, answer) = http.ask(request, lines);
+                assert!(status != 200 && answer.len() < 1_500, "{length}: {status}, {} bytes", answer.len());
+            }
+        }
+    }
+    assert_eq!(http.get("POST /api/stop").0, 200);
+}
+
+/// What the log of commands has of [`refused_requests_are_answered_shortly`], when the agent has ended.
+pub fn refusals_cost_few_short_lines(log: &str) {
+    let lines: Vec<Value> =
+        log.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
+    let of = |what| lines.iter().filter(move |line| line["what"] == what);
+    let times = |what| of(what).map(|line| line["times"].as_u64().unwrap_or(1)).sum::<u64>();
+    assert!(times("refused") > 300 && times("denied") >= 100, "each is counted: {log}");
+    assert!(of("refused").count() + of("denied").count() < 40, "{} lines", lines.len());
+    assert!(log.lines().all(|line| line.len() < 1_000) && log.len() < 40_000, "{} bytes", log.len());
+}
+
 /// What is long or wrong is refused with a status of its own, and changes nothing.
 pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) {
     let host = format!("Host: {}", http.address);

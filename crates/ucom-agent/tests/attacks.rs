@@ -39,6 +39,14 @@ fn a_wrong_token_keeps_no_stop_of_this_computer_away() {
 }
 
 #[test]
+fn requests_that_are_refused_fill_no_disk() {
+    let mut served = Served::start(1);
+    http::refused_requests_are_answered_shortly(&served, "POST /api/run");
+    served.end();
+    http::refusals_cost_few_short_lines(&std::fs::read_to_string(&served.log).expect("the log"));
+}
+
+#[test]
 fn what_is_long_or_wrong_changes_nothing() {
     let requests = [
         ("POST /api/stop", "Content-Type: text/plain"),

@@ -37,7 +37,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("name one with --token-file FILE")
     })?;
     let stop = Stop::listen()?;
-    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+    let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
+    let log = log.map_err(|error| {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;

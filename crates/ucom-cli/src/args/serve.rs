@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::FalseyValueParser;
+use cli_kit::size;
 
 use super::CacheArgs;
 
@@ -32,6 +33,9 @@ pub struct ServeArgs {
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
+    /// Room that the log takes at most: it is put aside as FILE.1 when it has half of it
+    #[arg(long, env = "UCOM_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
+    pub command_log_limit: u64,
     /// Certificate chain, PEM: the agent speaks TLS
     #[arg(long, env = "UCOM_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
@@ -40,4 +44,9 @@ pub struct ServeArgs {
     pub tls_key: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
+}
+
+/// Room for the log of commands: some thousand lines at least.
+fn log_size(text: &str) -> Result<u64, String> {
+    size(text, 1_000_000)
 }

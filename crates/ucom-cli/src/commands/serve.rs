@@ -43,7 +43,8 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         cleanup: CleanupList::default(),
     };
     let stop = listen(&config.cleanup)?;
-    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+    let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
+    let log = log.map_err(|error| {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;

@@ -14,7 +14,7 @@ use subtle::ConstantTimeEq as _;
 use crate::cut::cut;
 
 pub use paths::{halts, looks, stops};
-pub use tokens::{TokenError, Tokens, default_token_file, random, token_file};
+pub use tokens::{Announced, TokenError, Tokens, default_token_file, random, token_file};
 
 /// What a client may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]

@@ -37,7 +37,7 @@ pub struct ServeArgs {
         value_parser = jtc_agent::access::origin
     )]
     pub allow_origins: Vec<String>,
-    /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
+    /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
     #[arg(id = "link_with_token", long = "link", env = "JTC_LINK", value_parser = FalseyValueParser::new())]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result

@@ -27,7 +27,7 @@ pub struct ServeArgs {
     /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
-    /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
+    /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
     #[arg(id = "link_with_token", long = "link", env = "UCOM_LINK", value_parser = FalseyValueParser::new())]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result

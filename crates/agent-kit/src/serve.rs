@@ -71,7 +71,7 @@ pub fn serve(
 
 /// Takes connections for ever.
 async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<TlsAcceptor>) {
-    let (here, elsewhere) = (Places::new(), Places::new());
+    let (here, elsewhere) = (Places::here(), Places::elsewhere());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
             // No more files, for the time being.
@@ -80,7 +80,7 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<
         };
         let places = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
         let (router, tls) = (router.clone().layer(Extension(ConnectInfo(peer))), tls.clone());
-        places.run(async move |place| {
+        let connection = async move |place: Place| {
             // A status of 175 bytes is not to wait for more.
             let _ = stream.set_nodelay(true);
             match tls {
@@ -93,7 +93,8 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<
                     }
                 }
             }
-        });
+        };
+        places.run(connection).await;
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! A page of another site that somebody has open in a browser can send requests to this computer's own address. It is known by its `Origin`;
 //! and one that has made a name of its own point here (DNS rebinding) by its `Host`. Both are refused, whatever token they have.
+mod paths;
 mod tokens;
 
 use std::net::{IpAddr, SocketAddr};
@@ -10,7 +11,10 @@ use std::time::{Duration, Instant};
 
 use subtle::ConstantTimeEq as _;
 
-pub use tokens::{TokenError, Tokens, default_token_file, random, token_file};
+use crate::cut::cut;
+
+pub use paths::{halts, looks, stops};
+pub use tokens::{Announced, TokenError, Tokens, default_token_file, random, token_file};
 
 /// What a client may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
@@ -65,6 +69,8 @@ pub struct Request<'a> {
     pub address_token: Option<&'a str>,
     /// It can only look: what it asks for may be shown to pages of origins that are allowed.
     pub looks: bool,
+    /// It is a Stop or a Pause ([`halts`]): on this computer these need no token.
+    pub halts: bool,
 }
 
 /// What a request that is let in may do.
@@ -74,14 +80,6 @@ pub struct Entry {
     pub role: Role,
     /// It was made by a page of an origin that is allowed: it may look, and nothing else.
     pub looks_only: bool,
-}
-
-/// Paths that pages of allowed origins may ask for. With the method GET none of them changes anything.
-const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
-
-/// A request with this method for this path can only look.
-pub fn looks(method: &str, path: &str) -> bool {
-    ["GET", "HEAD"].contains(&method) && LOOKS.contains(&path)
 }
 
 /// An origin as browsers send it: scheme, host and port, or `file://`.
@@ -141,16 +139,25 @@ impl Access {
     /// [`Refusal`].
     pub fn enter(&self, request: &Request<'_>) -> Result<Entry, Refusal> {
         let looks_only = self.is_foreign(request)?;
-        let role = match (request.token, request.address_token) {
-            (Some(token), _) => self.bearer(token, request.peer)?,
-            (None, Some(token)) => match self.bearer(token, request.peer)? {
-                Role::Operator => return Err(Refusal::InAddress),
-                Role::Viewer => Role::Viewer,
-            },
-            (None, None) if request.peer.to_canonical().is_loopback() => Role::Viewer,
-            (None, None) => return Err(Refusal::NoToken),
+        let role = match self.role(request) {
+            // Without the token it would be served: an old one in a program's settings keeps nobody from stopping the arm.
+            Err(_) if request.halts && request.peer.to_canonical().is_loopback() => Role::Viewer,
+            role => role?,
         };
         Ok(Entry { role: if looks_only { Role::Viewer } else { role }, looks_only })
+    }
+
+    /// The role by the token alone.
+    fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
+        match (request.token, request.address_token) {
+            (Some(token), _) => self.bearer(token, request.peer),
+            (None, Some(token)) => match self.bearer(token, request.peer)? {
+                Role::Operator => Err(Refusal::InAddress),
+                Role::Viewer => Ok(Role::Viewer),
+            },
+            (None, None) if request.peer.to_canonical().is_loopback() => Ok(Role::Viewer),
+            (None, None) => Err(Refusal::NoToken),
+        }
     }
 
     /// Whether a page of an allowed origin made it, by what it says of itself, without its token.
@@ -159,8 +166,11 @@ impl Access {
     ///
     /// [`Refusal::Host`], [`Refusal::Origin`].
     pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
+        let site = request.origin.map(str::to_lowercase);
         match self.is_own(request.host, request.origin) {
-            Err(Refusal::Origin(site)) if request.looks && self.origins.contains(&site.to_lowercase()) => {
+            Err(Refusal::Origin(_))
+                if request.looks && site.is_some_and(|site| self.origins.contains(&site)) =>
+            {
                 Ok(true)
             }
             own => own.map(|()| false),
@@ -175,14 +185,18 @@ impl Access {
     pub fn is_own(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
         let host = host.unwrap_or_default().to_lowercase();
         if !self.hosts.contains(&host) {
-            return Err(Refusal::Host(if host.is_empty() { "named".into() } else { host }));
+            return Err(Refusal::Host(if host.is_empty() {
+                "named".into()
+            } else {
+                cut(&host).into_owned()
+            }));
         }
         let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
         // Its own page, not one of another agent on this computer.
         match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
             Some(own) if own == host => Ok(()),
-            _ => Err(Refusal::Origin(origin.to_owned())),
+            _ => Err(Refusal::Origin(cut(origin).into_owned())),
         }
     }
 
@@ -224,7 +238,7 @@ mod tests {
         token: Option<&str>,
     ) -> Result<Role, Refusal> {
         let peer = peer.parse().expect("an address");
-        let request = Request { peer, host, origin, token, address_token: None, looks: false };
+        let request = Request { peer, host, origin, token, address_token: None, looks: false, halts: false };
         access.enter(&request).map(|entry| entry.role)
     }
 
@@ -242,6 +256,7 @@ mod tests {
                     token,
                     address_token: None,
                     looks: true,
+                    halts: false,
                 };
                 assert_eq!(access.enter(&request), Ok(Entry { role: Role::Viewer, looks_only: true }));
                 let acts = Request { looks: false, ..request };
@@ -258,6 +273,7 @@ mod tests {
                 token: None,
                 address_token: None,
                 looks: true,
+                halts: false,
             };
             assert_eq!(access.enter(&request), Err(Refusal::Origin(from.into())), "{from}");
         }
@@ -276,7 +292,15 @@ mod tests {
         let access = access();
         let from = |peer: &str, token: Option<&str>, address_token: Option<&str>| {
             let peer = peer.parse().expect("an address");
-            access.enter(&Request { peer, host: Some(HERE), origin: None, token, address_token, looks: true })
+            access.enter(&Request {
+                peer,
+                host: Some(HERE),
+                origin: None,
+                token,
+                address_token,
+                looks: true,
+                halts: false,
+            })
         };
         let (operator, viewer) = ("o".repeat(43), "v".repeat(43));
         let role = |role| Ok(Entry { role, looks_only: false });
@@ -332,5 +356,65 @@ mod tests {
         // Nobody is kept out by that who has a right one, or needs none.
         assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
         assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
+    }
+
+    #[test]
+    fn a_wrong_token_keeps_no_stop_of_this_computer_away_and_nothing_else_is_let_in_by_it() {
+        let access = access();
+        let enter = |peer: &str, origin, (token, address_token), halts| {
+            let peer = peer.parse().expect("an address");
+            let request =
+                Request { peer, host: Some(HERE), origin, token, address_token, looks: false, halts };
+            access.enter(&request).map(|entry| entry.role)
+        };
+        let operator = "o".repeat(43);
+        let wrong = [
+            (Some(""), None),
+            (Some("0123456789abcdefghij"), None),
+            (None, Some("0123456789abcdefghij")),
+            (None, Some(operator.as_str())),
+        ];
+        // Also when too many wrong ones came.
+        for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
+            for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
+                assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");
+                assert!(enter(here, None, token, false).is_err(), "{here} {token:?}");
+                let evil = Some("http://evil.example");
+                assert!(matches!(enter(here, evil, token, true), Err(Refusal::Origin(_))), "{here}");
+            }
+            assert!(enter("10.0.0.9", None, token, true).is_err(), "{token:?}");
+        }
+        assert_eq!(enter("127.0.0.1", None, (Some(&operator), None), true), Ok(Role::Operator));
+    }
+
+    #[test]
+    fn foreign_names_in_refusals_are_cut() {
+        let access = access();
+        for length in [1, 199, 200, 201, 65_000] {
+            let evil = "e".repeat(length);
+            let host = role(&access, "127.0.0.1", Some(&evil), None, None).expect_err("it is another name");
+            let origin = role(&access, "127.0.0.1", Some(HERE), Some(&evil), None).expect_err("another site");
+            for refusal in [host, origin] {
+                let text = refusal.to_string();
+                assert!(text.len() < 320 && text.contains(&evil[..length.min(200)]), "{text}");
+            }
+        }
+        // An allowed origin is compared whole.
+        let long = format!("https://{}.example", "a".repeat(300));
+        let access = access.allowing(std::slice::from_ref(&long));
+        let peer = "127.0.0.1".parse().expect("an address");
+        let enter = |origin: &str| {
+            access.enter(&Request {
+                peer,
+                host: Some(HERE),
+                origin: Some(origin),
+                token: None,
+                address_token: None,
+                looks: true,
+                halts: false,
+            })
+        };
+        assert_eq!(enter(&long), Ok(Entry { role: Role::Viewer, looks_only: true }));
+        assert!(enter(&format!("{long}x")).is_err());
     }
 }

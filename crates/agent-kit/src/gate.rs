@@ -12,8 +12,9 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde_json::json;
 
-use crate::access::{self, Access, Entry, Refusal, Role, looks};
+use crate::access::{self, Access, Entry, Refusal, Role, halts, looks};
 use crate::api::Problem;
+use crate::cut::cut;
 use crate::lease::key_of;
 use crate::log::CommandLog;
 use crate::problem::Denial;
@@ -49,6 +50,12 @@ impl Gate {
     /// Writes a line to the log of commands.
     pub fn note(&self, what: &str, facts: serde_json::Value) {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+    }
+
+    /// Writes a line to the log of commands about an address that can cause many: the first, then how many there were.
+    pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
+        let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
+        log.write_repeated(what, &from.ip().to_string(), facts);
     }
 
     /// Lines that the log of commands lost.
@@ -145,11 +152,10 @@ pub async fn let_in(
         peer: peer.ip(),
         host: text_of(headers, header::HOST),
         origin: text_of(headers, header::ORIGIN),
-        token: text_of(headers, header::AUTHORIZATION)
-            .map(|value| value.strip_prefix("Bearer ").unwrap_or(""))
-            .or_else(|| protocol_token(headers)),
+        token: text_of(headers, header::AUTHORIZATION).map(bearer_token).or_else(|| protocol_token(headers)),
         address_token: address_token.as_deref(),
         looks: looks(method, request.uri().path()),
+        halts: halts(method, request.uri().path()),
     };
     // A browser asks without a token whether its page may ask with one.
     let origin = headers.get(header::ORIGIN).cloned();
@@ -163,7 +169,10 @@ pub async fn let_in(
             let response = next.run(request).await;
             if let Some((asked, Denial { code, why })) = command.zip(response.extensions().get()) {
                 let facts = json!({ "from": peer.to_string(), "asked": asked, "code": code, "why": why });
-                gate.note("denied", facts);
+                match role {
+                    Role::Operator => gate.note("denied", facts),
+                    Role::Viewer => gate.note_repeated("denied", peer, facts),
+                }
             }
             let mut response = if looks_only { may_read(response, origin) } else { response };
             let headers = response.headers_mut();
@@ -173,11 +182,9 @@ pub async fn let_in(
             response
         }
         Err(refusal) => {
-            let path = request.uri().path().to_owned();
-            gate.note(
-                "refused",
-                json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() }),
-            );
+            let path = cut(request.uri().path());
+            let facts = json!({ "from": peer.to_string(), "path": path, "why": refusal.to_string() });
+            gate.note_repeated("refused", peer, facts);
             refusal.into_response()
         }
     }
@@ -185,7 +192,26 @@ pub async fn let_in(
 
 /// What is asked for, without what may be behind the question mark.
 fn line_of(request: &Request<Body>) -> String {
-    format!("{} {}", request.method(), request.uri().path())
+    format!("{} {}", cut(request.method().as_str()), cut(request.uri().path()))
+}
+
+/// In front of every handler behind [`let_in`]: who may not command is refused before anything of the body is read, however slowly it comes.
+pub async fn may_command(request: Request<Body>, next: Next) -> Response {
+    let (method, path) = (request.method(), request.uri().path());
+    let commands = !method.is_safe() && !halts(method.as_str(), path);
+    let refused = request.extensions().get::<Caller>().filter(|_| commands).map(Caller::operator);
+    match refused {
+        Some(Err(problem)) => problem.into_response(),
+        _ => next.run(request).await,
+    }
+}
+
+/// The token of `Authorization: Bearer TOKEN`; the scheme has no case (RFC 9110, 11.1). Empty, which is nobody's, for any other.
+fn bearer_token(value: &str) -> &str {
+    match value.split_once(' ') {
+        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => token.trim(),
+        _ => "",
+    }
 }
 
 /// A page of this origin may read it.
@@ -238,5 +264,25 @@ impl IntoResponse for Refusal {
             Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
         };
         (status, Json(Problem::new("not-let-in", self.to_string(), next))).into_response()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scheme_of_a_token_has_no_case() {
+        for scheme in ["Bearer", "bearer", "BEARER", "bEaReR"] {
+            assert_eq!(bearer_token(&format!("{scheme} abc")), "abc");
+            assert_eq!(bearer_token(&format!("{scheme}   abc ")), "abc");
+            assert_eq!(bearer_token(scheme), "");
+            assert_eq!(bearer_token(&format!("{scheme} ")), "");
+        }
+        for value in
+            ["", "abc", "Basic abc", "Bearerabc", "Bearer\tabc", "bearer.abc", "Token abc", " Bearer abc"]
+        {
+            assert_eq!(bearer_token(value), "", "{value:?}");
+        }
     }
 }

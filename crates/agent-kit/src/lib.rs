@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod api;
+mod cut;
 pub mod events;
 pub mod gate;
 pub mod halt;

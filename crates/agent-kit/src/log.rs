@@ -1,13 +1,22 @@
 //! The log of commands: who, what, when, result; appended to and never rewritten.
-use std::fs::OpenOptions;
+mod repeats;
+mod rotate;
+
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+
+use crate::cut::cut_texts;
+use repeats::Repeats;
+use rotate::{Rotated, Target};
+
+/// Bytes that the log takes at most, where nothing else was asked for: the file and the one before it.
+pub const LIMIT: u64 = 100_000_000;
 
 /// Lines that may wait for a slow disk.
 const WAITING_MAX: usize = 4096;
@@ -26,6 +35,7 @@ pub struct CommandLog {
     lost_in_all: u64,
     /// Lines that the disk did not take.
     unwritten: Arc<AtomicU64>,
+    repeats: Repeats,
 }
 
 /// What is written whatever else is: what moved something, who stopped it. The rest leaves half of the room free.
@@ -33,13 +43,18 @@ const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
-    /// Goes on with this file, or begins it; none: nothing is kept. `failed` is called, on the writer's thread, with the first error of
-    /// writing, and again after lines could be written in between.
+    /// Goes on with this file, or begins it; none: nothing is kept. When it has half of `limit` bytes it is put aside as `FILE.1`, in place of
+    /// the one before. `failed` is called, on the writer's thread, with the first error of writing, and again after lines could be written in
+    /// between.
     ///
     /// # Errors
     ///
     /// It cannot be opened.
-    pub fn open(path: Option<&Path>, failed: impl FnMut(&io::Error) + Send + 'static) -> io::Result<Self> {
+    pub fn open(
+        path: Option<&Path>,
+        limit: u64,
+        failed: impl FnMut(&io::Error) + Send + 'static,
+    ) -> io::Result<Self> {
         let Some(path) = path else {
             return Ok(Self {
                 lines: None,
@@ -48,12 +63,13 @@ impl CommandLog {
                 lost: 0,
                 lost_in_all: 0,
                 unwritten: Arc::default(),
+                repeats: Repeats::default(),
             });
         };
-        Ok(Self::on(OpenOptions::new().append(true).create(true).open(path)?, failed))
+        Ok(Self::on(Rotated::open(path, limit)?, failed))
     }
 
-    fn on(file: impl io::Write + Send + 'static, failed: impl FnMut(&io::Error) + Send + 'static) -> Self {
+    fn on(file: impl Target + Send + 'static, failed: impl FnMut(&io::Error) + Send + 'static) -> Self {
         let (lines, incoming) = sync_channel(WAITING_MAX);
         let (waiting, unwritten) = (Arc::<AtomicUsize>::default(), Arc::<AtomicU64>::default());
         let (done, missing) = (waiting.clone(), unwritten.clone());
@@ -62,16 +78,39 @@ impl CommandLog {
             write(file, &incoming, &done, &missing, failed);
             drop::<SyncSender<()>>(writes);
         });
-        Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten }
+        let repeats = Repeats::default();
+        Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten, repeats }
     }
 
     /// Writes a line: what happened, and what is to be known of it. Never waits.
-    pub fn write(&mut self, what: &str, mut facts: Value) {
+    pub fn write(&mut self, what: &str, facts: Value) {
+        for (what, facts) in self.repeats.due(Instant::now()) {
+            self.line(what, facts);
+        }
+        self.line(what, facts);
+    }
+
+    /// Writes a line about a `sender` that can cause many without a token: the first ten of it, then one a minute that says how many there
+    /// were (`times`), with the facts of the last.
+    pub fn write_repeated(&mut self, what: &'static str, sender: &str, facts: Value) {
+        if self.lines.is_none() {
+            return;
+        }
+        let now = Instant::now();
+        let mut lines = self.repeats.due(now);
+        lines.extend(self.repeats.admit(what, sender, facts, now).map(|facts| (what, facts)));
+        for (what, facts) in lines {
+            self.line(what, facts);
+        }
+    }
+
+    fn line(&mut self, what: &str, mut facts: Value) {
         let Some(lines) = &self.lines else { return };
         let since = host_kit::unix_time();
         let mut line = json!({ "unix_s": since.as_secs_f64(), "what": what });
         if let (Some(line), Some(facts)) = (line.as_object_mut(), facts.as_object_mut()) {
             line.append(facts);
+            line.values_mut().for_each(cut_texts);
             if self.lost > 0 {
                 line.insert("lines_lost_before".into(), self.lost.into());
             }
@@ -97,6 +136,9 @@ impl CommandLog {
 
 impl Drop for CommandLog {
     fn drop(&mut self) {
+        for (what, facts) in self.repeats.rest() {
+            self.line(what, facts);
+        }
         self.lines = None;
         // Nothing is ever sent: it ends with the thread that writes, also where that panicked, or is left behind.
         let _ = self.written.recv_timeout(LAST_LINES);
@@ -104,7 +146,7 @@ impl Drop for CommandLog {
 }
 
 fn write(
-    mut file: impl io::Write,
+    mut file: impl Target,
     lines: &Receiver<Value>,
     waiting: &AtomicUsize,
     unwritten: &AtomicU64,
@@ -120,8 +162,15 @@ fn write(
             line.insert("lines_lost_before".into(), (before + lost).into());
         }
         // A line that broke off is ended first: only that one is lost.
-        let text = format!("{}{line}\n", if cut { "\n" } else { "" });
-        let (taken, written) = write_whole(&mut file, text.as_bytes());
+        let mut text = format!("{}{line}\n", if cut { "\n" } else { "" });
+        let room = file.make_room(text.len());
+        if cut && matches!(room, Ok(true)) {
+            text.remove(0);
+        }
+        let (taken, written) = match room {
+            Ok(_) => write_whole(&mut file, text.as_bytes()),
+            Err(error) => (0, Err(error)),
+        };
         if let Some(last) = taken.checked_sub(1).and_then(|last| text.as_bytes().get(last)) {
             cut = *last != b'\n';
         }
@@ -184,6 +233,8 @@ mod tests {
         }
     }
 
+    impl Target for Disk {}
+
     /// A disk that hangs keeps the end of a program for a moment, not for ever.
     #[test]
     fn a_disk_that_hangs_keeps_nobody() {
@@ -199,6 +250,7 @@ mod tests {
                 Ok(())
             }
         }
+        impl Target for Hung {}
         let (hangs, until) = sync_channel(0);
         let mut log = CommandLog::on(Hung(until), |_| {});
         log.write("sent", json!({}));
@@ -241,5 +293,87 @@ mod tests {
             assert_eq!(named, lost, "{room}: {text}");
             assert_eq!(failures.load(Ordering::Relaxed), usize::from(lost > 0), "{room}");
         }
+    }
+
+    /// Whatever its limit, and however often the program is begun anew: file and file before together keep it, each line is whole and there
+    /// once, and none is missing between the first that is kept and the last.
+    #[test]
+    fn the_log_keeps_its_limit_and_its_last_lines() {
+        let dir = tempfile::tempdir().expect("a directory");
+        for (case, limit) in [1_000, 2_000, 5_000, 20_000, 1_000_000].into_iter().enumerate() {
+            let path = dir.path().join(format!("{case}.jsonl"));
+            let aside = dir.path().join(format!("{case}.jsonl.1"));
+            for begun in 0..3 {
+                let mut log =
+                    CommandLog::open(Some(&path), limit, |error| panic!("{error}")).expect("a file");
+                (0..100).for_each(|n| log.write("sent", json!({ "n": 100 * begun + n })));
+                drop(log);
+                let (now, before) = (std::fs::read(&path).expect("it is there"), std::fs::read(&aside));
+                let before = before.unwrap_or_default();
+                assert!(
+                    (now.len() + before.len()) as u64 <= limit,
+                    "{limit}: {} {}",
+                    before.len(),
+                    now.len()
+                );
+                let text = String::from_utf8([before, now].concat()).expect("text");
+                let lines: Vec<Value> =
+                    text.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
+                let numbers: Vec<u64> = lines.iter().filter_map(|line| line["n"].as_u64()).collect();
+                let last = 100 * begun + 99;
+                assert_eq!(numbers, (last + 1 - numbers.len() as u64..=last).collect::<Vec<_>>(), "{limit}");
+                assert!(text.len() as u64 * 3 > limit || numbers.len() as u64 == last + 1, "{limit}");
+            }
+        }
+    }
+
+    /// Where the file cannot be put aside, that is reported, the lines are counted as lost, and the limit is kept.
+    #[test]
+    fn a_log_that_cannot_be_put_aside_stays_within_its_limit() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("log.jsonl");
+        std::fs::create_dir_all(dir.path().join("log.jsonl.1/x")).expect("a directory in its place");
+        let (failures, failed) = sync_channel(100);
+        let mut log = CommandLog::open(Some(&path), 1_000, move |error| {
+            failures.try_send(error.to_string()).expect("it is reported once");
+        })
+        .expect("a file");
+        (0..100).for_each(|n| log.write("sent", json!({ "n": n })));
+        let lost = log.unwritten.clone();
+        drop(log);
+        let text = std::fs::read_to_string(&path).expect("it is there");
+        assert!(text.len() <= 500, "{text}");
+        assert_eq!(text.lines().count() as u64 + lost.load(Ordering::Relaxed), 100);
+        let errors: Vec<String> = failed.iter().collect();
+        assert!(errors.len() == 1 && errors[0].contains("cannot be renamed"), "{errors:?}");
+    }
+
+    #[test]
+    fn what_is_no_ordinary_file_is_never_put_aside() {
+        let mut log =
+            CommandLog::open(Some(Path::new("/dev/null")), 10, |error| panic!("{error}")).expect("it opens");
+        (0..100).for_each(|n| log.write("sent", json!({ "n": n })));
+        drop(log);
+        assert!(!Path::new("/dev/null.1").exists());
+    }
+
+    /// A refused request costs a line of bounded length, and soon no line at all; each is counted.
+    #[test]
+    fn lines_of_those_who_are_not_let_in_are_short_and_few() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("log.jsonl");
+        let mut log = CommandLog::open(Some(&path), LIMIT, |error| panic!("{error}")).expect("a file");
+        let long = "B".repeat(65_000);
+        for n in 0..5_000 {
+            let from = format!("10.0.{}.{}", n % 3, n % 2);
+            log.write_repeated("refused", &from, json!({ "from": from, "path": long, "why": long }));
+        }
+        drop(log);
+        let text = std::fs::read_to_string(&path).expect("it is there");
+        let lines: Vec<Value> =
+            text.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
+        let times: u64 = lines.iter().map(|line| line["times"].as_u64().unwrap_or(1)).sum();
+        assert_eq!(times, 5_000);
+        assert!(lines.len() == 6 * 11 && text.len() < 200_000, "{} lines, {} bytes", lines.len(), text.len());
     }
 }

@@ -164,7 +164,7 @@ mod tests {
     fn pages() -> Pages {
         let tokens = Tokens { operator: "o".repeat(43), viewer: "v".repeat(43) };
         let access = Access::new(tokens, ([127, 0, 0, 1], 8780).into(), &[]);
-        let log = CommandLog::open(None, |_| {}).expect("no file is needed");
+        let log = CommandLog::open(None, crate::log::LIMIT, |_| {}).expect("no file is needed");
         Pages::new(Gate::new(access, Arc::new(log.into())), "index.html")
     }
 

@@ -6,9 +6,12 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use serde::Serialize;
+
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Object, RefOr};
 use utoipa::{PartialSchema, ToSchema};
+
+use crate::cut::cut_middle;
 
 /// Why something was not done, with the facts that an agent adds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -63,8 +66,9 @@ impl<F: Default> ProblemWith<F> {
         Self::new(code, error.to_string(), next.replace('`', "")).kind(kind)
     }
 
-    /// What was sent cannot be read.
-    pub fn rejected(status: StatusCode, message: String) -> Self {
+    /// What was sent cannot be read; the message may have parts of it.
+    pub fn rejected(status: StatusCode, message: impl AsRef<str>) -> Self {
+        let message = cut_middle(message.as_ref());
         Self { status, ..Self::new("request", message, "GET /openapi.json describes each request") }
     }
 

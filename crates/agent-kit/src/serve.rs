@@ -1,29 +1,43 @@
 //! Serving an agent until it is to end.
+mod in_time;
+mod places;
+
+use std::convert::Infallible;
 use std::io;
 use std::net::TcpListener;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use axum::body::Body;
 use axum::extract::ConnectInfo;
+use axum::http::Request;
+use axum::response::{IntoResponse as _, Response};
 use axum::{Extension, Router};
+use host_kit::ErrorKind;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use rustls::ServerConfig;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::sync::Semaphore;
 use tokio_rustls::TlsAcceptor;
+
+use crate::access::stops;
+use crate::api::Problem;
+use in_time::{InTime, Taken};
+use places::{Place, Places};
 
 /// How often is looked whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
-/// Connections at once from this computer, and as many from others: these cannot keep those out.
-const CONNECTIONS_MAX: usize = 256;
-/// Where fewer places than that are left, a connection is for one request, that comes at once: those that are kept open and ask for nothing
-/// keep no Stop out.
-const FEW: usize = CONNECTIONS_MAX / 2;
 /// Longest that the head of a request may take, and that a connection waits for the next one.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
+/// Longest head of a request, bytes.
+const HEAD_MAX: usize = 16 << 10;
+/// Longest that the body of a request may take while few places are left. While there are enough, the whole request has a time.
+const BODY_TIME_OF_FEW: Duration = Duration::from_secs(1);
 
 /// Serves `router` at `listener`, with TLS where it is given, until `ended` is true. Blocks.
 ///
@@ -57,33 +71,30 @@ pub fn serve(
 
 /// Takes connections for ever.
 async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<TlsAcceptor>) {
-    let (here, elsewhere) = (Semaphore::new(CONNECTIONS_MAX), Semaphore::new(CONNECTIONS_MAX));
-    let (here, elsewhere) = (Arc::new(here), Arc::new(elsewhere));
+    let (here, elsewhere) = (Places::here(), Places::elsewhere());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
             // No more files, for the time being.
             tokio::time::sleep(LOOK).await;
             continue;
         };
-        let room = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
-        // Without room it is closed at once.
-        let Ok(permit) = room.clone().try_acquire_owned() else { continue };
-        let few = room.available_permits() < FEW;
+        let places = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
         let (router, tls) = (router.clone().layer(Extension(ConnectInfo(peer))), tls.clone());
-        tokio::spawn(async move {
+        let connection = async move |place: Place| {
             // A status of 175 bytes is not to wait for more.
             let _ = stream.set_nodelay(true);
             match tls {
-                None => serve_connection(router, stream, few).await,
+                None => serve_connection(router, stream, place).await,
                 // Whoever does not shake hands, or not in time, gets no word.
                 Some(tls) => {
-                    if let Ok(Ok(stream)) = tokio::time::timeout(head_time(few), tls.accept(stream)).await {
-                        serve_connection(router, stream, few).await;
+                    let handshake = tokio::time::timeout(head_time(place.few), tls.accept(stream));
+                    if let Ok(Ok(stream)) = handshake.await {
+                        serve_connection(router, stream, place).await;
                     }
                 }
             }
-            drop(permit);
-        });
+        };
+        places.run(connection).await;
     }
 }
 
@@ -94,17 +105,44 @@ fn head_time(few: bool) -> Duration {
 async fn serve_connection(
     router: Router,
     stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
-    few: bool,
+    place: Place,
 ) {
+    let few = place.few;
+    let (router, place) = (TowerToHyperService::new(router), Arc::new(place));
+    let service = {
+        let place = place.clone();
+        service_fn(move |request: Request<Incoming>| {
+            let served = place.serves(stops(request.method().as_str(), request.uri().path()));
+            let within = place.are_few().then_some(BODY_TIME_OF_FEW);
+            let router = router.clone();
+            async move {
+                if !served {
+                    return Ok::<Response, Infallible>(full());
+                }
+                router.call(request.map(|body| Body::new(InTime::new(body, within)))).await
+            }
+        })
+    };
+    let is_socket = Arc::<AtomicBool>::default();
     let served = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(head_time(few))
+        .max_buf_size(HEAD_MAX)
         .keep_alive(!few)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router))
+        .serve_connection(TokioIo::new(Taken::new(stream, is_socket.clone())), service)
         .with_upgrades()
         .await;
-    // Whoever is gone needs no answer.
-    drop(served);
+    is_socket.store(true, Ordering::Relaxed);
+    // Whoever is gone needs no answer. Sockets have places of their own.
+    drop((served, place));
+}
+
+/// What is answered where the places that are left are kept for others.
+fn full() -> Response {
+    let next = "ask again in a second; Stop and Pause are taken meanwhile";
+    Problem::new("full", "all connections of this agent are taken", next)
+        .kind(ErrorKind::NoLink)
+        .into_response()
 }
 
 #[cfg(test)]
@@ -115,6 +153,7 @@ mod tests {
 
     use axum::routing::get;
 
+    use super::places::CONNECTIONS_MAX;
     use super::*;
 
     fn ask(stream: &mut TcpStream) -> io::Result<String> {

@@ -14,6 +14,7 @@ pub mod pages;
 pub mod reference;
 mod screen;
 mod signal;
+mod size;
 mod stdout;
 #[cfg(feature = "trial")]
 pub mod trial;
@@ -32,5 +33,6 @@ pub use output::{Output, figure, table};
 pub use output_file::OutputFile;
 pub use screen::{Screen, restore_terminal};
 pub use signal::Stop;
+pub use size::size;
 pub use stdout::stdout_is_stuck;
 pub use within::print_within;

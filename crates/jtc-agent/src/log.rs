@@ -3,7 +3,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
 
-pub use agent_kit::log::CommandLog;
+pub use agent_kit::log::{CommandLog, LIMIT};
 
 use crate::line::LineEvent;
 use crate::owner::Observer;
@@ -12,7 +12,14 @@ use crate::owner::Observer;
 pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     Box::new(move |_, event| {
         let Some((what, facts)) = logged(event) else { return };
-        log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
+        let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
+        match event {
+            // Also of those who only look.
+            LineEvent::Denied { client, .. } => {
+                log.write_repeated(what, &format!("client {}", client.0), facts)
+            }
+            _ => log.write(what, facts),
+        }
     })
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use jtc_agent::jobs::{Jobs, Stage, Store};
 use jtc_agent::line::Class;
-use jtc_agent::log::CommandLog;
+use jtc_agent::log::{CommandLog, LIMIT};
 use jtc_agent::modbus::codes::{Command, Outcome};
 use jtc_agent::modbus::map::holding;
 use jtc_agent::modbus::{Allowed, Plc, Server, plc};
@@ -46,7 +46,7 @@ impl Cell {
             }
         });
         let owner = Owner::new(LivePort::new(World::new(config)), observer);
-        let log = Arc::new(Mutex::new(CommandLog::open(None, |_| {}).expect("none")));
+        let log = Arc::new(Mutex::new(CommandLog::open(None, LIMIT, |_| {}).expect("none")));
         let jobs = Jobs::new(owner.line(), Store::in_memory(), arm);
         jobs.store.put(3, "there and back", &there_and_back(), false).expect("a trajectory");
         let plc = Plc::new(owner.line(), jobs.clone(), log, true, FIRST);

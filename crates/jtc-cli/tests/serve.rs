@@ -3,9 +3,10 @@
 
 mod common;
 
+use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
 
-use cli_kit::trial::run;
+use cli_kit::trial::{Terminal, run, signal};
 use common::Sim;
 use common::agent::{self, Agent, command_in};
 use serde_json::Value;
@@ -63,6 +64,47 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
+}
+
+/// The journal of the system, or a file, is read by others and kept.
+#[test]
+fn the_operators_token_is_printed_on_a_terminal_alone() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let tokens = dir.path().join("own-tokens.toml");
+    let words = [
+        "serve",
+        "--sim",
+        "--listen",
+        "127.0.0.1:0",
+        "--link",
+        "--token-file",
+        tokens.to_str().expect("a name"),
+    ];
+    // Its first start makes the token, the second one is asked for the link.
+    for begun in 0..2 {
+        let mut command = command_in(&dir);
+        let mut child =
+            command.args(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        assert!(line.starts_with("ready: "), "{line}");
+        signal(&child, "-INT");
+        let ended = child.wait_with_output().expect("it ends");
+        let (err, file) =
+            (String::from_utf8_lossy(&ended.stderr), std::fs::read_to_string(&tokens).expect("tokens"));
+        let secrets: Vec<&str> =
+            file.split('"').filter(|part| part.len() >= 20 && !part.contains('\n')).collect();
+        assert!(secrets.len() == 2 && secrets.iter().all(|token| !err.contains(token)), "{begun}: {err}");
+        assert!(err.contains("`cat ") && !err.contains("#token="), "{begun}: {err}");
+    }
+    let mut command = command_in(&dir);
+    command.args(words);
+    let mut terminal = Terminal::new(200, 30);
+    let mut child = terminal.start(&command);
+    terminal.until_it_shows("ready: ");
+    assert!(terminal.picture.text().contains("/#token="), "{}", terminal.picture.text());
+    terminal.press("\u{3}");
+    assert_eq!(terminal.ends(&mut child), 0);
 }
 
 #[test]

@@ -106,6 +106,19 @@ fn tokens_cannot_be_tried_without_end_and_a_stop_is_taken_meanwhile() {
 }
 
 #[test]
+fn a_wrong_token_keeps_no_stop_of_this_computer_away() {
+    http::a_wrong_token_keeps_no_stop_away(&Served::start(921_600), &["POST /api/stop", "POST /api/pause"]);
+}
+
+#[test]
+fn requests_that_are_refused_fill_no_disk() {
+    let mut served = Served::start(921_600);
+    http::refused_requests_are_answered_shortly(&served, "POST /api/gripper");
+    served.end();
+    http::refusals_cost_few_short_lines(&std::fs::read_to_string(&served.log).expect("the log"));
+}
+
+#[test]
 fn what_is_long_or_wrong_changes_nothing() {
     let requests = [
         ("POST /api/stop", "Content-Type: text/plain"),

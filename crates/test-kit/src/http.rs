@@ -153,12 +153,15 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
         let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
         assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
-        assert_eq!(
-            http.ask(request, &[&own, "Authorization: Bearer 0123456789abcdefghij"]).0,
-            401,
-            "{request}"
-        );
-        assert_eq!(http.ask(request, &[&own, "Authorization: Basic b3BlcmF0b3I6"]).0, 401, "{request}");
+        // A Stop of this computer needs none.
+        let refused = if ["POST /api/stop", "POST /api/pause"].contains(request) { 200 } else { 401 };
+        for token in ["Bearer 0123456789abcdefghij", "Basic b3BlcmF0b3I6"] {
+            assert_eq!(
+                http.ask(request, &[&own, &format!("Authorization: {token}")]).0,
+                refused,
+                "{request}"
+            );
+        }
     }
     assert_eq!(http.get("GET /api/status").0, 200);
     // Reading a state changes nothing, and a page's image or link cannot stop anything.
@@ -221,6 +224,87 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
     assert!(answers.all(|status| status == 429));
     // Those who have a right one, and those on this computer who need none, are not kept out.
     assert_eq!(http.get("POST /api/stop").0, 200);
+}
+
+/// A wrong token keeps no Stop of this computer away, however it is sent and however many came; and it lets nobody in.
+pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
+    let host = format!("Host: {}", http.address);
+    let evil = "Origin: https://evil.example";
+    let (operator, cut) = (&http.operator, &http.operator[1..]);
+    for line in [
+        "Authorization: Bearer 0123456789abcdefghij".to_owned(),
+        "Authorization: bearer 0123456789abcdefghij".to_owned(),
+        "Authorization: Bearer".to_owned(),
+        "Authorization: Bearer ".to_owned(),
+        format!("Authorization: Bearer {cut}"),
+        format!("Authorization: Bearer {operator}x"),
+        format!("Authorization: Bearer\t{operator}"),
+        format!("Authorization: {operator}"),
+        format!("Authorization: Basic {operator}"),
+        format!("Authorization: Bearer {}", "x".repeat(10_000)),
+        "Authorization: Bearer \u{fc}".to_owned(),
+        "Authorization:".to_owned(),
+        format!("Sec-WebSocket-Protocol: openjtc, bearer.{cut}"),
+    ] {
+        for _ in 0..3 {
+            for stop in stops {
+                assert_eq!(http.ask(stop, &[&host, &line]).0, 200, "{stop} {line:?}");
+                assert_eq!(http.ask(stop, &[&host, &line, evil]).0, 403, "{stop} {line:?}: another site");
+            }
+            let (status, _) = http.ask("GET /api/status", &[&host, &line]);
+            assert!([401, 429].contains(&status), "{line:?}: {status}");
+            let (status, _) = http.ask("POST /api/lease", &[&host, &line]);
+            assert!([401, 429].contains(&status), "{line:?}: {status}");
+        }
+    }
+    for scheme in ["Bearer", "bearer", "BEARER", "bEARER", "Bearer "] {
+        let (status, body) =
+            http.ask("GET /api/status", &[&host, &format!("Authorization: {scheme} {operator}")]);
+        assert!(status == 200 && body.contains("\"role\":\"operator\""), "{scheme}: {status} {body}");
+    }
+}
+
+/// Requests that are refused are sent without end; what is answered is short. [`refusals_cost_few_short_lines`] looks at the log then.
+pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
+    let (own, bearer) = (format!("Host: {}", http.address), "Authorization: Bearer 0123456789abcdefghij");
+    for length in [100, 1_000, 12_000, 15_000, 65_000, 380_000] {
+        let long = "B".repeat(length);
+        let (host, origin) = (format!("Host: {long}"), format!("Origin: http://{long}"));
+        let (path, asked) = (format!("GET /{long}"), format!("GET /api/status?{long}={long}"));
+        let name = format!("GET /api/explain/{long}");
+        let post = format!("POST /api/{long}");
+        let method = format!("{long} /api/status");
+        let cases: [(&str, &[&str]); 10] = [
+            (&path, &["Host: evil"]),
+            (&path, &[&own, bearer]),
+            ("GET /api/status", &[&host]),
+            ("GET /api/status", &[&own, &origin]),
+            (&asked, &["Host: evil"]),
+            (&name, &[&own]),
+            (&post, &[&own, &origin]),
+            (&method, &["Host: evil"]),
+            (command, &[&own]),
+            (&format!("GET /api/events?after={long}"), &[&own]),
+        ];
+        for (request, lines) in cases {
+            for _ in 0..20 {
+                let (status, answer) = http.ask(request, lines);
+                assert!(status != 200 && answer.len() < 1_500, "{length}: {status}, {} bytes", answer.len());
+            }
+        }
+    }
+    assert_eq!(http.get("POST /api/stop").0, 200);
+}
+
+/// What the log of commands has of [`refused_requests_are_answered_shortly`], when the agent has ended.
+pub fn refusals_cost_few_short_lines(log: &str) {
+    let lines: Vec<Value> =
+        log.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
+    let of = |what| lines.iter().filter(move |line| line["what"] == what);
+    let times = |what| of(what).map(|line| line["times"].as_u64().unwrap_or(1)).sum::<u64>();
+    assert!(times("refused") > 300 && times("denied") >= 100, "each is counted: {log}");
+    assert!(of("refused").count() + of("denied").count() < 40, "{} lines", lines.len());
+    assert!(log.lines().all(|line| line.len() < 1_000) && log.len() < 40_000, "{} bytes", log.len());
 }
 
 /// What is long or wrong is refused with a status of its own, and changes nothing.

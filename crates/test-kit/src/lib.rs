@@ -4,6 +4,7 @@
 
 pub mod clock;
 pub mod existing;
+pub mod flood;
 pub mod http;
 pub mod page;
 #[cfg(unix)]

@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use cli_kit::trial::{program, signal};
+use cli_kit::trial::{Terminal, program, signal};
 use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;
@@ -58,13 +58,35 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     signal(&child, "-TERM");
     let (code, err) = over(child);
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("operator's token, new in"), "{err}");
+    assert!(err.contains("operator's token, new in") && err.contains("`cat "), "{err}");
+    assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
     // The tokens stay.
     let (child, again) = serve(dir.path(), &["--sim"]);
     assert_eq!(http(&again).operator, http(&ready).operator);
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
+    // The link is asked for, and what it is printed to may keep it.
+    let (child, again) = serve(dir.path(), &["--sim", "--link"]);
+    signal(&child, "-INT");
+    let (code, err) = over(child);
+    assert!(code == Some(0) && err.contains("`cat "), "{err}");
+    assert!(!err.contains(&http(&again).operator) && !err.contains("#token="), "{err}");
+}
+
+#[test]
+fn the_link_with_the_token_is_printed_on_a_terminal() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
+    command.args(["serve", "--sim", "--listen", "127.0.0.1:0", "--token-file", "tokens.toml"]);
+    command.env("XDG_STATE_HOME", dir.path()).env("XDG_CACHE_HOME", dir.path()).current_dir(dir.path());
+    let mut terminal = Terminal::new(200, 30);
+    let mut child = terminal.start(&command);
+    terminal.until_it_shows("ready: ");
+    let text = terminal.picture.text();
+    assert!(text.contains("operator's token, new in") && text.contains("/#token="), "{text}");
+    terminal.press("\u{3}");
+    assert_eq!(terminal.ends(&mut child), 0);
 }
 
 /// What the agent has started does not run on without it, and a bus that goes ends it.

@@ -122,15 +122,37 @@ impl Tokens {
 }
 
 impl Tokens {
-    /// The dashboard of the agent at `url`, as people open it: with the operator's token where they may see it. What stands behind `#` is not
-    /// sent to any server, and the page takes it out of the address at once.
-    pub fn dashboard(&self, url: &str, with_token: bool) -> String {
-        if with_token {
-            format!("dashboard: {url}/#token={}", self.operator)
-        } else {
-            format!("dashboard: {url}")
+    /// What people are told about the agent at `url` when it begins: the operator's token and the link of the dashboard with it on a terminal alone,
+    /// for what is written elsewhere (the journal of the system, a file) is kept and read by others. What stands behind `#` is not sent to any
+    /// server, and the page takes it out of the address at once.
+    pub fn announce(&self, url: &str, file: &Path, announced: Announced) -> Vec<String> {
+        let Announced { are_new, link, on_terminal } = announced;
+        let (operator, file) = (&self.operator, file.display());
+        let mut lines = Vec::new();
+        if are_new && on_terminal {
+            lines.push(format!("operator's token, new in {file}: {operator}"));
+        } else if are_new {
+            lines.push(format!("operator's token, new in {file}: `cat {file}` shows it"));
+        } else if link && !on_terminal {
+            lines.push(format!("operator's token: printed on a terminal alone; `cat {file}` shows it"));
         }
+        lines.push(match on_terminal && (are_new || link) {
+            true => format!("dashboard: {url}/#token={operator}"),
+            false => format!("dashboard: {url}"),
+        });
+        lines
     }
+}
+
+/// To whom tokens are announced, and why.
+#[derive(Clone, Copy, Debug)]
+pub struct Announced {
+    /// They were made just now.
+    pub are_new: bool,
+    /// The link with the token is asked for.
+    pub link: bool,
+    /// A person reads it, and nothing keeps it.
+    pub on_terminal: bool,
 }
 
 /// The token file of this user, where none is named.
@@ -164,4 +186,34 @@ fn check_mode(path: &Path) -> Result<(), TokenError> {
 #[cfg(not(unix))]
 fn check_mode(_: &Path) -> Result<(), TokenError> {
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_token_is_printed_on_a_terminal_alone() {
+        let tokens = Tokens { operator: "o".repeat(43), viewer: "v".repeat(43) };
+        let file = Path::new("/home/anna/tokens.toml");
+        for are_new in [false, true] {
+            for link in [false, true] {
+                for on_terminal in [false, true] {
+                    let announced = Announced { are_new, link, on_terminal };
+                    let text = tokens.announce("http://127.0.0.1:8780", file, announced).join("\n");
+                    assert!(text.contains("dashboard: http://127.0.0.1:8780"), "{text}");
+                    assert!(!text.contains(&tokens.viewer), "{text}");
+                    let shown = on_terminal && (are_new || link);
+                    assert_eq!(text.contains(&tokens.operator), shown, "{announced:?}: {text}");
+                    assert_eq!(text.contains("#token="), shown, "{announced:?}: {text}");
+                    let told = !on_terminal && (are_new || link);
+                    assert_eq!(
+                        text.contains("`cat /home/anna/tokens.toml` shows it"),
+                        told,
+                        "{announced:?}: {text}"
+                    );
+                }
+            }
+        }
+    }
 }

@@ -32,7 +32,7 @@ use std::time::Duration;
 use agent_kit::access::{Access, TokenError, random};
 use agent_kit::api::Refusals;
 use agent_kit::events::Events;
-use agent_kit::gate::{Asker, Caller, Gate, let_in};
+use agent_kit::gate::{Asker, Caller, Gate, let_in, may_command};
 use agent_kit::log::CommandLog;
 use agent_kit::openapi::{Bearer, served, text};
 use agent_kit::pages::{Pages, show};
@@ -41,7 +41,7 @@ use axum::body::Body;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::handler::Handler as _;
 use axum::http::{Method, StatusCode};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::Response;
 use axum::{Extension, Json, Router};
 use jtc_host::ErrorKind;
@@ -151,6 +151,7 @@ impl Agent {
             .route("/openapi.json", served(&description))
             .layer(in_time(REQUEST_TIME))
             .merge(slow.layer(in_time(LONG_TIME)))
+            .route_layer(from_fn(may_command))
             .layer(from_fn_with_state(self.clone(), at_root))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
             .layer(from_fn_with_state(Pages::new(self.gate.clone(), "index.html"), show))

@@ -2,9 +2,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use agent_kit::api::Asked;
 use axum::Extension;
+use axum::extract::State;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade};
-use axum::extract::{Query, State};
 use axum::response::Response;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
@@ -111,7 +112,7 @@ enum LeaseWish {
 pub(super) async fn line(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
-    Query(joining): Query<Joining>,
+    Asked(joining): Asked<Joining>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let sockets = agent.sockets.clone();
@@ -125,10 +126,13 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     let introduction = Introduction { name: name.clone(), role, policy: joining.policy };
     let joined = agent.line.join(introduction);
     let client = joined.client();
-    agent.note(
-        "joined",
-        json!({ "client": client.0, "name": name, "role": role, "from": caller.peer.to_string() }),
-    );
+    // Those who only look may come and go as often as they like.
+    let note = |what, facts| match role {
+        Role::Operator => agent.note(what, facts),
+        Role::Viewer => agent.gate.note_repeated(what, caller.peer, facts),
+    };
+    let from = caller.peer.to_string();
+    note("joined", json!({ "client": client.0, "name": name, "role": role, "from": from }));
     let hello =
         Hello { port: agent.port.to_string(), baud: agent.line.baud(), simulated: agent.simulated, role };
     if matches!(
@@ -138,7 +142,7 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
         pass(&agent.line, client, socket).await;
     }
     drop(joined);
-    agent.note("left", json!({ "client": client.0, "name": name }));
+    note("left", json!({ "client": client.0, "name": name }));
 }
 
 /// Passes messages both ways until one end has gone. Neither waits for the other: a Stop is read also where nothing is taken.

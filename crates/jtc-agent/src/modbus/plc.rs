@@ -163,7 +163,9 @@ impl Plc {
 
     /// Somebody may not connect.
     pub fn refused(&self, peer: SocketAddr, why: &str) {
-        self.note("refused", json!({ "from": peer.to_string(), "path": "modbus", "why": why }));
+        let facts = json!({ "from": peer.to_string(), "path": "modbus", "why": why });
+        let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
+        log.write_repeated("refused", &format!("modbus {}", peer.ip()), facts);
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
+use cli_kit::size;
 use cli_kit::variables::on_off;
 use jtc_agent::modbus::Network;
 
@@ -36,12 +37,15 @@ pub struct ServeArgs {
         value_parser = jtc_agent::access::origin
     )]
     pub allow_origins: Vec<String>,
-    /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
-    #[arg(id = "link_with_token", long = "link")]
+    /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
+    #[arg(id = "link_with_token", long = "link", )]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
+    /// Room that the log takes at most: it is put aside as FILE.1 when it has half of it
+    #[arg(long, env = "JTC_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
+    pub command_log_limit: u64,
     /// Directory that keeps trajectories by number, as files like 7-pick.csv; without it they are kept as long as the agent runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
@@ -55,7 +59,7 @@ pub struct ServeArgs {
     #[arg(long, env = "JTC_RECORD", value_name = "DIR")]
     pub record: Option<PathBuf>,
     /// Room that recordings take at most: the oldest of this directory's agents are removed first
-    #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = size)]
+    #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
     /// Address at which a PLC drives the arm by Modbus TCP, which knows no tokens; by default only from this computer
     #[arg(long, env = "JTC_MODBUS", value_name = "ADDRESS:PORT")]
@@ -67,50 +71,12 @@ pub struct ServeArgs {
     pub link: LinkArgs,
 }
 
-/// Least room for recordings: some minutes.
-const SIZE_MIN: u64 = 10_000_000;
-
-/// Bytes, as `500MB`, `2 GB`, `1GiB` or a plain number.
-fn size(text: &str) -> Result<u64, String> {
-    let text = text.trim();
-    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
-    let (number, unit) = text.split_at(digits);
-    let factor: f64 = match unit.trim().to_ascii_lowercase().as_str() {
-        "" | "b" => 1.0,
-        "kb" => 1e3,
-        "mb" => 1e6,
-        "gb" => 1e9,
-        "tb" => 1e12,
-        "kib" => 1024.0,
-        "mib" => 1024_f64.powi(2),
-        "gib" => 1024_f64.powi(3),
-        "tib" => 1024_f64.powi(4),
-        unit => {
-            return Err(format!("{unit:?} is no unit of a size: B, kB, MB, GB, TB, KiB, MiB, GiB or TiB"));
-        }
-    };
-    let number: f64 = number.parse().map_err(|_| "a size is a number and its unit, as 500MB".to_owned())?;
-    let bytes = (number * factor) as u64;
-    if bytes < SIZE_MIN { Err("recordings need 10MB at least".into()) } else { Ok(bytes) }
+/// Room for recordings: some minutes at least.
+fn record_size(text: &str) -> Result<u64, String> {
+    size(text, 10_000_000)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::size;
-
-    #[test]
-    fn sizes_are_read_with_their_units() {
-        for (text, bytes) in [
-            ("2GB", 2_000_000_000),
-            ("1.5 gb", 1_500_000_000),
-            ("64MiB", 64 << 20),
-            ("10000000", 10_000_000),
-            ("50000kB", 50_000_000),
-        ] {
-            assert_eq!(size(text), Ok(bytes), "{text}");
-        }
-        for text in ["", "GB", "2 parsec", "-1GB", "9MB", "1e9", "NaN"] {
-            assert!(size(text).is_err(), "{text}");
-        }
-    }
+/// Room for the log of commands: some thousand lines at least.
+fn log_size(text: &str) -> Result<u64, String> {
+    size(text, 1_000_000)
 }

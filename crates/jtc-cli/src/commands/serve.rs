@@ -1,12 +1,13 @@
 //! `jtc serve`: the agent that owns a port.
 
+use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output, Stop};
-use jtc_agent::access::{Access, Tokens, default_token_file};
+use jtc_agent::access::{Access, Announced, Tokens, default_token_file};
 use jtc_agent::api::Agent;
 use jtc_agent::jobs::{Jobs, Store};
 use jtc_agent::log::{CommandLog, observer};
@@ -37,7 +38,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
             .hint("name one with --token-file FILE")
     })?;
     let stop = Stop::listen()?;
-    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+    let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
+    let log = log.map_err(|error| {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
@@ -95,10 +97,9 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     if let Some(at) = modbus_at {
         out.note(format!("note: Modbus knows no tokens: whoever may connect to {at} may command the arm"));
     }
-    if are_new {
-        out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
-    }
-    out.note(tokens.dashboard(&url, are_new || args.link_with_token));
+    let asked =
+        Announced { are_new, link: args.link_with_token, on_terminal: std::io::stderr().is_terminal() };
+    tokens.announce(&url, &token_file, asked).into_iter().for_each(|line| out.note(line));
     let access = Access::new(tokens, listen, &args.names).allowing(&args.allow_origins);
     let jobs = Jobs::new(owner.line(), store, arm);
     let agent = Agent::new(owner.line(), jobs.clone(), access, log.clone(), &name, args.sim)?;

@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use jtc_agent::access::{Access, Tokens};
 use jtc_agent::api::Agent;
 use jtc_agent::jobs::{Jobs, Store};
-use jtc_agent::log::{CommandLog, observer};
+use jtc_agent::log::{CommandLog, LIMIT, observer};
 use jtc_agent::{Line, Owner, serve};
 use jtc_client::{AgentPort, Options};
 use jtc_host::port::sim::LivePort;
@@ -97,7 +97,7 @@ impl Served {
     ) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let log_path = dir.path().join("commands.jsonl");
-        let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
+        let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), LIMIT, |_| {}).expect("a file")));
         let owner = Owner::new(port, observer(log.clone()));
         let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");

@@ -15,14 +15,14 @@ use std::time::Duration;
 use agent_kit::access::{Access, Role, TokenError, random};
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::events::Events;
-use agent_kit::gate::{Asker, Caller, Gate, let_in};
+use agent_kit::gate::{Asker, Caller, Gate, let_in, may_command};
 use agent_kit::log::CommandLog;
 use agent_kit::openapi::{Bearer, denials, served, text};
 use agent_kit::pages::{Pages, show};
 use agent_kit::socket::Sockets;
 use axum::extract::{DefaultBodyLimit, State};
 use axum::http::StatusCode;
-use axum::middleware::from_fn_with_state;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::{Extension, Json, Router};
 use serde_json::json;
 use tokio::sync::Semaphore;
@@ -103,6 +103,7 @@ impl Agent {
             .route("/api/stream", axum::routing::get(events::stream))
             .route("/openapi.json", served(&description))
             .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+            .route_layer(from_fn(may_command))
             .layer(from_fn_with_state(self.gate.clone(), let_in))
             .layer(from_fn_with_state(Pages::new(self.gate.clone(), "chain.html"), show))
             .with_state(self)

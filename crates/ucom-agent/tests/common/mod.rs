@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use agent_kit::access::{Access, Tokens};
-use agent_kit::log::CommandLog;
+use agent_kit::log::{CommandLog, LIMIT};
 use can_link::{CanBus, CanFrame};
 use serde_json::{Value, json};
 use test_kit::http::Http;
@@ -124,7 +124,7 @@ impl Served {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
         let log_path = dir.path().join("commands.jsonl");
-        let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), |_| {}).expect("a file")));
+        let log = Arc::new(Mutex::new(CommandLog::open(Some(&log_path), LIMIT, |_| {}).expect("a file")));
         let owner = Owner::open(&chain.url, config).expect("the bus opens");
         let (tokens, _) = Tokens::load_or_make(&dir.path().join("tokens.toml")).expect("a token file");
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");

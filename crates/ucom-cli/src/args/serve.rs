@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
+use cli_kit::size;
 use cli_kit::variables::on_off;
 
 use super::CacheArgs;
@@ -26,8 +27,8 @@ pub struct ServeArgs {
     /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
-    /// Print the link of the dashboard with the operator's token, which is otherwise printed once, when it is made
-    #[arg(id = "link_with_token", long = "link")]
+    /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
+    #[arg(id = "link_with_token", long = "link", )]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
@@ -35,6 +36,9 @@ pub struct ServeArgs {
     /// Flash numbers of the boards, as `ucom init` wrote them; updates keep there what they wrote
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
+    /// Room that the log takes at most: it is put aside as FILE.1 when it has half of it
+    #[arg(long, env = "UCOM_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
+    pub command_log_limit: u64,
     /// Certificate chain, PEM: the agent speaks TLS
     #[arg(long, env = "UCOM_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
@@ -43,4 +47,9 @@ pub struct ServeArgs {
     pub tls_key: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
+}
+
+/// Room for the log of commands: some thousand lines at least.
+fn log_size(text: &str) -> Result<u64, String> {
+    size(text, 1_000_000)
 }

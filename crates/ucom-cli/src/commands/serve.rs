@@ -1,12 +1,13 @@
 //! `ucom serve`: the agent that owns a bus.
 
+use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use agent_kit::access::{Access, Tokens, token_file};
+use agent_kit::access::{Access, Announced, Tokens, token_file};
 use agent_kit::log::CommandLog;
 use agent_kit::{serve as service, tls};
 use cli_kit::{ErrorKind, Failure, Output};
@@ -45,7 +46,8 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
-    let log = CommandLog::open(args.command_log.as_deref(), log_failure(out)).map_err(|error| {
+    let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
+    let log = log.map_err(|error| {
         let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
@@ -64,11 +66,10 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if !address.ip().is_loopback() && tls.is_none() {
         out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
     }
-    if are_new {
-        out.note(format!("operator's token, new in {}: {}", token_file.display(), tokens.operator));
-    }
     let url = format!("{}://{address}", if tls.is_some() { "https" } else { "http" });
-    out.note(tokens.dashboard(&url, are_new || args.link_with_token));
+    let asked =
+        Announced { are_new, link: args.link_with_token, on_terminal: std::io::stderr().is_terminal() };
+    tokens.announce(&url, &token_file, asked).into_iter().for_each(|line| out.note(line));
     let access = Access::new(tokens, address, &args.names);
     let agent = Agent::new(&owner, access, Arc::new(Mutex::new(log)), &bus, args.sim)?;
     let value = json!({ "url": url, "token_file": token_file, "simulated": args.sim, "bus": bus });

@@ -1,0 +1,72 @@
+//! What a request is, by its method and path alone: known before anything else of it.
+
+/// Paths that pages of allowed origins may ask for. With the method GET none of them changes anything.
+const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
+
+/// A request with this method for this path can only look.
+pub fn looks(method: &str, path: &str) -> bool {
+    ["GET", "HEAD"].contains(&method) && LOOKS.contains(&path)
+}
+
+/// Paths of the Stop and the Pause, which need no lease, and on this computer no token.
+const HALTS: [&str; 2] = ["/api/stop", "/api/pause"];
+
+/// A request with this method for this path is a Stop or a Pause.
+pub fn halts(method: &str, path: &str) -> bool {
+    method == "POST" && HALTS.contains(&path)
+}
+
+/// A request with this method for this path is served when all other connections are taken: a Stop, a Pause, a command that ends the work of
+/// a board or a job, or the socket by which `jtc traj stop` sends its Stop.
+pub fn stops(method: &str, path: &str) -> bool {
+    let number = |part: &str| part.parse::<u64>().is_ok();
+    let board = path.strip_prefix("/api/boards/").and_then(|rest| rest.split_once('/'));
+    let job = path.strip_prefix("/api/jobs/");
+    halts(method, path)
+        || (method, path) == ("GET", "/api/line")
+        || board.is_some_and(|(board, what)| {
+            number(board) && [("POST", "stop"), ("PUT", "outputs")].contains(&(method, what))
+        })
+        || (method == "DELETE" && job.is_some_and(number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_that_stop_are_told_from_all_others() {
+        for (method, path) in [("POST", "/api/stop"), ("POST", "/api/pause")] {
+            assert!(halts(method, path) && stops(method, path), "{method} {path}");
+        }
+        for (method, path) in [
+            ("POST", "/api/boards/3/stop"),
+            ("PUT", "/api/boards/3/outputs"),
+            ("DELETE", "/api/jobs/17"),
+            ("GET", "/api/line"),
+        ] {
+            assert!(!halts(method, path) && stops(method, path), "{method} {path}");
+        }
+        for (method, path) in [
+            ("GET", "/api/stop"),
+            ("GET", "/api/line/"),
+            ("GET", "/api/stream"),
+            ("post", "/api/stop"),
+            ("POST", "/api/stop/"),
+            ("POST", "/api/stops"),
+            ("POST", "//api/stop"),
+            ("POST", "/api/%73top"),
+            ("POST", "/api/boards//stop"),
+            ("POST", "/api/boards/x/stop"),
+            ("POST", "/api/boards/3/start"),
+            ("PUT", "/api/boards/3/stop"),
+            ("POST", "/api/boards/3/x/stop"),
+            ("DELETE", "/api/jobs/"),
+            ("DELETE", "/api/lease"),
+            ("GET", "/api/jobs/17"),
+            ("POST", "/api/run"),
+        ] {
+            assert!(!stops(method, path), "{method} {path}");
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Clients that take all connections: in a program of its own, for they take many.
+mod common;
+
+use common::Served;
+
+#[test]
+fn a_stop_is_answered_whoever_takes_all_connections() {
+    let served = Served::start(921_600);
+    let stops = ["POST /api/stop", "POST /api/pause"];
+    test_kit::flood::stops_are_answered_in_every_flood(&served, "POST /api/gripper", &stops);
+}

@@ -1,0 +1,14 @@
+//! Clients that take all connections: in a program of its own, for they take many.
+mod common;
+
+use common::Served;
+
+#[test]
+fn a_stop_is_answered_whoever_takes_all_connections() {
+    let served = Served::start(1);
+    test_kit::flood::stops_are_answered_in_every_flood(
+        &served,
+        "PUT /api/boards/1/outputs",
+        &["POST /api/stop"],
+    );
+}

@@ -5,14 +5,24 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::{Failure, Output, exit};
 
 /// The command line of this process; otherwise help, version or wrong usage is printed, and the exit code is to be returned. Wrong
 /// usage is one JSON object on stdout where `--json` or the variable `json_env` asks for JSON, besides the words on stderr.
 pub fn parse<Cli: Parser>(program: &'static str, json_env: &str) -> Result<Cli, ExitCode> {
-    Cli::try_parse().map_err(|e| {
+    parse_with(program, json_env, &[])
+}
+
+/// Like `parse`. `meant` has words that people try as commands, each with the command to use.
+pub fn parse_with<Cli: Parser>(
+    program: &'static str,
+    json_env: &str,
+    meant: &[(&str, &str)],
+) -> Result<Cli, ExitCode> {
+    Cli::try_parse().map_err(|mut e| {
+        name_what_is_meant(&mut e, meant);
         let shown = e.print().and_then(|()| std::io::stdout().flush());
         if !e.use_stderr() {
             let _ = shown.inspect_err(Output::lose);
@@ -27,6 +37,16 @@ pub fn parse<Cli: Parser>(program: &'static str, json_env: &str) -> Result<Cli, 
         }
         ExitCode::from(exit::USAGE)
     })
+}
+
+/// Replaces the parser's guess by the command to use, where a word is known that is no command.
+fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
+    let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return };
+    let word = word.to_lowercase();
+    if let Some((_, command)) = meant.iter().find(|(known, _)| *known == word) {
+        e.remove(ContextKind::SuggestedSubcommand);
+        e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![format!("use `{command}`").into()]));
+    }
 }
 
 /// The option among the words, as far as options go, or the variable with a value that means yes.

@@ -21,7 +21,7 @@ use cli_kit::{Output, exit};
 use args::Cli;
 
 fn main() -> ExitCode {
-    let cli: Cli = match cli_kit::usage::parse("jtc", "JTC_JSON") {
+    let cli: Cli = match cli_kit::usage::parse_with("jtc", "JTC_JSON", &args::MEANT) {
         Ok(cli) => cli,
         Err(code) => return code,
     };

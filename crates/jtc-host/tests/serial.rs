@@ -114,7 +114,7 @@ fn a_stop_is_written_until_the_controller_confirms_it() {
     let socket = door(&path);
     let asked = std::thread::spawn(move || halt::ask(&socket, Halt::Stop, "a test"));
     let mut got = [0; fixed::STOP.len()];
-    for _ in 0..6 {
+    for _ in 0..8 {
         far.read_exact(&mut got).unwrap();
         assert_eq!(got, fixed::STOP);
     }

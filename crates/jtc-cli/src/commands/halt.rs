@@ -1,11 +1,13 @@
 //! `jtc stop` and `jtc traj pause`: directly, through an agent, or through the program of this user that has the port.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_client::agents::registered;
-use jtc_host::port::Standstill;
 use jtc_host::port::halt::{self, Answer, End, Halt};
+use jtc_host::port::{Standstill, is_moving};
 use jtc_host::{Error, LinkError, PortError, Session};
 use serde_json::{Value, json};
 
@@ -15,6 +17,10 @@ use crate::progress::Progress;
 
 /// A program that has just opened the port, or is about to close it, does not listen for this time.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
+/// The same where a program of this user has listened: it may be waiting for the end of another Stop.
+const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
+/// Programs that may have the port one after the other while one Stop is waited for.
+const OWNERS: usize = 16;
 /// Longest time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
 
@@ -106,6 +112,8 @@ struct Stopped {
     moved: bool,
     state: String,
     trajectory: String,
+    /// What moves without torque.
+    falls: Option<String>,
     /// The program that had the port.
     holder: Option<Answer>,
 }
@@ -113,6 +121,9 @@ struct Stopped {
 impl Stopped {
     fn words(&self) -> String {
         let holder = self.holder.as_ref().map_or(String::new(), |answer| format!("; {}", holder(answer)));
+        if let Some(falls) = &self.falls {
+            return format!("nothing to stop: state {}, without torque {falls}{holder}", self.state);
+        }
         if self.moved {
             return format!("stopped: the arm stands{holder}");
         }
@@ -125,6 +136,7 @@ impl Stopped {
             "moved": self.moved,
             "state": self.state,
             "trajectory": self.trajectory,
+            "moves_without_torque": self.falls,
             "holder": self.holder.as_ref().map(holder_json),
         })
     }
@@ -148,7 +160,7 @@ enum Reached {
 
 /// Opens the line, or asks the program that has the port.
 fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, Failure> {
-    let end = Instant::now() + CHANGES_HANDS;
+    let start = Instant::now();
     loop {
         let (path, busy) = match link.open_unless_busy(None)? {
             Ok(port) => return Ok(Reached::Line(Session::new(port))),
@@ -158,11 +170,23 @@ fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, Failure> {
         if let Some((answer, stands)) = ask(&path, what)? {
             return Ok(Reached::Holder(answer, stands));
         }
-        if Instant::now() >= end {
+        let patience = if is_own(&path) { CHANGES_OWN_HANDS } else { CHANGES_HANDS };
+        if start.elapsed() >= patience {
             return Err(busy.into());
         }
         std::thread::sleep(Duration::from_millis(20));
     }
+}
+
+/// A program of this user listens for this port, or did.
+#[cfg(unix)]
+fn is_own(path: &str) -> bool {
+    !halt::sockets_of(path).is_empty()
+}
+
+#[cfg(not(unix))]
+fn is_own(_: &str) -> bool {
+    false
 }
 
 /// Asks the program that has this port, if it is one of this user that listens.
@@ -181,49 +205,45 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, Failure> {
     Ok(None)
 }
 
+/// Stops one arm. A program that was stopped may end before the arm stands: then the port is free, or another program has it.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
-    let reached = match arm {
+    let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
+    for _ in 0..OWNERS {
+        let (answer, end) = match reached.map_err(may_be_moving)? {
+            Reached::Line(session) => return directly(session, progress, first),
+            Reached::Holder(answer, end) => (answer, end),
+        };
+        let port = Some(answer.port.clone());
+        let link = match arm {
+            Arm::Of(link) => LinkArgs { port, ..link.clone() },
+            #[cfg(unix)]
+            Arm::Behind(_) => LinkArgs { port, token_file: None, tls_ca: None, baud: answer.baud },
+        };
+        let (state, trajectory) = (answer.state.clone(), answer.trajectory.clone());
+        let so_far = first.get_or_insert_with(|| answer.clone());
+        so_far.accepted |= answer.accepted;
+        so_far.moved |= answer.moved;
+        match end {
+            Some(End { stands: true, moved, moving: falls }) => {
+                let (accepted, moved) = (so_far.accepted, so_far.moved || moved);
+                return Ok(Stopped { accepted, moved, state, trajectory, falls, holder: first });
+            }
+            Some(End { moving, .. }) => return Err(still_moving(&moving.unwrap_or_default())),
+            None => reached = reach(&link, Halt::Stop),
+        }
+    }
+    Err(still_moving("one program after the other opens its port"))
+}
+
+fn reach_arm(arm: &Arm) -> Result<Reached, Failure> {
+    match arm {
         Arm::Of(link) => reach(link, Halt::Stop),
         #[cfg(unix)]
-        Arm::Behind(socket) => match halt::ask(socket, Halt::Stop, &who()) {
-            Ok(Some((answer, end))) => Ok(Reached::Holder(answer, end)),
-            Ok(None) => {
-                Err(Failure::new(ErrorKind::NoLink, "port", "the program that had the port has ended")
-                    .hint("`jtc stop --port PATH` stops the arm at its port"))
-            }
-            Err(error) => Err(error.into()),
+        Arm::Behind(socket) => match halt::ask(socket, Halt::Stop, &who())? {
+            Some((answer, end)) => Ok(Reached::Holder(answer, end)),
+            None => Err(Failure::new(ErrorKind::NoLink, "port", "the program that had the port has ended")
+                .hint("`jtc stop --port PATH` stops the arm at its port")),
         },
-    };
-    match reached.map_err(may_be_moving)? {
-        Reached::Line(session) => directly(session, progress, None),
-        Reached::Holder(answer, Some(end)) => {
-            let moved = answer.moved || end.moved;
-            if let Some(moving) = end.moving {
-                return Err(still_moving(&moving));
-            }
-            let Answer { accepted, ref state, ref trajectory, .. } = answer;
-            let (state, trajectory) = (state.clone(), trajectory.clone());
-            Ok(Stopped { accepted, moved, state, trajectory, holder: Some(answer) })
-        }
-        // The program has ended, as a stopped one does: the port is free, or another one has it.
-        Reached::Holder(answer, None) => {
-            let port = Some(answer.port.clone());
-            let link = match arm {
-                Arm::Of(link) => LinkArgs { port, ..link.clone() },
-                #[cfg(unix)]
-                Arm::Behind(_) => LinkArgs { port, token_file: None, tls_ca: None, baud: answer.baud },
-            };
-            match reach(&link, Halt::Stop).map_err(may_be_moving)? {
-                Reached::Line(session) => directly(session, progress, Some(answer)),
-                Reached::Holder(_, None) => Err(still_moving("the port changes hands all the time")),
-                Reached::Holder(_, Some(End { moving: Some(moving), .. })) => Err(still_moving(&moving)),
-                Reached::Holder(later, Some(_)) => {
-                    let Answer { accepted, moved, state, trajectory, .. } = later;
-                    let (accepted, moved) = (accepted || answer.accepted, moved || answer.moved);
-                    Ok(Stopped { accepted, moved, state, trajectory, holder: Some(answer) })
-                }
-            }
-        }
     }
 }
 
@@ -234,6 +254,13 @@ fn directly(
     holder: Option<Answer>,
 ) -> Result<Stopped, Failure> {
     progress.watch(&mut session);
+    // Statuses that come in before the Stop is confirmed count, too.
+    let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
+    let seen = Rc::clone(&moved);
+    session.observe(move |_, status| {
+        own.see(status);
+        seen.set(seen.get() || is_moving(status));
+    });
     let accepted = match session.stop() {
         Ok(()) => true,
         Err(Error::Link(LinkError::Refused { .. })) => false,
@@ -251,9 +278,10 @@ fn directly(
         if standstill.is_reached() {
             return Ok(Stopped {
                 accepted: accepted || taught || holder.as_ref().is_some_and(|answer| answer.accepted),
-                moved: standstill.moved() || taught || holder.as_ref().is_some_and(|answer| answer.moved),
+                moved: moved.get() || taught || holder.as_ref().is_some_and(|answer| answer.moved),
                 state: status.state.to_string(),
                 trajectory: status.trajectory.to_string(),
+                falls: End::of(&status, &standstill).moving,
                 holder,
             });
         }

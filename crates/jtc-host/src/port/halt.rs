@@ -19,6 +19,7 @@ use super::line::HaltOutcome;
 #[cfg(unix)]
 use super::runtime;
 use super::standstill::Standstill;
+use crate::words;
 
 /// Most bytes of a request.
 pub(super) const REQUEST_MAX: usize = 1024;
@@ -26,7 +27,7 @@ pub(super) const REQUEST_MAX: usize = 1024;
 const ANSWER_MAX: usize = 4096;
 /// Most bytes of an end.
 pub(super) const END_MAX: usize = 1024;
-/// Longest wait for the answer of a program that has the port: longer than it takes to write a Stop six times.
+/// Longest wait for the answer of a program that has the port: longer than it takes to write a Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Longest wait for the end: longer than a stopped arm takes to come to rest.
 const REST: Duration = Duration::from_secs(6);
@@ -90,7 +91,7 @@ pub struct End {
     pub stands: bool,
     /// The arm moved before.
     pub moved: bool,
-    /// What still moves.
+    /// What still moves. In a state without torque that is no fault of the Stop.
     pub moving: Option<String>,
 }
 
@@ -115,13 +116,14 @@ impl Answer {
 impl End {
     /// Of the last status.
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
-        let moving = match standstill.fastest() {
-            Some((joint, speed)) => format!("{joint} moves at {speed:.2} rad/s"),
-            None if status.is_executing() => "the arm is on the path of a trajectory".to_owned(),
-            None => "the arm was not still for long enough".to_owned(),
-        };
         let stands = standstill.is_reached();
-        Self { stands, moved: standstill.moved(), moving: (!stands).then_some(moving) }
+        let moving = match words::moving_joint(status) {
+            Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
+            None if stands => None,
+            None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
+            None => Some("the arm was not still for long enough".to_owned()),
+        };
+        Self { stands, moved: standstill.moved(), moving }
     }
 }
 
@@ -130,7 +132,8 @@ pub fn this_program() -> String {
     let mut words = std::env::args();
     let name = words.next().unwrap_or_default();
     let name = std::path::Path::new(&name).file_name().map(|n| n.to_string_lossy().into_owned());
-    let words = words.filter(|word| !word.starts_with('-')).take(2);
+    let option = |word: &String| word.starts_with('-');
+    let words = words.skip_while(option).take_while(|word| !option(word)).take(2);
     let all: Vec<String> = name.into_iter().chain(words).collect();
     all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
 }

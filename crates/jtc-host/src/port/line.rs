@@ -16,7 +16,7 @@ use jtc_wire::{
     STATUS_LEN, Status, StatusReceiver, fixed,
 };
 
-use super::standstill::Standstill;
+use super::standstill::{Standstill, is_moving};
 use super::{PortError, line_time};
 
 /// Longest time in which a write finds no room.
@@ -30,7 +30,7 @@ const PIECE: Duration = Duration::from_millis(50);
 /// Time for the record of a Stop, beyond three statuses on the line.
 const AWAITED: Duration = Duration::from_millis(150);
 /// Number of times that a Stop is written before it counts as not confirmed.
-const TRIES: u32 = 6;
+const TRIES: u32 = 8;
 /// A frame whose record did not come for this time has none.
 const RECORD_TIME: Duration = Duration::from_secs(1);
 /// Time after another program's Stop in which no motion can be requested, as with an agent.
@@ -103,6 +103,8 @@ struct Input {
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
+    /// When the last status of a moving arm was read.
+    moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
     /// Frames Execute, Pause and Stop without a record, oldest first, with the number of those that the door wrote.
@@ -199,9 +201,10 @@ impl Line {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes another program's Stop or Pause, again until the controller has received it. `None`: it is not confirmed.
+    /// Writes another program's Stop or Pause, again until the controller has received it. `None`: it is not confirmed. An owner that
+    /// closes the port meanwhile waits for that: it ends because of the Stop.
     pub fn halt(&self, command: ExecCommand, by: &str) -> Result<Option<HaltOutcome>, PortError> {
-        let mut jogged = false;
+        let (begin, mut jogged) = (Instant::now(), false);
         // First of all nothing that moves the arm passes any more.
         self.urgently(|output| {
             output.halted = Some(Halted { by: by.to_owned(), at: Instant::now() });
@@ -209,13 +212,13 @@ impl Line {
             Ok(())
         })?;
         let _turn = lock(&self.turn);
-        let moved = jogged || self.moves();
+        let moved = jogged || self.moved_since(begin.checked_sub(RECENT).unwrap_or(begin));
         let first = lock(&self.seen).numbers;
         let mut record = None;
         for _ in 0..TRIES {
             self.write_urgent(&fixed::exec(command), true)?;
             record = self.record_since(first);
-            if record.is_some() || self.is_closing() {
+            if record.is_some() {
                 break;
             }
         }
@@ -227,7 +230,8 @@ impl Line {
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            moved: moved || taught,
+            // An owner that does not read leaves old statuses for now.
+            moved: moved || taught || self.moved_since(begin),
             status,
         }))
     }
@@ -254,10 +258,9 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// The arm moves on a path or by a jog, as the last status has it.
-    fn moves(&self) -> bool {
-        let recent = lock(&self.seen).status.filter(|(at, _)| at.elapsed() < RECENT);
-        recent.is_some_and(|(_, status)| super::standstill::is_moving(&status))
+    /// A status of a moving arm was read since then.
+    fn moved_since(&self, time: Instant) -> bool {
+        lock(&self.seen).moved_at.is_some_and(|at| at >= time)
     }
 
     /// The record of a Stop that was written with a number from `first` on.
@@ -273,7 +276,7 @@ impl Line {
                         return Some(record);
                     }
                 }
-                if seen.damaged != damaged || self.is_closing() || Instant::now() >= end {
+                if seen.damaged != damaged || Instant::now() >= end {
                     return None;
                 }
             }
@@ -286,7 +289,7 @@ impl Line {
         let seen = lock(&self.seen);
         let before = seen.statuses;
         let wait = Duration::from_millis(100);
-        let nothing_new = |seen: &mut Seen| seen.statuses == before && !self.is_closing();
+        let nothing_new = |seen: &mut Seen| seen.statuses == before;
         let waited = self.news.wait_timeout_while(seen, wait, nothing_new);
         if !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out() {
             return;
@@ -438,6 +441,9 @@ impl Seen {
         let response = status.response;
         self.statuses += 1;
         self.status = Some((Instant::now(), status));
+        if is_moving(&status) {
+            self.moved_at = Some(Instant::now());
+        }
         match response.status {
             FrameStatus::Idle => {}
             FrameStatus::NoError if response.frame_type == FrameType::TrajSetExecStatus as u8 => {

@@ -22,7 +22,7 @@ pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
 pub use list::{PortInfo, PortKind, list, only_one};
 pub use serial::{STANDARD_RATES, SerialPort};
-pub use standstill::Standstill;
+pub use standstill::{Standstill, is_moving};
 
 /// A byte stream to a controller, polled by one thread.
 ///

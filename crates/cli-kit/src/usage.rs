@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::variables::{Variables, on_off};
 use crate::{Failure, Output, exit, print_within};
@@ -18,6 +18,15 @@ const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 /// usage is one JSON object on stdout where `--json` or its variable asks for JSON, besides the words on stderr. Variables that set
 /// an option of the command are named on stderr.
 pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Result<Cli, ExitCode> {
+    parse_with(program, variables, &[])
+}
+
+/// Like `parse`. `meant` has words that people try as commands, each with the command to use.
+pub fn parse_with<Cli: Parser>(
+    program: &'static str,
+    variables: &Variables,
+    meant: &[(&str, &str)],
+) -> Result<Cli, ExitCode> {
     let typed: Vec<OsString> = std::env::args_os().skip(1).collect();
     let value = |name: &str| std::env::var_os(name);
     let mut command = Cli::command();
@@ -26,7 +35,7 @@ pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Resul
         Ok((cli, matches))
     });
     let out = Output::new(program, json_is_asked(typed.iter(), value(variables.json).as_deref()));
-    let e = match read {
+    let mut e = match read {
         Ok((cli, matches)) => {
             let report = variables.report(program, &command, &matches, value);
             if let Some(refused) = report.refused {
@@ -42,6 +51,7 @@ pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Resul
         }
         Err(e) => e,
     };
+    name_what_is_meant(&mut e, meant);
     let shown = e.print().and_then(|()| std::io::stdout().flush());
     if !e.use_stderr() {
         let _ = shown.inspect_err(Output::lose);
@@ -59,6 +69,16 @@ pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Resul
         Output::bytes(format!("{}\n", serde_json::json!({ "error": error })).as_bytes());
     }
     Err(ExitCode::from(exit::USAGE))
+}
+
+/// Replaces the parser's guess by the command to use, where a word is known that is no command.
+fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
+    let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return };
+    let word = word.to_lowercase();
+    if let Some((_, command)) = meant.iter().find(|(known, _)| *known == word) {
+        e.remove(ContextKind::SuggestedSubcommand);
+        e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![format!("use `{command}`").into()]));
+    }
 }
 
 /// The option among the words, as far as options go, or the variable with a value that means yes.

@@ -187,6 +187,12 @@ pub enum Command {
     /// Named positions in the arm file
     #[command(subcommand)]
     Pose(PoseCommand),
+    /// Stop on the path and end the execution
+    #[command(after_help = motion::STOP_EXAMPLES, aliases = ["halt", "estop", "e-stop", "abort"])]
+    Stop(LinkArgs),
+    /// Check, upload, execute, follow, report
+    #[command(after_help = motion::RUN_EXAMPLES)]
+    Run(RunArgs),
     /// Trajectories: check, run, pause, resume, stop
     #[command(subcommand)]
     Traj(TrajCommand),
@@ -285,6 +291,28 @@ pub enum Command {
     },
 }
 
+/// Words that people try, with the command to use.
+pub const MEANT: [(&str, &str); 15] = [
+    ("pause", "jtc traj pause"),
+    ("hold", "jtc traj pause"),
+    ("resume", "jtc traj resume"),
+    ("check", "jtc traj check FILE"),
+    ("replay", "jtc traj replay RECORDING"),
+    ("continue", "jtc traj continue RUN"),
+    ("start", "jtc run FILE"),
+    ("execute", "jtc run FILE"),
+    ("upload", "jtc run FILE"),
+    (
+        "home",
+        "jtc move --to home --arm FILE` (`jtc pose list` shows the poses of the arm file), or `jtc move --to 0,0,0,0,0,0",
+    ),
+    ("goto", "jtc move --to Q1,Q2,Q3,Q4,Q5,Q6"),
+    ("kill", "jtc stop"),
+    ("end", "jtc stop"),
+    ("version", "jtc --version"),
+    ("connect", "jtc status"),
+];
+
 impl Command {
     /// It moves the arm, or records a person moving it: its result cannot be had again.
     pub fn moves(&self) -> bool {
@@ -293,6 +321,7 @@ impl Command {
             Command::Demo(_)
                 | Command::Jog(_)
                 | Command::Move(_)
+                | Command::Run(_)
                 | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay { .. } | TrajCommand::Continue(_))
                 | Command::Teach(TeachCommand::Record { .. })
         )

@@ -27,11 +27,19 @@ impl LinkArgs {
 
     /// The same; `policy` is what becomes of a motion when this program goes, which needs an agent.
     pub fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
+        Ok(self.open_unless_busy(policy)??)
+    }
+
+    /// The same. The inner error is that of a serial port which no agent of this user owns.
+    pub fn open_unless_busy(
+        &self,
+        policy: Option<&'static str>,
+    ) -> Result<Result<LinkPort, PortError>, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
             let agent = registered().into_iter().find(|agent| agent.url == name.trim_end_matches('/'));
             let options = self.options(agent.as_ref(), policy)?;
-            return Ok(Box::new(AgentPort::open(&name, &options)?));
+            return Ok(Ok(Box::new(AgentPort::open(&name, &options)?)));
         }
         let Some(agent) = owner_of(&name) else {
             if let Some(policy) = policy.filter(|policy| *policy != "continue") {
@@ -41,7 +49,7 @@ impl LinkArgs {
                 return Err(Failure::nothing_sent(Failure::usage(what))
                     .hint(format!("`jtc serve --port {name}` is one")));
             }
-            return Ok(Box::new(SerialPort::open(&name, self.baud)?));
+            return Ok(SerialPort::open(&name, self.baud).map(|port| Box::new(port) as LinkPort));
         };
         let port = AgentPort::open(&agent.url, &self.options(Some(&agent), policy)?)?;
         if !is_same_port(&port.hello().port, &name) {
@@ -50,7 +58,7 @@ impl LinkArgs {
                 Failure::nothing_sent(Failure::usage(what)).hint("name the agent with --port http://…")
             );
         }
-        Ok(Box::new(port))
+        Ok(Ok(Box::new(port)))
     }
 
     /// How this program presents itself to an agent. A token goes to agents of this user only, and where its file was named.
@@ -77,12 +85,13 @@ impl LinkArgs {
             return Err(Failure::from(PortError::Busy { path: name })
                 .hint(format!("an agent owns it: `--port {}` uses it", agent.url)));
         }
-        Ok(SerialPort::open(&name, self.baud)?)
+        // Other programs stop the arm through the agent.
+        Ok(SerialPort::open_without_door(&name, self.baud)?)
     }
 }
 
 /// What others see of this program: its command, and who runs it.
-fn who() -> String {
+pub fn who() -> String {
     let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {
         Ok(user) if !user.is_empty() => format!("{user}: jtc {command}"),

@@ -21,7 +21,7 @@ use cli_kit::{Output, exit};
 use args::Cli;
 
 fn main() -> ExitCode {
-    let cli: Cli = match cli_kit::usage::parse("jtc", &args::VARIABLES) {
+    let cli: Cli = match cli_kit::usage::parse_with("jtc", &args::VARIABLES, &args::MEANT) {
         Ok(cli) => cli,
         Err(code) => return code,
     };

@@ -86,7 +86,7 @@ fn link(page: &mut Page, desk: &Desk) {
     page.case("No joint is jogged that fast", "jtc jog 1 5", &sim.run("jtc jog 1 5"));
     let second = "jtc sim --serial /tmp/jtc";
     page.case("A second simulator at the same place", second, &sim.run(second));
-    page.case("Stop, and nothing moves", "jtc traj stop", &sim.run("jtc traj stop"));
+    page.case("Stop, and nothing moves", "jtc stop", &sim.run("jtc stop"));
     page.case("Resume, and nothing is paused", "jtc traj resume", &sim.run("jtc traj resume"));
     let busy = sim.hold_port();
     page.case("Another program has the port", "jtc status", &sim.run("jtc status"));

@@ -6,6 +6,8 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+use jtc_host::port::runtime;
+
 /// An agent of this computer.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Registered {
@@ -34,55 +36,13 @@ impl Drop for Registration {
     }
 }
 
-/// The folder, if this user has one that is nobody else's.
-fn folder() -> Option<PathBuf> {
-    match std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| !dir.is_empty()) {
-        Some(dir) => Some(PathBuf::from(dir).join("openjtc")),
-        None => own_name().map(|name| std::env::temp_dir().join(name)),
-    }
-}
-
-#[cfg(unix)]
-fn own_name() -> Option<String> {
-    Some(format!("openjtc-{}", rustix::process::geteuid().as_raw()))
-}
-
-#[cfg(not(unix))]
-fn own_name() -> Option<String> {
-    None
-}
-
-/// The folder is this user's, and nobody else can write to it.
-#[cfg(unix)]
-fn is_own(folder: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    fs::symlink_metadata(folder).is_ok_and(|found| {
-        found.is_dir() && found.uid() == rustix::process::geteuid().as_raw() && found.mode() & 0o022 == 0
-    })
-}
-
-#[cfg(not(unix))]
-fn is_own(folder: &Path) -> bool {
-    folder.is_dir()
-}
-
 /// Writes the file of an agent. `None`: there is no place for it that nobody else can write to.
 ///
 /// # Errors
 ///
 /// It cannot be written.
 pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
-    let Some(folder) = folder() else { return Ok(None) };
-    let mut builder = fs::DirBuilder::new();
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    match builder.create(&folder) {
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
-        _ => {}
-    }
-    if !is_own(&folder) {
-        return Ok(None);
-    }
+    let Some(folder) = runtime::create()? else { return Ok(None) };
     let path = folder.join(format!("{}.json", std::process::id()));
     let mut file = File::create(&path)?;
     // Before anything is in it: an agent that has no lock is none.
@@ -93,7 +53,7 @@ pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
 
 /// The agents that are there.
 pub fn registered() -> Vec<Registered> {
-    let Some(folder) = folder().filter(|folder| is_own(folder)) else { return Vec::new() };
+    let Some(folder) = runtime::folder().filter(|folder| runtime::is_own(folder)) else { return Vec::new() };
     let files = fs::read_dir(folder).into_iter().flatten().flatten();
     files.filter_map(|file| alive(&file.path())).collect()
 }

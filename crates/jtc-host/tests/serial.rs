@@ -4,8 +4,10 @@
 use std::io::{Read, Write};
 use std::time::Duration;
 
+use jtc_host::port::halt::{self, Halt};
 use jtc_host::port::{PortError, STANDARD_RATES, SerialPort};
-use jtc_host::{Diagnose, Port};
+use jtc_host::{Diagnose, Port, frame};
+use jtc_wire::{DataStatus, FrameType, RawPoint, Response, Status, fixed};
 use serialport::{SerialPort as _, TTYPort};
 
 /// The far end, and the path of the near one.
@@ -53,4 +55,74 @@ fn what_is_wrong_is_said_with_the_next_command() {
     drop(far);
     let error = port.read(&mut [0; 8], Duration::from_secs(1)).expect_err("gone");
     assert!(matches!(error, PortError::Gone { .. }), "{error}");
+}
+
+/// The door of this port.
+fn door(path: &str) -> std::path::PathBuf {
+    let mut sockets = halt::sockets_of(path).into_iter().filter(|socket| halt::is_alive(socket));
+    sockets.next().expect("the program listens")
+}
+
+fn status(response: Response) -> [u8; jtc_wire::STATUS_LEN] {
+    Status { response, ..Status::default() }.emit()
+}
+
+/// J-03: a Stop comes between two frames. A long one that is half written is given up, and no piece of it follows.
+#[test]
+fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
+    let (mut far, path) = pair();
+    let mut port = SerialPort::open(&path, 115_200).unwrap();
+    let segment = frame::segment(0, 0, 2, 1, &[RawPoint::default(); 100]).unwrap();
+    port.write_all(&segment[..300]).unwrap();
+    let socket = door(&path);
+    let asked = std::thread::spawn(move || halt::ask(&socket, Halt::Stop, "a test"));
+    let mut got = vec![0; 300 + fixed::STOP.len()];
+    far.read_exact(&mut got).unwrap();
+    assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
+    let error = port.write_all(&segment[300..]).expect_err("it was given up");
+    assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
+    // Nothing that moves the arm passes any more, and what does not still does.
+    assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
+    assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
+    port.write_all(&fixed::PAUSE).unwrap();
+    port.write_all(&fixed::GET_INFO).unwrap();
+    let mut got = vec![0; fixed::PAUSE.len() + fixed::GET_INFO.len()];
+    far.read_exact(&mut got).unwrap();
+    assert_eq!(got, [&fixed::PAUSE[..], &fixed::GET_INFO].concat());
+    // The owner does not read: the record is found all the same, and the owner has its bytes later.
+    let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
+    far.write_all(&status(record)).unwrap();
+    let (answer, _) = loop {
+        // Statuses come on, as those of a controller do.
+        far.write_all(&status(Response::default())).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+        if asked.is_finished() {
+            break asked.join().unwrap().unwrap().unwrap();
+        }
+    };
+    assert_eq!((answer.confirmed, answer.accepted, answer.moved), (true, false, false), "{answer:?}");
+    let mut first = [0; jtc_wire::STATUS_LEN];
+    assert_eq!(port.read(&mut first, Duration::from_secs(1)).unwrap(), first.len());
+    assert_eq!(first, status(record));
+}
+
+/// What arrived damaged, or is not answered, is written again; at the end the asker learns that nothing is confirmed.
+#[test]
+fn a_stop_is_written_until_the_controller_confirms_it() {
+    let (mut far, path) = pair();
+    let port = SerialPort::open(&path, 115_200).unwrap();
+    let socket = door(&path);
+    let asked = std::thread::spawn(move || halt::ask(&socket, Halt::Stop, "a test"));
+    let mut got = [0; fixed::STOP.len()];
+    for _ in 0..8 {
+        far.read_exact(&mut got).unwrap();
+        assert_eq!(got, fixed::STOP);
+    }
+    let error = asked.join().unwrap().expect_err("nothing confirms it");
+    assert!(
+        matches!(error, PortError::NotHalted { .. }) && error.hint().contains("emergency stop"),
+        "{error}"
+    );
+    drop(port);
+    assert!(halt::sockets_of(&path).is_empty(), "the socket goes with the port");
 }

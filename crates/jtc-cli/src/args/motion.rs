@@ -6,6 +6,23 @@ use clap::{Args, Subcommand};
 
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
+/// Help of `jtc run` and `jtc traj run`.
+pub(super) const RUN_EXAMPLES: &str = "The motion runs at 100 % of the file's own speed. An approach runs at --speed, and at half of the limits at most;\n\
+                            without --speed at 10 % of the limits, and at 25 % in a simulator.\n\
+                            On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
+                            Ctrl-C stops on the path, then ends; a second one ends at once.\n\
+                            Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
+                            program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
+                            moves; if that happens on the way (full disk), it is reported at once, the motion goes on as it was checked, and\n\
+                            the command ends with exit code 5.\n\nExamples:\n  jtc run motion.csv --approach\n  \
+                            jtc traj run motion.csv --speed 10 --record run.mcap\n  \
+                            jtc traj run cycle.csv --approach --repeat 10";
+
+/// Help of `jtc stop` and `jtc traj stop`.
+pub(super) const STOP_EXAMPLES: &str = "The Stop reaches the arm also when an agent or another program of this user has the port. Without --port, or JTC_PORT, it goes to\n\
+                            every arm whose port they have, else to the only port found. It ends with exit code 0 when the arm stands, also when\n\
+                            nothing was moving. It does not replace the emergency stop.\n\nExamples:\n  jtc stop\n  jtc traj stop --port /dev/ttyUSB0";
+
 /// What a trajectory is checked against.
 #[derive(Args, Clone, Debug)]
 pub struct CheckArgs {
@@ -54,18 +71,7 @@ pub enum TrajCommand {
         deg: bool,
     },
     /// Check, upload, execute, follow, report
-    #[command(
-        after_help = "The motion runs at 100 % of the file's own speed. An approach runs at --speed, and at half of the limits at most;\n\
-                            without --speed at 10 % of the limits, and at 25 % in a simulator.\n\
-                            On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
-                            Ctrl-C stops on the path, then ends; a second one ends at once.\n\
-                            Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
-                            program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
-                            moves; if that happens on the way (full disk), it is reported at once, the motion goes on as it was checked, and\n\
-                            the command ends with exit code 5.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
-                            jtc traj run motion.csv --speed 10 --record run.mcap\n  \
-                            jtc traj run cycle.csv --approach --repeat 10"
-    )]
+    #[command(after_help = RUN_EXAMPLES)]
     Run(RunArgs),
     /// Run again what a recording is of: its trajectory, or the way that was measured
     #[command(
@@ -107,7 +113,7 @@ pub enum TrajCommand {
     )]
     Resume(ResumeArgs),
     /// Stop on the path and end the execution
-    #[command(after_help = "Examples:\n  jtc traj stop")]
+    #[command(after_help = STOP_EXAMPLES)]
     Stop(LinkArgs),
     /// Speed override: the speed on the path in percent, while it runs and of what runs later
     #[command(

@@ -38,7 +38,7 @@ pub struct ServeArgs {
     )]
     pub allow_origins: Vec<String>,
     /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
-    #[arg(id = "link_with_token", long = "link", )]
+    #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]

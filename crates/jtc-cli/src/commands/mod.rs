@@ -10,6 +10,7 @@ mod dynamics;
 mod example;
 mod explain;
 mod firmware;
+mod halt;
 mod help;
 mod info;
 mod job;
@@ -61,6 +62,8 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Plan(args) => plan::plan(&args, out),
         Command::Move(args) => moves::move_to(&args, out),
         Command::Pose(command) => pose::pose(&command, out),
+        Command::Stop(link) => halt::stop(&link, out),
+        Command::Run(args) => run::run(&args, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),
         Command::Log(command) => log::log(&command, out),

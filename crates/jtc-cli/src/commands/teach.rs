@@ -104,7 +104,12 @@ fn record(
                     }
                 }
             }
-            Ok(_) => {}
+            // A Stop of another program holds the arm: the person who leads it has let go, or is about to.
+            Ok(s) => {
+                teaching.store(false, Ordering::Relaxed);
+                failed = Some(taught_no_more(&s));
+                break;
+            }
             Err(failure) => {
                 failed = Some(failure);
                 break;
@@ -118,6 +123,12 @@ fn record(
         teaching.store(false, Ordering::Relaxed);
     }
     failed.map_or(written, Err)
+}
+
+/// Teaching has ended, and not by this command.
+fn taught_no_more(status: &Status) -> Failure {
+    let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
+    Failure::new(ErrorKind::Fault, "not-teaching", message).hint("`jtc teach record FILE` starts a new one")
 }
 
 /// Ctrl-C: the first one is asked for, the second one ends the command with what is so at that moment.

@@ -1,4 +1,4 @@
-//! `jtc traj check`, `info`, `pause`, `resume`, `stop`: trajectories from files, and the one being executed.
+//! `jtc traj check`, `info`, `speed`: trajectories from files, and the one being executed.
 
 use std::path::Path;
 
@@ -7,15 +7,12 @@ use jtc_core::{Config, Payload};
 use jtc_host::check::Verdict;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded};
-use jtc_host::{Error, Session};
 use jtc_wire::Joint;
 use serde_json::json;
 
 use super::job::{Job, typed};
-use super::{continued, resume, run};
+use super::{continued, halt, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
-use crate::link::LinkPort;
-use crate::progress::Progress;
 
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
@@ -27,17 +24,9 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         TrajCommand::Run(args) => run::run(args, out),
         TrajCommand::Replay { run: args, measured } => replay(args, *measured, out),
         TrajCommand::Continue(args) => continued::continued(args, out),
-        TrajCommand::Pause(link) => send(
-            || link.session().map_err(may_be_moving),
-            Session::pause,
-            "pause",
-            "pausing on the path",
-            out,
-        ),
+        TrajCommand::Pause(link) => halt::pause(link, out),
         TrajCommand::Resume(args) => resume::resume(args, out),
-        TrajCommand::Stop(link) => {
-            send(|| link.session().map_err(may_be_moving), Session::stop, "stop", "stopping on the path", out)
-        }
+        TrajCommand::Stop(link) => halt::stop(link, out),
         TrajCommand::Speed { percent, link } => speed(*percent, link, out),
     }
 }
@@ -74,31 +63,6 @@ fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let speed = 100.0 * session.speed()?;
     out.result(&json!({ "speed_percent": speed }), || format!("speed on the path: {} %", figure(speed, 1)));
     Ok(())
-}
-
-fn send(
-    open: impl FnOnce() -> Result<Session<LinkPort>, Failure>,
-    command: impl FnOnce(&mut Session<LinkPort>) -> Result<(), Error>,
-    name: &str,
-    words: &str,
-    out: &Output,
-) -> Result<(), Failure> {
-    let progress = Progress::begin(out)?;
-    let mut session = open()?;
-    progress.watch(&mut session);
-    command(&mut session)?;
-    out.result(&json!({ "command": name, "accepted": true }), || words.to_owned());
-    Ok(())
-}
-
-/// Whoever wants an arm to stand and has no port must know that nothing was sent.
-fn may_be_moving(failure: Failure) -> Failure {
-    let hint = format!(
-        "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
-         stops there). {}",
-        failure.hint
-    );
-    Failure { hint, ..failure }
 }
 
 fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Result<(), Failure> {

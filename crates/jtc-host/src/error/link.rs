@@ -125,7 +125,7 @@ impl LinkError {
             Self::Refused { .. }
                 | Self::Denied { .. }
                 | Self::NoExtension { .. }
-                | Self::Port(PortError::Halted)
+                | Self::Port(PortError::Halted { .. })
         )
     }
 }

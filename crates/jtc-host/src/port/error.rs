@@ -87,9 +87,32 @@ pub enum PortError {
         /// Name given.
         path: String,
     },
-    /// The port withholds a frame that would move the arm: somebody stopped the arm since it was asked for.
-    #[error("not sent: the arm was stopped since this was asked for")]
-    Halted,
+    /// The port withholds a frame that would move the arm: the arm was stopped after the motion was requested.
+    #[error("not sent: {} after this motion was requested", stopped_by(by.as_deref()))]
+    Halted {
+        /// The program that stopped the arm, where it is another one.
+        by: Option<String>,
+    },
+    /// The program that has the port does not answer a Stop or Pause.
+    #[error("{}: the program that has this port{} did not answer within {seconds:.0} s", path, process_words(*process))]
+    HolderSilent {
+        /// Name of the port or of its socket.
+        path: String,
+        /// Its process number.
+        process: Option<i32>,
+        /// Time that was waited, s.
+        seconds: f64,
+    },
+    /// The program that has the port could not get a Stop or Pause to the controller.
+    #[error("{path}: the controller has not confirmed it to {holder}, which has this port{}", what.as_ref().map_or(String::new(), |what| format!(" ({what})")))]
+    NotHalted {
+        /// Name of the port.
+        path: String,
+        /// The program.
+        holder: String,
+        /// Why, where the frame could not be written.
+        what: Option<String>,
+    },
     /// Anything else that the operating system reports.
     #[error("{path}: {source}")]
     Io {
@@ -98,6 +121,14 @@ pub enum PortError {
         /// Its words.
         source: io::Error,
     },
+}
+
+fn stopped_by(program: Option<&str>) -> String {
+    program.map_or("the arm was stopped".to_owned(), |program| format!("{program} stopped the arm"))
+}
+
+fn process_words(process: Option<i32>) -> String {
+    process.map_or(String::new(), |process| format!(" (process {process})"))
 }
 
 impl Diagnose for PortError {
@@ -128,12 +159,15 @@ impl Diagnose for PortError {
                     .into()
             }
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
-            PortError::Halted => "`jtc status` shows where the arm is".into(),
+            PortError::Halted { .. } => "`jtc status` shows where the arm is".into(),
+            PortError::HolderSilent { .. } | PortError::NotHalted { .. } => {
+                "if the arm is moving, press the emergency stop".into()
+            }
             PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
         };
         let (kind, code) = match self {
             PortError::NotLetIn { .. } => (ErrorKind::Refused, "not-let-in"),
-            PortError::Halted => (ErrorKind::Fault, "cancelled"),
+            PortError::Halted { .. } => (ErrorKind::Fault, "cancelled"),
             PortError::NoAgent { .. } | PortError::AgentGone { .. } => (ErrorKind::NoLink, "no-agent"),
             _ => (ErrorKind::NoLink, "port"),
         };

@@ -55,7 +55,7 @@ pub fn list() -> Result<Vec<PortInfo>, PortError> {
     let mut ports: Vec<PortInfo> = found
         .into_iter()
         .map(|p| PortInfo {
-            problem: SerialPort::open(&p.port_name, 115_200).err(),
+            problem: SerialPort::open_without_door(&p.port_name, 115_200).err(),
             kind: kind(p.port_type),
             path: p.port_name,
         })

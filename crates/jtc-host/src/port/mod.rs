@@ -1,11 +1,19 @@
 //! Ways to the controller: serial ports, the simulator in this process, and what can be wrapped around them.
 
 mod capture;
+#[cfg(unix)]
+mod door;
 mod error;
+#[cfg_attr(not(unix), allow(dead_code))]
+pub mod halt;
+#[cfg_attr(not(unix), allow(dead_code))]
+mod line;
 mod list;
+pub mod runtime;
 mod serial;
 #[cfg(feature = "sim")]
 pub mod sim;
+mod standstill;
 pub mod test;
 
 use std::time::Duration;
@@ -14,6 +22,7 @@ pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
 pub use list::{PortInfo, PortKind, list, only_one};
 pub use serial::{STANDARD_RATES, SerialPort};
+pub use standstill::{Standstill, is_moving};
 
 /// A byte stream to a controller, polled by one thread.
 ///

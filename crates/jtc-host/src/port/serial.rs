@@ -1,10 +1,15 @@
-//! Serial ports of this computer, pseudo-terminals included: 8N1, no flow control, opened for this program alone.
+//! Serial ports of this computer, pseudo-terminals included: 8N1, no flow control, opened for this program alone. Other programs of the
+//! same user can stop the arm through the port's [door](super::halt).
 
-use std::io::{self, Read, Write};
+use std::io;
 #[cfg(unix)]
 use std::os::unix::fs::FileTypeExt as _;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Duration;
 
+#[cfg(unix)]
+use super::door::Door;
+use super::line::Line;
 use super::{Port, PortError};
 
 /// Rates up to 15 MBd that adapters know; any other number may work too.
@@ -13,27 +18,33 @@ pub const STANDARD_RATES: [u32; 16] = [
     2_000_000, 3_000_000, 4_000_000, 12_000_000, 15_000_000,
 ];
 
-/// How long one write may find no room.
-const STALL: Duration = Duration::from_secs(5);
-/// Bytes handed over at once, so that a stalled line is noticed.
-const CHUNK: usize = 256;
-
 /// An open serial port.
 pub struct SerialPort {
-    port: Box<dyn serialport::SerialPort>,
-    path: String,
-    baud: u32,
-    start: Instant,
-    timeout: Duration,
+    /// Closed before the line is.
+    #[cfg(unix)]
+    _door: Option<Door>,
+    line: Arc<Line>,
 }
 
 impl SerialPort {
-    /// Opens `path` at `baud`.
+    /// Opens `path` at `baud`, with a door: other programs of this user can stop the arm while this one has the port.
     ///
     /// # Errors
     ///
     /// The port is not there, is used by another program, may not be opened by this user, or does not take the rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
+        let port = Self::open_without_door(path, baud)?;
+        #[cfg(unix)]
+        let port = Self { _door: Door::open(&port.line), ..port };
+        Ok(port)
+    }
+
+    /// Like `open`, without a door: for a program that other programs reach in another way, as an agent.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`SerialPort::open`].
+    pub fn open_without_door(path: &str, baud: u32) -> Result<Self, PortError> {
         // The builder reports a missing port in several ways; ask the file system first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
@@ -51,21 +62,12 @@ impl SerialPort {
             .timeout(Duration::from_millis(10))
             .open()
             .map_err(|e| opening(path, baud, e))?;
+        let line = Arc::new(Line::new(path, baud, port)?);
         Ok(Self {
-            port,
-            path: path.to_owned(),
-            baud,
-            start: Instant::now(),
-            timeout: Duration::from_millis(10),
+            #[cfg(unix)]
+            _door: None,
+            line,
         })
-    }
-
-    fn set_timeout(&mut self, timeout: Duration) -> Result<(), PortError> {
-        if timeout != self.timeout {
-            self.port.set_timeout(timeout).map_err(|e| PortError::io(&self.path, e.into()))?;
-            self.timeout = timeout;
-        }
-        Ok(())
     }
 }
 
@@ -89,51 +91,29 @@ fn opening(path: &str, baud: u32, error: serialport::Error) -> PortError {
     }
 }
 
-fn nothing_yet(e: &io::Error) -> bool {
-    matches!(e.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
-}
-
 impl Port for SerialPort {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
-        self.set_timeout(timeout)?;
-        match self.port.read(buffer) {
-            Ok(n) => Ok(n),
-            Err(e) if nothing_yet(&e) => Ok(0),
-            Err(e) => Err(PortError::io(&self.path, e)),
-        }
+        self.line.read(buffer, timeout)
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.set_timeout(STALL)?;
-        for chunk in bytes.chunks(CHUNK) {
-            let mut rest = chunk;
-            while !rest.is_empty() {
-                match self.port.write(rest) {
-                    Ok(0) => return Err(PortError::Gone { path: self.path.clone() }),
-                    Ok(n) => rest = &rest[n..],
-                    Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                    Err(e) if nothing_yet(&e) => {
-                        return Err(PortError::Stalled {
-                            path: self.path.clone(),
-                            seconds: STALL.as_secs_f64(),
-                        });
-                    }
-                    Err(e) => return Err(PortError::io(&self.path, e)),
-                }
-            }
-        }
-        Ok(())
+        self.line.write_all(bytes)
     }
 
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.line.start.elapsed()
     }
 
     fn baud(&self) -> Option<u32> {
-        Some(self.baud)
+        Some(self.line.baud)
     }
 
     fn name(&self) -> String {
-        self.path.clone()
+        self.line.path.clone()
+    }
+
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        self.line.ask_to_move();
+        Ok(())
     }
 }

@@ -118,7 +118,7 @@ impl<P: Port> Session<P> {
                 // The motion goes on as it was, or stays paused, and is followed.
                 (
                     Flow::Resume,
-                    Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted))),
+                    Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
                 ) => {}
                 (
                     Flow::Resume,

@@ -98,7 +98,7 @@ impl Machine {
             self.shared.set_moves(false);
         }
         match jogged {
-            Err(Error::Link(LinkError::Port(PortError::Halted))) | Ok(()) if asked.is_halted() => {
+            Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) | Ok(()) if asked.is_halted() => {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
@@ -116,7 +116,7 @@ impl Machine {
         self.teaching = true;
         let begun = self.session.teach_until(|| asked.is_halted());
         if let Err(Error::Link(
-            LinkError::Refused { .. } | LinkError::Denied { .. } | LinkError::Port(PortError::Halted),
+            LinkError::Refused { .. } | LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }),
         )) = &begun
         {
             self.teaching = before;

@@ -270,7 +270,7 @@ impl Machine {
         );
         self.observe();
         self.tape.pause();
-        if let Err(Error::Link(LinkError::Port(PortError::Halted))) = outcome {
+        if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = outcome {
             // Stopped before it began.
             self.shared.set_moves(false);
             return Err(Error::Cancelled.into());

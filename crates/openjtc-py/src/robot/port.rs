@@ -138,7 +138,7 @@ impl AnyPort {
             return Ok(());
         }
         self.shared.set_moves(moved_before);
-        Err(PortError::Halted)
+        Err(PortError::Halted { by: None })
     }
 
     fn touch(&mut self) {

@@ -28,7 +28,7 @@ pub struct ServeArgs {
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
-    #[arg(id = "link_with_token", long = "link", )]
+    #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// File to which each command is appended: who, what, when, result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]

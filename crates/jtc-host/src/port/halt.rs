@@ -1,0 +1,296 @@
+//! A Stop or Pause by another program of the same user: what is said at the [door](super) of the program that has the port.
+//!
+//! The asker sends one line, a [`Request`] as JSON. The program that has the port writes the frame to the line, answers with an
+//! [`Answer`], and with an [`End`] when the arm stands.
+
+use std::io;
+use std::time::Duration;
+#[cfg(unix)]
+use std::{
+    os::unix::net::UnixStream,
+    path::{Path, PathBuf},
+};
+
+use jtc_wire::{ExecCommand, Status};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::PortError;
+use super::line::HaltOutcome;
+#[cfg(unix)]
+use super::runtime;
+use super::standstill::Standstill;
+use crate::words;
+
+/// Most bytes of a request.
+pub(super) const REQUEST_MAX: usize = 1024;
+/// Most bytes of an answer.
+const ANSWER_MAX: usize = 4096;
+/// Most bytes of an end.
+pub(super) const END_MAX: usize = 1024;
+/// Longest wait for the answer of a program that has the port: longer than it takes to write a Stop eight times.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Longest wait for the end: longer than a stopped arm takes to come to rest.
+const REST: Duration = Duration::from_secs(6);
+
+/// What another program is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Halt {
+    /// Stop on the path and end the execution.
+    Stop,
+    /// Pause on the path.
+    Pause,
+}
+
+impl Halt {
+    /// The command to the controller.
+    pub fn command(self) -> ExecCommand {
+        match self {
+            Self::Stop => ExecCommand::Stop,
+            Self::Pause => ExecCommand::Pause,
+        }
+    }
+}
+
+/// What is asked for, and by whom.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Request {
+    pub halt: Halt,
+    pub by: String,
+}
+
+/// What became of the frame.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The program that has the port.
+    pub program: String,
+    /// Its process number.
+    pub pid: u32,
+    /// The port, as that program opened it.
+    pub port: String,
+    /// Its rate, Bd.
+    pub baud: u32,
+    /// The controller has received the frame.
+    pub confirmed: bool,
+    /// The controller accepted it: there was something to stop.
+    pub accepted: bool,
+    /// The arm moved when the frame came.
+    pub moved: bool,
+    /// State of the controller.
+    pub state: String,
+    /// Trajectory execution state.
+    pub trajectory: String,
+    /// Why the frame could not be written.
+    pub error: Option<String>,
+}
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct End {
+    /// The arm stands.
+    pub stands: bool,
+    /// The arm moved before.
+    pub moved: bool,
+    /// What still moves. In a state without torque that is no fault of the Stop.
+    pub moving: Option<String>,
+}
+
+impl Answer {
+    pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
+        let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
+        match done {
+            Ok(Some(HaltOutcome { accepted, moved, status })) => Self {
+                confirmed: true,
+                accepted,
+                moved,
+                state: status.state.to_string(),
+                trajectory: status.trajectory.to_string(),
+                ..own
+            },
+            Ok(None) => own,
+            Err(error) => Self { error: Some(error.to_string()), ..own },
+        }
+    }
+}
+
+impl End {
+    /// Of the last status.
+    pub fn of(status: &Status, standstill: &Standstill) -> Self {
+        let stands = standstill.is_reached();
+        let moving = match words::moving_joint(status) {
+            Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
+            None if stands => None,
+            None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
+            None => Some("the arm was not still for long enough".to_owned()),
+        };
+        Self { stands, moved: standstill.moved(), moving }
+    }
+}
+
+/// What this program is called: its name and the first words of its command line.
+pub fn this_program() -> String {
+    let mut words = std::env::args();
+    let name = words.next().unwrap_or_default();
+    let name = std::path::Path::new(&name).file_name().map(|n| n.to_string_lossy().into_owned());
+    let option = |word: &String| word.starts_with('-');
+    let words = words.skip_while(option).take_while(|word| !option(word)).take(2);
+    let all: Vec<String> = name.into_iter().chain(words).collect();
+    all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
+}
+
+/// The user at the other end may stop the arm: it is the one that runs this program.
+#[cfg(unix)]
+pub(super) fn may_ask(user: u32) -> bool {
+    user == rustix::process::geteuid().as_raw()
+}
+
+/// The user at the other end of a socket. Where the system does not tell, the rights of the folder and of the socket let no other in.
+#[cfg(target_os = "linux")]
+pub(super) fn peer(stream: &UnixStream) -> Option<u32> {
+    rustix::net::sockopt::socket_peercred(stream).ok().map(|peer| peer.uid.as_raw())
+}
+
+/// The same where the system does not tell.
+#[cfg(all(unix, not(target_os = "linux")))]
+pub(super) fn peer(_: &UnixStream) -> Option<u32> {
+    Some(rustix::process::geteuid().as_raw())
+}
+
+/// The process at the other end of a socket, where the system tells.
+#[cfg(unix)]
+fn process(stream: &UnixStream) -> Option<i32> {
+    #[cfg(target_os = "linux")]
+    return rustix::net::sockopt::socket_peercred(stream).ok().map(|peer| peer.pid.as_raw_nonzero().get());
+    #[cfg(not(target_os = "linux"))]
+    return None.filter(|_: &i32| stream.peer_addr().is_ok());
+}
+
+/// The name of the socket of a port: the number of its device, which all its names share.
+#[cfg(unix)]
+pub(super) fn socket_name(port: &str) -> Option<String> {
+    use std::os::unix::fs::MetadataExt as _;
+    Some(format!("line-{:x}.sock", std::fs::metadata(port).ok()?.rdev()))
+}
+
+/// The sockets where a program that has this port may listen.
+#[cfg(unix)]
+pub fn sockets_of(port: &str) -> Vec<PathBuf> {
+    let Some(name) = socket_name(port) else { return Vec::new() };
+    runtime::folders().into_iter().map(|folder| folder.join(&name)).filter(|path| path.exists()).collect()
+}
+
+/// The sockets of all ports that programs of this user have, and of programs that were killed.
+#[cfg(unix)]
+pub fn sockets() -> Vec<PathBuf> {
+    let files = runtime::folders().into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
+    let named = |path: &PathBuf| {
+        path.file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(|name| name.starts_with("line-") && name.ends_with(".sock"))
+    };
+    files.flatten().map(|file| file.path()).filter(named).collect()
+}
+
+/// A program listens at this socket.
+#[cfg(unix)]
+pub fn is_alive(socket: &Path) -> bool {
+    UnixStream::connect(socket).is_ok()
+}
+
+/// Asks the program that listens at this socket. `None`: none does, or it ended before it answered.
+///
+/// # Errors
+///
+/// [`PortError::HolderSilent`] when the program does not answer, [`PortError::NotHalted`] when the frame did not get to the controller.
+#[cfg(unix)]
+pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option<End>)>, PortError> {
+    let Ok(stream) = UnixStream::connect(socket) else { return Ok(None) };
+    if !peer(&stream).is_some_and(may_ask) {
+        return Ok(None);
+    }
+    let process = process(&stream);
+    let said = |error: io::Error| match error.kind() {
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => Err(PortError::HolderSilent {
+            path: socket.display().to_string(),
+            process,
+            seconds: PATIENCE.as_secs_f64(),
+        }),
+        _ => Ok(None),
+    };
+    let request = Request { halt, by: by.to_owned() };
+    let set = stream.set_read_timeout(Some(PATIENCE)).and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+    let answered =
+        set.and_then(|()| write_line(&stream, &request)).and_then(|()| read_line(&stream, ANSWER_MAX));
+    let answer: Answer = match answered {
+        Ok(answer) => answer,
+        Err(error) => return said(error),
+    };
+    if !answer.confirmed {
+        let holder = format!("{} (process {})", answer.program, answer.pid);
+        return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
+    }
+    // A program that was stopped may end before the arm stands.
+    let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
+    Ok(Some((answer, end)))
+}
+
+/// Reads one line of at most `most` bytes.
+pub(super) fn read_line<T: DeserializeOwned>(mut stream: impl io::Read, most: usize) -> io::Result<T> {
+    let (mut line, mut byte) = (Vec::new(), [0]);
+    while line.last() != Some(&b'\n') {
+        if line.len() >= most {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        match stream.read(&mut byte)? {
+            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
+            _ => line.push(byte[0]),
+        }
+    }
+    Ok(serde_json::from_slice(&line)?)
+}
+
+/// Writes one line.
+pub(super) fn write_line<T: Serialize>(mut stream: impl io::Write, what: &T) -> io::Result<()> {
+    let mut line = serde_json::to_vec(what)?;
+    line.push(b'\n');
+    stream.write_all(&line)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    /// Another user may not stop the arm, wherever its request comes from.
+    #[test]
+    fn the_request_of_another_user_is_refused() {
+        let own = rustix::process::geteuid().as_raw();
+        assert!(may_ask(own));
+        for other in [own + 1, own.wrapping_sub(1), own + 1000, 65_534, u32::MAX]
+            .into_iter()
+            .filter(|user| *user != own)
+        {
+            assert!(!may_ask(other), "{other}");
+        }
+        let (one, other) = UnixStream::pair().unwrap();
+        assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
+    }
+
+    #[test]
+    fn a_line_is_bounded_and_whole() {
+        let request = |text: &str| read_line::<Request>(text.as_bytes(), 64);
+        let good = request("{\"halt\":\"stop\",\"by\":\"x\"}\nmore").unwrap();
+        assert_eq!(good, Request { halt: Halt::Stop, by: "x".into() });
+        let long = format!("{{\"halt\":\"stop\",\"by\":\"{}\"}}\n", "x".repeat(64));
+        for bad in [
+            &long[..],
+            "",
+            "\n",
+            "{}\n",
+            "{\"halt\":\"stop\",\"by\":\"x\"}",
+            "{\"halt\":\"execute\",\"by\":\"\"}\n",
+            "\u{7f}\n",
+        ] {
+            assert!(request(bad).is_err(), "{bad}");
+        }
+    }
+}

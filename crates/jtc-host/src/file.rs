@@ -7,7 +7,8 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 /// Largest file that is read.
 pub const FILE_MAX: u64 = 64 << 20;
 /// Why the numbers of a file that names its units are not read as degrees.
-pub(crate) const UNITS_KNOWN: &str = "the units of this file are known: its numbers are not taken as degrees; leave --deg out";
+pub(crate) const UNITS_KNOWN: &str =
+    "the units of this file are known: its numbers are not taken as degrees; leave --deg out";
 
 /// Why a file cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -77,6 +77,16 @@ impl SharedLine {
         for id in first.into_iter().chain(then) {
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
+            if frame.class == Class::Ask
+                && let Err(denied) = self.may_ask(id, now)
+            {
+                if let Some(frame) = self.clients.get_mut(&id).and_then(Client::take_waiting) {
+                    self.refuse(id, &frame, denied);
+                }
+                continue;
+            }
+            let Some(client) = self.clients.get_mut(&id) else { continue };
+            let Some(frame) = client.waiting.front() else { continue };
             // What is returned has no number: one request of those at a time (J-50).
             let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
@@ -122,7 +132,7 @@ impl SharedLine {
                 self.halts.motion_written();
                 self.moving.begun(frame_type, at);
             }
-            _ if frame_type == FrameType::SetSettings && !abandoned => self.supervision.take_set(&bytes),
+            _ if frame_type == FrameType::SetSettings && !abandoned => self.supervision.note_written(&bytes),
             _ if frame_type == FrameType::Trajectory && !abandoned => self.moving.uploaded(at),
             _ if frame_type == FrameType::TeachingModeDisable && !abandoned => self.moving.taught(),
             _ => {}
@@ -159,9 +169,13 @@ impl SharedLine {
 
     fn take_status(&mut self, status: Status, frame: &[u8], now: Duration) {
         self.status = Some((now, status));
+        self.supervision.take_status(&status);
         let answered = status.response().map_or_else(Vec::new, |response| self.whose(response, now));
         for (client, response) in &answered {
             let taken = response.status == FrameStatus::NoError;
+            if taken && response.frame_type == FrameType::SetSettings as u8 {
+                self.supervision.take_record(response);
+            }
             if taken
                 && response.data != DataStatus::NoError
                 && response.frame_type == FrameType::TeachingModeEnable as u8

@@ -3,15 +3,17 @@
 use std::time::Duration;
 
 use jtc_host::session::host_timeout_ms;
-use jtc_wire::{Answer, Command, FrameRef};
+use jtc_wire::{Answer, Command, ControllerState, FrameRef, Response, Status};
 
 use super::{ClientId, Denied, SharedLine};
 
 /// What is known of the controller's supervision of its host.
 #[derive(Debug, Default)]
 pub(super) struct Supervision {
-    /// Its `host_timeout_ms`, as it was last read or set on this line; none without supervision.
+    /// Its `host_timeout_ms`, as it was last read or set on this line; none without supervision, and where it is not known.
     timeout: Option<Duration>,
+    /// That of a SetSettings whose record has not come, ms.
+    written_ms: Option<f64>,
 }
 
 impl Supervision {
@@ -28,17 +30,32 @@ impl Supervision {
         }
     }
 
-    /// Takes the timeout from a SetSettings that was written. Where the device refuses it, the next read corrects it.
-    pub fn take_set(&mut self, frame: &[u8]) {
+    /// Notes the timeout in a SetSettings that was written.
+    pub fn note_written(&mut self, frame: &[u8]) {
         if let Some(Ok(Command::SetSettings(values))) = FrameRef::new_checked(frame).map(Command::parse) {
-            self.set(host_timeout_ms(values.iter()));
+            self.written_ms = host_timeout_ms(values.iter());
+        }
+    }
+
+    /// Takes the record of a SetSettings.
+    pub fn take_record(&mut self, response: &Response) {
+        let written = self.written_ms.take();
+        if response.accepted() {
+            self.set(written);
+        }
+    }
+
+    /// Takes a status: a controller without torque may have started again, with other settings.
+    pub fn take_status(&mut self, status: &Status) {
+        if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
+            self.timeout = None;
         }
     }
 }
 
 impl SharedLine {
-    /// This client may ask the controller. While the arm moves under host supervision, others may ask only as long as frames of the client
-    /// that commands arrive within the timeout.
+    /// This client may ask the controller. While the arm moves under host supervision, others may ask only if a frame of the client that
+    /// commands arrived within half of the timeout. Our clients send one in each third of it.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);
@@ -51,7 +68,7 @@ impl SharedLine {
         let heard = self
             .clients
             .get(&lease.holder)
-            .is_some_and(|holder| now.saturating_sub(holder.heard_at) < timeout);
+            .is_some_and(|holder| now.saturating_sub(holder.heard_at) < timeout / 2);
         if heard || lease.holder == id {
             Ok(())
         } else {

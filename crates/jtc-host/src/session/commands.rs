@@ -136,11 +136,17 @@ impl<P: Port> Session<P> {
     pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         self.introduce()?;
         self.read_host_timeout()?;
+        self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
             // It does not teach, or for somebody else.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
-            Ok(()) => self.wait_for_teaching(&ended),
+            Ok(()) => {
+                self.presence.wait_for_teaching(true);
+                let begun = self.wait_for_teaching(&ended);
+                self.presence.wait_for_teaching(false);
+                begun
+            }
         };
         if begun.is_err() {
             // The first error is the one to report; what is accepted in every state needs no answer here.
@@ -256,6 +262,7 @@ impl<P: Port> Session<P> {
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
+            self.presence.command(self.port.now());
         }
         let retries = self.statistics.retries;
         let mut record = self

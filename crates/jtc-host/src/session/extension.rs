@@ -50,7 +50,6 @@ impl<P: Port> Session<P> {
 
     /// Asks the device who it is where that was not done of late: only then it reports each reason of a refusal (J-51).
     pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
-        self.presence.commands();
         let due = match self.extensions {
             Extensions::Unknown => true,
             Extensions::None => false,
@@ -61,7 +60,7 @@ impl<P: Port> Session<P> {
         }
         match self.info() {
             // Statuses come: the command itself is worth a try.
-            Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. }) => {
+            Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
             }
@@ -86,7 +85,11 @@ impl<P: Port> Session<P> {
             record => record?,
         };
         self.extensions = Extensions::Asked(self.port.now());
-        if crate::error::accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
+        if !crate::error::accepted(&record) {
+            return Err(self.refused(record));
+        }
+        self.presence.accepted();
+        Ok(())
     }
 
     /// Sends an extension request and waits for what it returns.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Status, TrajectoryState};
 
 use super::Session;
-use crate::error::{Error, LinkError};
+use crate::error::{Error, LinkError, StateError};
 use crate::port::Port;
 use crate::words;
 
@@ -74,7 +74,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of the line.
+    /// [`StateError::Device`] when the controller has released the arm; those of the line.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
         // Refused where nothing is jogged any more, which is just as well.
         match self.jog(&[0.0; JOINTS]) {
@@ -84,6 +84,9 @@ impl<P: Port> Session<P> {
         let end = self.now() + REST;
         loop {
             let status = self.next_status()?;
+            if status.state == ControllerState::Error {
+                return Err(StateError::Device { status: Box::new(status) }.into());
+            }
             if words::moving_joint(&status).is_none() {
                 return Ok(Some(status));
             }

@@ -272,7 +272,7 @@ impl<P: Port> Session<P> {
             if status.trajectory == TrajectoryState::Null {
                 self.uploaded = None;
             }
-            self.presence.take_status(status);
+            self.presence.take_status(status, now);
             self.last = Some(*status);
             self.last_received = now;
         }

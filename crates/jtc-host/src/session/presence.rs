@@ -12,19 +12,23 @@ use super::extension::{ASK_AGAIN, Extensions};
 use crate::error::LinkError;
 use crate::port::Port;
 
+/// A command shows in the statuses within this time.
+const SHOWS: Duration = Duration::from_secs(1);
 /// Shortest time between two requests: a status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
 const SHORTEST: Duration = Duration::from_millis(20);
 
 /// What the session knows of host supervision, and what it has sent for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Presence {
-    /// The session has sent a command since the arm moved last.
-    commands: bool,
-    /// The arm moves, by the last status.
+    /// When this session commanded the motion or the teaching that goes on.
+    commanded: Option<Duration>,
+    /// The session waits for teaching to begin.
+    waits: bool,
+    /// The arm moves, or can be led, by the last status.
     moves: bool,
-    /// The controller's `host_timeout_ms` as it was last read or set, ms; 0: no supervision.
+    /// The controller's `host_timeout_ms` as it was last read or set, ms; 0: no supervision. A controller without torque may get another.
     host_timeout_ms: Option<f64>,
-    /// The controller has answered GetInfo.
+    /// The controller has accepted an extension request.
     answered: bool,
     /// When GetInfo was sent last.
     asked_at: Duration,
@@ -33,16 +37,35 @@ pub(super) struct Presence {
 }
 
 impl Presence {
-    /// The session sends a command.
-    pub fn commands(&mut self) {
-        self.commands = true;
+    /// The session commands a motion or teaching.
+    pub fn command(&mut self, now: Duration) {
+        self.commanded = Some(now);
     }
 
-    /// Takes a status. A motion that ends was the last one for the commands that were sent before.
-    pub fn take_status(&mut self, status: &Status) {
-        let moves = status.state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
-        self.commands &= moves || !self.moves;
-        self.moves = moves;
+    /// The session waits for teaching to begin, or no longer.
+    pub fn wait_for_teaching(&mut self, waits: bool) {
+        self.waits = waits;
+    }
+
+    /// The controller has accepted an extension request.
+    pub fn accepted(&mut self) {
+        self.answered = true;
+    }
+
+    /// Takes a status.
+    pub fn take_status(&mut self, status: &Status, now: Duration) {
+        self.moves = status.state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
+        if !self.moves && !self.waits {
+            self.commanded.take_if(|at| now.saturating_sub(*at) > SHOWS);
+        }
+        if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
+            self.host_timeout_ms = None;
+        }
+    }
+
+    /// The arm moves for this session.
+    fn is_shown(&self) -> bool {
+        self.commanded.is_some() && (self.moves || self.waits)
     }
 
     /// Time between two requests: at least three within the controller's timeout.
@@ -57,7 +80,6 @@ impl Presence {
     pub fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {
-                self.answered = true;
                 self.unanswered = self.unanswered.checked_sub(1)?;
                 return Some(self.asked_at);
             }
@@ -85,7 +107,7 @@ impl<P: Port> Session<P> {
     /// Sends GetInfo when it is due; returns the time until it is due again.
     pub(super) fn show_presence(&mut self) -> Result<Duration, LinkError> {
         let Extensions::Asked(at) = self.extensions else { return Ok(Duration::MAX) };
-        if !self.presence.commands || !self.presence.moves {
+        if !self.presence.is_shown() {
             return Ok(Duration::MAX);
         }
         let (now, period) = (self.port.now(), self.presence.period());
@@ -108,7 +130,7 @@ impl<P: Port> Session<P> {
     pub(super) fn await_presence(&mut self) -> Result<(), LinkError> {
         let end = self.presence.asked_at + self.confirmation_time(jtc_wire::ANSWER_MAX);
         while self.presence.unanswered > 0 && self.port.now() < end {
-            self.read(end - self.port.now())?;
+            self.read(end.saturating_sub(self.port.now()))?;
         }
         self.presence.unanswered = 0;
         Ok(())

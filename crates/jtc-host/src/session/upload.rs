@@ -280,6 +280,10 @@ impl<P: Port> Session<P> {
     /// Writes a piece or waits for a record; true when a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
+            if up.next == 0 {
+                // A controller takes the host of a segment 0 without a request before it for one that knows no extensions (J-30).
+                self.introduce()?;
+            }
             up.writing = Some((up.next, 0));
             let now = self.port.now();
             up.line_done = up.line_done.max(now) + line_time(up.frames[up.next].len(), self.port.baud());

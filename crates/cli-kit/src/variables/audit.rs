@@ -17,8 +17,10 @@ pub enum Kind {
     Output,
     /// It chooses the form of what is printed.
     Format,
-    /// A rate or a limit of the line, of time or of a disk, which changes no motion.
-    Rate,
+    /// The rate of the line.
+    Line,
+    /// A limit of time or of a disk of one command, which changes no motion.
+    Limit,
     /// A setting of a simulator.
     Simulator,
     /// It makes a command send less.
@@ -115,6 +117,18 @@ fn lists(
             ));
         }
     }
+    for (words, command) in &commands {
+        let of_command = |retired: &&super::Retired| !words.is_empty() && retired.command == words.as_str();
+        for retired in variables.retired.iter().filter(of_command) {
+            let mut options = command.get_arguments().filter(|arg| arg.get_long() == Some(retired.option));
+            if options.any(|arg| arg.get_env() == Some(retired.variable.as_ref())) {
+                faults.push(format!(
+                    "{words} --{}: it reads {}, which is retired",
+                    retired.option, retired.variable
+                ));
+            }
+        }
+    }
     for words in variables.offline {
         if commands.iter().all(|(name, _)| name != words) {
             faults.push(format!("there is no command {words}"));
@@ -128,7 +142,7 @@ fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {
         Kind::File | Kind::Output if is_flag || !names_place => Some("its value is no file or folder"),
-        Kind::Rate if is_flag => Some("it has no value"),
+        Kind::Line | Kind::Limit if is_flag => Some("it has no value"),
         Kind::Caution if !is_flag => Some("it has a value"),
         _ if is_flag && arg.get_value_parser().type_id() != clap::builder::ValueParser::bool().type_id() => {
             Some("it is no on/off option")
@@ -142,7 +156,7 @@ fn mean_the_same(kind: Kind, one: &Arg, other: &Arg) -> bool {
     let help = |arg: &Arg| arg.get_help().map(ToString::to_string);
     one.get_long() == other.get_long()
         && value_name(one) == value_name(other)
-        && (kind != Kind::Output || help(one) == help(other))
+        && (!matches!(kind, Kind::Output | Kind::Limit) || help(one) == help(other))
 }
 
 fn value_name(arg: &Arg) -> Option<String> {

@@ -126,6 +126,13 @@ fn the_audit_finds_options_that_must_not_have_a_variable() {
     let wrong = Variables { retired: RETIRED, offline: &["go away"], ..VARIABLES };
     assert_eq!(faults::<Cli>("TRY_", &wrong, &ALLOWED, &[]).len(), 2);
 
+    const AGAIN: &[Retired] = &[Retired::less("TRY_GO_OUT", "go", "out")];
+    let again = faults::<Cli>("TRY_", &Variables { retired: AGAIN, ..VARIABLES }, &ALLOWED, &[]);
+    assert!(
+        again.iter().any(|fault| fault == "go --out: it reads TRY_GO_OUT, which is retired"),
+        "{again:?}"
+    );
+
     #[derive(clap::Parser)]
     struct Dangerous {
         /// Enables outputs

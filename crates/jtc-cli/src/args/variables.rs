@@ -81,17 +81,17 @@ mod tests {
     /// A new option brings no variable with it that acts: each one is in this list, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
-        use Kind::{File, Format, Output, Place, Rate, Simulator};
+        use Kind::{File, Format, Limit, Line, Output, Place, Simulator};
         let allowed = [
             ("JTC_JSON", Format),
             ("JTC_PORT", Place),
             ("JTC_TOKEN_FILE", File),
             ("JTC_TLS_CA", File),
-            ("JTC_BAUD", Rate),
+            ("JTC_BAUD", Line),
             ("JTC_ARM", File),
             ("JTC_TRAJECTORY", File),
             ("JTC_DRIVE", Place),
-            ("JTC_WAIT", Rate),
+            ("JTC_WAIT", Limit),
             ("JTC_RUN_RECORD", Output),
             ("JTC_RUN_REPORT", Output),
             ("JTC_PLAN_OUT", Output),
@@ -113,7 +113,7 @@ mod tests {
             ("JTC_TLS_CERT", File),
             ("JTC_TLS_KEY", File),
             ("JTC_RECORD", Output),
-            ("JTC_RECORD_LIMIT", Rate),
+            ("JTC_RECORD_LIMIT", Limit),
             ("JTC_MODBUS", Place),
             ("JTC_MODBUS_ALLOW", Place),
             ("JTC_SERIAL", Place),

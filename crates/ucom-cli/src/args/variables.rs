@@ -63,7 +63,7 @@ mod tests {
     /// A new option brings no variable with it that acts: each one is in this list, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
-        use Kind::{Caution, File, Format, Output, Place, Rate, Simulator};
+        use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};
         let allowed = [
             ("UCOM_JSON", Format),
             ("UCOM_BUS", Place),
@@ -75,7 +75,7 @@ mod tests {
             ("UCOM_DRY_RUN", Caution),
             ("UCOM_LISTEN_ONLY", Caution),
             ("UCOM_CSV", Format),
-            ("UCOM_FOR", Rate),
+            ("UCOM_FOR", Limit),
             ("UCOM_IMAGE", File),
             ("UCOM_PARAMS", File),
             ("UCOM_SAVE", Output),

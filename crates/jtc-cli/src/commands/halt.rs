@@ -53,7 +53,8 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let (answer, words) = match reach(link, Halt::Pause).map_err(may_be_moving)? {
-        Reached::Line(mut session) => {
+        Reached::Line(session) => {
+            let mut session = *session;
             progress.watch(&mut session);
             session.pause()?;
             (None, "pausing on the path".to_owned())
@@ -153,7 +154,7 @@ fn holder_json(answer: &Answer) -> Value {
 /// How an arm is reached.
 enum Reached {
     /// By a line of our own.
-    Line(Session<LinkPort>),
+    Line(Box<Session<LinkPort>>),
     /// By the program that has the port, which has done it.
     Holder(Answer, Option<End>),
 }
@@ -163,7 +164,7 @@ fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, Failure> {
     let start = Instant::now();
     loop {
         let (path, busy) = match link.open_unless_busy(None)? {
-            Ok(port) => return Ok(Reached::Line(Session::new(port))),
+            Ok(port) => return Ok(Reached::Line(Box::new(Session::new(port)))),
             Err(PortError::Busy { path }) => (path.clone(), PortError::Busy { path }),
             Err(error) => return Err(error.into()),
         };
@@ -210,7 +211,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
         let (answer, end) = match reached.map_err(may_be_moving)? {
-            Reached::Line(session) => return directly(session, progress, first),
+            Reached::Line(session) => return directly(*session, progress, first),
             Reached::Holder(answer, end) => (answer, end),
         };
         let port = Some(answer.port.clone());

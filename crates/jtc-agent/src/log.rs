@@ -18,6 +18,7 @@ pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
             LineEvent::Denied { client, .. } => {
                 log.write_repeated(what, &format!("client {}", client.0), facts)
             }
+            LineEvent::PutOut { .. } => log.write_repeated(what, "clients", facts),
             _ => log.write(what, facts),
         }
     })

@@ -633,6 +633,37 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     board.line.want_lease(anna, now).expect("nobody waits");
 }
 
+/// A client that commands and falls silent is noticed although another one asks all the time, also by what waits for the line.
+#[test]
+fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
+    for (timeout_ms, every_ms) in [(600, 10), (2000, 50), (2000, 250), (5000, 100)] {
+        let mut board = Board::new(115_200);
+        let anna = operator(&mut board, "anna");
+        let bob = board.join("bob", Role::Viewer, Policy::Continue);
+        board.status.state = ControllerState::HoldPos.into();
+        board.run_ms(100);
+        let mut frame = [0; 16];
+        let setting = jtc_core::settings::named("host_timeout_ms").expect("it is a setting").number;
+        let value = SettingValue { setting, joint: 0, value: timeout_ms as f64 };
+        let n = jtc_wire::set_settings(&mut frame, [value].into_iter()).expect("it fits");
+        board.send(anna, &frame[..n]);
+        board.run_ms(500);
+        board.status.state = ControllerState::Operate.into();
+        board.run_ms(100);
+        board.send(anna, &fixed::GET_INFO);
+        let silent_from = board.now();
+        for _ in 0..2 * timeout_ms / every_ms {
+            board.send(bob, &fixed::GET_INFO);
+            board.run_ms(every_ms);
+        }
+        let last = board.frames.iter().filter(|(_, kind, _)| kind.is_some()).map(|(at, ..)| *at).max();
+        let shown = last.expect("frames came").saturating_sub(silent_from);
+        // The frame that is being written when half of the timeout is over still comes.
+        let limit = Duration::from_millis(timeout_ms / 2 + 20);
+        assert!(shown <= limit, "{timeout_ms} ms, every {every_ms} ms: a frame came after {shown:?}");
+    }
+}
+
 /// While the arm moves under host supervision, only the client that commands shows the controller that its host is there.
 #[test]
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
@@ -666,6 +697,8 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         let setting = jtc_core::settings::named("host_timeout_ms").expect("it is a setting").number;
         let value = SettingValue { setting, joint: 0, value: f64::from(timeout_ms) };
         let n = jtc_wire::set_settings(&mut frame, [value].into_iter()).expect("it fits");
+        board.status.state = HoldPos.into();
+        board.run_ms(100);
         board.send(anna, &frame[..n]);
         board.run_ms(500);
         (board.status.state, board.status.trajectory) = (state.into(), trajectory.into());
@@ -673,20 +706,19 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         board.take(bob);
         let before = board.arrived(FrameType::GetInfo);
         let (mut asked, mut own) = (0, 0);
-        for ms in (0..3000).step_by(250) {
+        // The board returns nothing, which is waited for each time: questions take longer than 3 s.
+        for ms in (0..13_000).step_by(250) {
             if every_ms > 0 && ms % every_ms == 0 {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
             // Just after a frame of the holder questions may pass.
-            if every_ms != 2000 || ms % 2000 >= 400 {
+            if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;
             }
             board.run_ms(250);
         }
-        // The board returns nothing, which is waited for each time.
-        board.run_ms(10_000);
         let arrived = board.arrived(FrameType::GetInfo) - before;
         let (_, denied) = board.take(bob);
         assert_eq!(arrived, if pass { asked } else { 0 }, "{case}");

@@ -48,13 +48,23 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        std::fs::rename(path, before).map_err(|error| {
-            let (path, before) = (path.display(), before.display());
-            io::Error::new(
-                error.kind(),
-                format!("{path} is full, and cannot be renamed to {before}: {error}"),
-            )
-        })?;
+        // A file that this limit did not make, of an earlier version or of another program, is not replaced.
+        if std::fs::metadata(before).is_ok_and(|found| found.len() > self.limit) {
+            let mut kept = before.clone().into_os_string();
+            kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
+            std::fs::rename(before, kept)?;
+        }
+        match std::fs::rename(path, before) {
+            // Somebody has moved or removed it: the next line begins another one.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            renamed => renamed.map_err(|error| {
+                let (path, before) = (path.display(), before.display());
+                io::Error::new(
+                    error.kind(),
+                    format!("{path} is full, and cannot be renamed to {before}: {error}"),
+                )
+            })?,
+        }
         self.file = append(path)?;
         self.length = self.file.metadata()?.len();
         Ok(true)
@@ -82,4 +92,51 @@ fn before(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".1");
     name.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(log: &mut Rotated, line: &str) {
+        log.make_room(line.len()).expect("there is room");
+        log.write_all(line.as_bytes()).expect("it is written");
+    }
+
+    #[test]
+    fn a_log_that_was_removed_or_moved_begins_anew() {
+        for moved in [false, true] {
+            let dir = tempfile::tempdir().expect("a directory");
+            let path = dir.path().join("commands.jsonl");
+            let mut log = Rotated::open(&path, 200).expect("it opens");
+            write(&mut log, &"a".repeat(90));
+            let gone = if moved {
+                std::fs::rename(&path, dir.path().join("away"))
+            } else {
+                std::fs::remove_file(&path)
+            };
+            gone.expect("it is there");
+            for line in ["b", "c"] {
+                write(&mut log, &line.repeat(60));
+            }
+            let (now, earlier) = (std::fs::read(&path), std::fs::read(before(&path)));
+            assert_eq!(now.expect("it is there"), b"c".repeat(60), "moved: {moved}");
+            assert_eq!(earlier.expect("it is there"), b"b".repeat(60), "moved: {moved}");
+        }
+    }
+
+    #[test]
+    fn a_longer_log_of_an_earlier_version_is_not_replaced() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("commands.jsonl");
+        std::fs::write(&path, "e".repeat(5000)).expect("it is written");
+        let mut log = Rotated::open(&path, 200).expect("it opens");
+        for line in ["a", "b", "c", "d"] {
+            write(&mut log, &line.repeat(90));
+        }
+        let kept = std::fs::read_dir(dir.path()).expect("a directory").flatten();
+        let lengths: Vec<u64> = kept.filter_map(|file| Some(file.metadata().ok()?.len())).collect();
+        assert!(lengths.contains(&5000), "{lengths:?}");
+        assert_eq!(lengths.iter().filter(|length| **length == 90).count(), 2, "{lengths:?}");
+    }
 }

@@ -11,7 +11,8 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// How long a connection may take nothing of what waits for it, in all, and how many bytes it has to take for each further second.
+/// How long a connection may take nothing of what waits for it, and how many bytes it has to take for each further second. Bytes that were taken
+/// quickly give no more time than this.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
@@ -74,6 +75,11 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
+    /// Time in all that the bytes taken so far allow for taking nothing.
+    fn patience(&self) -> Duration {
+        TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
+    }
+
     /// Something was written, or waits for the other end to take what was written before.
     fn see<T>(
         &mut self,
@@ -86,12 +92,13 @@ impl<S> Taken<S> {
                 let bytes = done.as_ref().map_or(0, bytes);
                 self.bytes = self.bytes.saturating_add(bytes as u64);
                 self.waited += self.since.take().map_or(Duration::ZERO, |since| since.elapsed());
+                self.waited = self.waited.max(self.patience().saturating_sub(TAKES_NOTHING));
                 written
             }
             Poll::Pending if self.released.load(Ordering::Relaxed) => written,
             Poll::Pending => {
                 let since = *self.since.get_or_insert_with(Instant::now);
-                let patience = TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S);
+                let patience = self.patience();
                 self.timer.as_mut().reset(since + patience.saturating_sub(self.waited));
                 match self.timer.as_mut().poll(context) {
                     Poll::Ready(()) => Poll::Ready(Err(io::ErrorKind::TimedOut.into())),
@@ -192,6 +199,26 @@ mod tests {
         }
         // Nothing at all is taken.
         assert!(!taken(100_000, 1, Duration::from_secs(3600)).1);
+    }
+
+    /// A reader that was quick is closed as soon as one that was not.
+    #[test]
+    fn bytes_that_were_taken_quickly_give_no_time_to_take_nothing() {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
+        runtime.expect("a runtime").block_on(async {
+            let (here, mut there) = tokio::io::duplex(1024);
+            let mut stream = Taken::new(here, Arc::default());
+            let reader = tokio::spawn(async move {
+                let mut all = vec![0; 10_000_000];
+                there.read_exact(&mut all).await.expect("it comes");
+                tokio::time::sleep(Duration::from_secs(3600)).await;
+            });
+            stream.write_all(&vec![7; 10_000_000]).await.expect("it is taken");
+            let begun = Instant::now();
+            assert!(stream.write_all(&vec![7; 10_000]).await.is_err());
+            assert!(begun.elapsed() <= TAKES_NOTHING + Duration::from_secs(1), "{:?}", begun.elapsed());
+            reader.abort();
+        });
     }
 
     /// A socket may be silent as long as it likes.

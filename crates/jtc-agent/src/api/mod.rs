@@ -178,7 +178,11 @@ impl Agent {
         let facts = json!({
             "command": command.name(), "from": caller.peer.to_string(), "by": name, "lost": lost,
         });
-        self.note("halt", facts);
+        match client {
+            Some(_) => self.note("halt", facts),
+            // One that shows no lease can ask without end.
+            None => self.gate.note_repeated("halt", caller.peer, facts),
+        }
         if let Some(lost) = lost {
             let message = format!("{lost}: nothing was sent; the arm may be moving");
             let object = ErrorObject::new("no-link", message, "the emergency stop, if it is");

@@ -237,7 +237,11 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     let by = client.as_ref().map_or_else(|| asker.caller.peer.to_string(), |client| client.name.clone());
     let lost = agent.shared.lost();
     let facts = json!({ "command": "stop", "from": asker.caller.peer.to_string(), "by": by, "lost": lost });
-    agent.gate.note("halt", facts);
+    match client {
+        Some(_) => agent.gate.note("halt", facts),
+        // One that shows no lease can ask without end.
+        None => agent.gate.note_repeated("halt", asker.caller.peer, facts),
+    }
     if let Some(lost) = lost {
         let message = format!("{lost}: nothing was sent; boards that run become safe without heartbeats");
         return Err(Problem::new("no-link", message, "cut the power of the outputs, if anything moves")

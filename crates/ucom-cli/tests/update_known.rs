@@ -3,6 +3,7 @@
 
 mod common;
 
+use cli_kit::trial::ended;
 use common::{Sim, ended_by, image, outcomes};
 use serde_json::Value;
 
@@ -100,26 +101,19 @@ fn d62_a_killed_update_leaves_no_record() {
 #[test]
 fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let sim = Sim::numbered(&["--boards", "1"]);
-    let folder = sim.path("locked");
-    std::fs::create_dir(&folder).unwrap();
-    let path = format!("{folder}/inventory.toml");
-    std::fs::copy(sim.path("inventory.toml"), &path).unwrap();
-    let first = sim.file("first.bin", &image(2000, 1));
-    assert_eq!(of(&sim.json(&["update", "1", &first, "--inventory", &path], 0)), ("verified", true));
-    let lock = |mode: u32| {
-        use std::os::unix::fs::PermissionsExt as _;
-        std::fs::set_permissions(&folder, std::fs::Permissions::from_mode(mode)).unwrap();
-    };
-    lock(0o555);
-    if std::fs::write(format!("{folder}/probe"), "").is_ok() {
-        println!("skipped: this user may write everywhere");
-        return lock(0o755);
-    }
-    let next = sim.file("next.bin", &image(2000, 2));
-    let report = sim.json(&["update", "1", &next, "--inventory", &path], 4);
-    lock(0o755);
-    assert_eq!(of(&report), ("cancelled", false), "{report}");
-    assert_eq!(of(&sim.json(&["update", "1", &first, "--inventory", &path], 0)), ("up-to-date", true));
+    let (first, next) = (sim.file("first.bin", &image(2000, 1)), sim.file("next.bin", &image(2000, 2)));
+    assert_eq!(of(&sim.json(&["update", "1", &first], 0)), ("verified", true));
+    let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["--json", "update", "1", &next]);
+    // The inventory has been read, and no other PC is looked for yet.
+    peer.wait("201#");
+    std::fs::remove_file(sim.path("inventory.toml")).unwrap();
+    let output = ended(update).ends(4);
+    assert_eq!(of(&output.json()), ("cancelled", false), "{}", output.out);
+    assert!(output.err.contains("ends before anything more is erased"), "{}", output.err);
+    assert!(!peer.all(50).iter().any(|frame| frame.starts_with("2C1#")), "no program data");
+    assert_eq!(sim.json(&["info", "1"], 0)["boards"][0]["program_id"], shown);
 }
 
 /// U-3: the same image of another day is not written again, unless its date is asked for.

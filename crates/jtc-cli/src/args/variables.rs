@@ -109,6 +109,7 @@ mod tests {
             ("JTC_AGENT_NAMES", Place),
             ("JTC_ALLOW_ORIGINS", Place),
             ("JTC_COMMAND_LOG", File),
+            ("JTC_COMMAND_LOG_LIMIT", Limit),
             ("JTC_TRAJECTORIES", File),
             ("JTC_TLS_CERT", File),
             ("JTC_TLS_KEY", File),

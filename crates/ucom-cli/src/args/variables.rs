@@ -94,6 +94,7 @@ mod tests {
             ("UCOM_AGENT_NAMES", Place),
             ("UCOM_TOKEN_FILE", File),
             ("UCOM_COMMAND_LOG", File),
+            ("UCOM_COMMAND_LOG_LIMIT", Limit),
             ("UCOM_TLS_CERT", File),
             ("UCOM_TLS_KEY", File),
         ];

@@ -213,3 +213,39 @@ fn j58_joints_are_jogged_during_an_upload() {
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Null));
     }
 }
+
+/// The record of an earlier Stop on the line does not hide a later one: the segment 0 between them is older than the second.
+#[test]
+fn j30_each_of_several_stops_drops_the_upload_before_it() {
+    for frames_first in 0..2 {
+        for stops_first in 1..4 {
+            for line in [0, 1] {
+                for ticks in [0, 1, 2, 5] {
+                    let case =
+                        format!("{frames_first} long frames, {stops_first} Stops, line {line}, {ticks} ms");
+                    let mut rig = Rig::holding();
+                    rig.statuses.clear();
+                    // It takes some ticks, in which the others wait.
+                    (0..frames_first).for_each(|_| rig.send(FrameType::FrictionTableUseDefault, &[]));
+                    (0..stops_first).for_each(|_| rig.urgent(0, UrgentCommand::Stop));
+                    rig.send(FrameType::Trajectory, &segment(7, 0, 10));
+                    if frames_first > 0 {
+                        rig.run(ticks);
+                    }
+                    rig.urgent(line, UrgentCommand::Stop);
+                    for n in 1..SEGMENTS {
+                        rig.send(FrameType::Trajectory, &segment(7, n, 10));
+                    }
+                    rig.run(80);
+                    let segments: Vec<_> =
+                        rig.records().iter().filter(|r| r.frame_type == 0x04).map(|r| r.data).collect();
+                    assert_eq!(segments, [NotAllowed; SEGMENTS as usize], "{case}");
+                    assert_eq!(rig.trajectory(), TrajectoryState::Null, "{case}");
+                    assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "{case}");
+                    rig.upload(&[rest(0); 60], 10);
+                    assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{case}: the next upload is free");
+                }
+            }
+        }
+    }
+}

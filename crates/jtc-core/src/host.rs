@@ -289,6 +289,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
+            // J-30: the Stop during its upload was meant for this.
+            (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
+                if self.store.stopped() =>
+            {
+                Err(DataStatus::NotAllowed)
+            }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
                 self.check_friction()?;
                 self.start_path()

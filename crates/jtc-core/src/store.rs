@@ -23,6 +23,8 @@ pub(crate) struct Store<M> {
     plain: bool,
     /// A Stop has dropped the upload: its other segments are refused until a segment 0 comes.
     dropped: bool,
+    /// A Stop came during this upload, whose host survives no refused segment: it is completed and not executed.
+    stopped: bool,
     step: Step,
     /// Velocities of the accepted segments.
     speeds: [SpeedRange; JOINTS],
@@ -40,6 +42,7 @@ pub(crate) struct StoreState {
     number: u16,
     plain: bool,
     dropped: bool,
+    stopped: bool,
     step_ms: u16,
     speeds: [SpeedRange; JOINTS],
     held: usize,
@@ -60,6 +63,7 @@ remembered!(StoreState {
     number,
     plain,
     dropped,
+    stopped,
     step_ms,
     speeds,
     held,
@@ -95,6 +99,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             number: 0,
             plain: false,
             dropped: false,
+            stopped: false,
             step: Step::new(1),
             speeds,
             held: 0,
@@ -123,15 +128,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments > 0 && self.next_segment < self.segments
     }
 
-    /// J-30: a Stop drops an upload that is not complete, unless it was begun on a plain line, whose host would wait for ever.
-    /// Returns whether there was one.
+    /// J-30: a Stop drops an upload that is not complete. One that was begun on a plain line, whose host would wait for ever, is
+    /// completed and not executed. Returns whether there was one.
     pub fn drop_upload(&mut self) -> bool {
-        let drops = self.receiving() && !self.plain;
-        if drops {
+        let receiving = self.receiving();
+        if receiving && self.plain {
+            self.stopped = true;
+        } else if receiving {
             self.clear();
             self.dropped = true;
         }
-        drops
+        receiving
+    }
+
+    /// A Stop came during the upload of this trajectory: it is not executed (J-30).
+    pub fn stopped(&self) -> bool {
+        self.stopped
     }
 
     /// Segment 0 of an upload was refused because of a Stop: the other segments of the upload are refused, too.
@@ -178,12 +190,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy a segment that was accepted; segment 0 replaces what was there, and says whether its line is `plain`.
-    pub fn begin(&mut self, segment: &Segment<'_>, plain: bool) {
+    /// Begins to copy a segment that was accepted; segment 0 replaces what was there, and says whether its line is `plain`, and
+    /// whether a Stop came before it had its turn.
+    pub fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
             (self.held, self.hash) = (0, HASH_BEGIN);
-            (self.plain, self.dropped) = (plain, false);
+            (self.plain, self.dropped, self.stopped) = (plain, false, stopped);
             self.segments = segment.segments;
             self.number = segment.trajectory;
             self.step = Step::new(segment.step_time);
@@ -227,13 +240,26 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             number,
             plain,
             dropped,
+            stopped,
             ref step,
             speeds,
             held,
             hash,
         } = *self;
         let step_ms = step.ms;
-        StoreState { received, next_segment, segments, number, plain, dropped, step_ms, speeds, held, hash }
+        StoreState {
+            received,
+            next_segment,
+            segments,
+            number,
+            plain,
+            dropped,
+            stopped,
+            step_ms,
+            speeds,
+            held,
+            hash,
+        }
     }
 
     /// The same again; the points are put apart.
@@ -245,12 +271,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             number,
             plain,
             dropped,
+            stopped,
             step_ms,
             speeds,
             held,
             hash,
         } = *state;
-        (self.plain, self.dropped) = (plain, dropped);
+        (self.plain, self.dropped, self.stopped) = (plain, dropped, stopped);
         (self.received, self.next_segment, self.segments) =
             (received.min(self.capacity()), next_segment, segments);
         (self.number, self.step, self.speeds) = (number, Step::new(step_ms), speeds);

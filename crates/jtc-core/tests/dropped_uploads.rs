@@ -161,27 +161,73 @@ fn j30_a_pause_drops_no_upload() {
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
 }
 
-/// Existing hosts survive no refused segment. So their uploads are completed, and a Stop says that it has stopped nothing.
+/// A host on a plain line survives no refused segment. So its upload is completed; the Stop holds all the same: the trajectory is not
+/// executed.
 #[test]
-fn j30_an_upload_on_a_plain_line_outlasts_a_stop() {
+fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
+    // The Stop: on which line, before the record of which segment, and after how many ticks of it.
     for line in [0, 1] {
-        let mut rig = Rig::holding();
-        for n in 0..SEGMENTS {
-            rig.plain = n == 0;
-            rig.send(FrameType::Trajectory, &segment(7, n, 300));
-            rig.run(usize::from(n) * 5);
-            rig.plain = false;
-            rig.urgent(line, UrgentCommand::Stop);
-            rig.run(60);
+        for at in 0..SEGMENTS {
+            for ticks in [0, 1, 5, 19, 23] {
+                let case = format!("line {line}, segment {at}, {ticks} ms");
+                let mut rig = Rig::holding();
+                // What is there before counts no more.
+                rig.upload(&[rest(0); 60], 10);
+                rig.plain = true;
+                rig.statuses.clear();
+                for n in 0..SEGMENTS {
+                    rig.send(FrameType::Trajectory, &segment(7, n, 300));
+                    if n == at {
+                        rig.run(ticks);
+                        rig.urgent(line, UrgentCommand::Stop);
+                    }
+                    rig.run(60);
+                }
+                let refused = rig.records().iter().any(|r| r.frame_type == 0x04 && !r.accepted());
+                assert!(!refused, "{case}: {:?}", rig.records());
+                assert_eq!(rig.trajectory(), TrajectoryState::Stop, "{case}");
+                for _ in 0..3 {
+                    assert_eq!(rig.exec(ExecCommand::Execute), IncorrectValue, "{case}");
+                    rig.run(20);
+                    assert_eq!(rig.state(), ControllerState::HoldPos, "{case}");
+                }
+                if at > 0 {
+                    assert_eq!(stops(&rig)[0], NoError, "{case}: it has done something");
+                }
+                // The next upload is executed.
+                rig.upload(&[rest(0); 60], 10);
+                assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{case}");
+                rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
+                assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{case}: once more");
+            }
         }
-        assert_eq!(stops(&rig), [NotAllowed; SEGMENTS as usize], "the last found it complete");
-        let refused = rig.records().iter().any(|r| r.frame_type == 0x04 && !r.accepted());
-        assert!(!refused, "{:?}", rig.records());
-        assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-        rig.plain = true;
-        assert_eq!(rig.exec(ExecCommand::Execute), NoError);
     }
-    // One that was begun by a client that knows the extensions is dropped, though its line has become plain.
+}
+
+/// The other way round: nothing but a Stop during the upload keeps a plain host from executing.
+#[test]
+fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
+    for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
+        let mut rig = Rig::holding();
+        rig.plain = true;
+        // Before it or, for a Pause, in its middle.
+        if let Some(command) = command {
+            rig.urgent(1, command);
+            rig.run(3);
+        }
+        for n in 0..SEGMENTS {
+            if command == Some(UrgentCommand::Pause) {
+                rig.urgent(0, UrgentCommand::Pause);
+            }
+            assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NoError);
+        }
+        assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{command:?}");
+    }
+}
+
+/// An upload that was begun by a client that knows the extensions is dropped, though its line has become plain.
+#[test]
+fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_became_plain() {
     let mut rig = Rig::holding();
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 0, 10)), NoError);
     rig.plain = true;
@@ -211,5 +257,41 @@ fn j58_joints_are_jogged_during_an_upload() {
         rig.run(800);
         assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 1, 100)), NotAllowed);
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Null));
+    }
+}
+
+/// The record of an earlier Stop on the line does not hide a later one: the segment 0 between them is older than the second.
+#[test]
+fn j30_each_of_several_stops_drops_the_upload_before_it() {
+    for frames_first in 0..2 {
+        for stops_first in 1..4 {
+            for line in [0, 1] {
+                for ticks in [0, 1, 2, 5] {
+                    let case =
+                        format!("{frames_first} long frames, {stops_first} Stops, line {line}, {ticks} ms");
+                    let mut rig = Rig::holding();
+                    rig.statuses.clear();
+                    // It takes some ticks, in which the others wait.
+                    (0..frames_first).for_each(|_| rig.send(FrameType::FrictionTableUseDefault, &[]));
+                    (0..stops_first).for_each(|_| rig.urgent(0, UrgentCommand::Stop));
+                    rig.send(FrameType::Trajectory, &segment(7, 0, 10));
+                    if frames_first > 0 {
+                        rig.run(ticks);
+                    }
+                    rig.urgent(line, UrgentCommand::Stop);
+                    for n in 1..SEGMENTS {
+                        rig.send(FrameType::Trajectory, &segment(7, n, 10));
+                    }
+                    rig.run(80);
+                    let segments: Vec<_> =
+                        rig.records().iter().filter(|r| r.frame_type == 0x04).map(|r| r.data).collect();
+                    assert_eq!(segments, [NotAllowed; SEGMENTS as usize], "{case}");
+                    assert_eq!(rig.trajectory(), TrajectoryState::Null, "{case}");
+                    assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "{case}");
+                    rig.upload(&[rest(0); 60], 10);
+                    assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{case}: the next upload is free");
+                }
+            }
+        }
     }
 }

@@ -137,7 +137,7 @@ fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
     let mut body = [0; 8 + 4 * 36];
     (body[5], body[7]) = (1, 100);
     let segment = Segment::parse(&body).expect("four points");
-    controller.store.begin(&segment, false);
+    controller.store.begin(&segment, false, false);
     controller.store.copy(&segment, 0, 4);
     controller.store.commit(&segment, *controller.store.speeds());
     controller.clock.time = time;

@@ -12,7 +12,8 @@ pub(crate) struct Overtaking {
     pub(super) pauses: u8,
     /// An Execute was cancelled by them.
     pub(super) cancelled: bool,
-    /// A Stop has arrived, accepted or not: an upload that was begun before it is dropped (J-30).
+    /// A Stop has arrived on either line, accepted or not: an upload that was begun before it is dropped (J-30). Holds until the first
+    /// event that was received after it; the record of an earlier Stop does not end it.
     pub(super) stopped: bool,
 }
 
@@ -40,8 +41,6 @@ impl Overtaking {
         let accepted = self.accepted(command);
         let acted = *accepted > 0;
         *accepted = accepted.saturating_sub(1);
-        // What this line sends behind the last of its Stops is newer.
-        self.stopped &= command != UrgentCommand::Stop || self.stops > 0;
         if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
     }
 

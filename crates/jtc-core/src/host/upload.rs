@@ -26,9 +26,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // Also in the middle of a segment: the change of state has cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        let stopped = self.overtaking.get(received.line).is_some_and(|overtaking| overtaking.stopped);
-        if first && !received.plain && received.overtaken && stopped {
-            // It is older than a Stop that has acted.
+        // It is older than a Stop that has acted.
+        let stopped =
+            received.overtaken && self.overtaking.get(received.line).is_some_and(|before| before.stopped);
+        if first && !received.plain && stopped {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
@@ -39,12 +40,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         match self.slice_progress {
             SliceProgress::PointCopy(from) => self.copy_points(segment, from),
-            SliceProgress::PointCheck(from) => self.check_points(segment, from, received.plain),
+            SliceProgress::PointCheck(from) => self.check_points(segment, from, received.plain, stopped),
             _ => match self.store.check(segment) {
                 Err(status) => SliceOutcome::Refused(status),
                 Ok(()) => {
                     self.begin_check(segment);
-                    self.check_points(segment, 0, received.plain)
+                    self.check_points(segment, 0, received.plain, stopped)
                 }
             },
         }
@@ -61,7 +62,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.violation = None;
     }
 
-    fn check_points(&mut self, segment: &Segment<'_>, from: usize, plain: bool) -> SliceOutcome {
+    fn check_points(
+        &mut self,
+        segment: &Segment<'_>,
+        from: usize,
+        plain: bool,
+        stopped: bool,
+    ) -> SliceOutcome {
         let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
         for point in segment.points_from(from).take(slice) {
             if let Err(violation) = self.check.take(&point) {
@@ -76,7 +83,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         {
             return self.refuse_path(violation);
         }
-        self.store.begin(segment, plain);
+        self.store.begin(segment, plain, stopped);
         if segment.segment == 0 {
             self.set_trajectory(TrajectoryState::Null);
             self.parameters.friction_is_new = false;

@@ -50,7 +50,7 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     controller.state = ControllerState::HoldPos;
     let points = [0, 1, 0, 0, 0, 1, 0, 10].into_iter().chain([0; 4 * 36]).collect::<Vec<u8>>();
     let segment = Segment::parse(&points).expect("four points at standstill");
-    controller.store.begin(&segment, false);
+    controller.store.begin(&segment, false, false);
     controller.store.copy(&segment, 0, 4);
     controller.store.commit(&segment, *controller.store.speeds());
     controller.set_trajectory(TrajectoryState::Stop);

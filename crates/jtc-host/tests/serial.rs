@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::time::Duration;
 
 use jtc_host::port::halt::{self, Halt};
-use jtc_host::port::{PortError, STANDARD_RATES, SerialPort};
+use jtc_host::port::{Halts, PortError, STANDARD_RATES, SerialPort};
 use jtc_host::{Diagnose, Port, frame};
 use jtc_wire::{DataStatus, FrameType, RawPoint, Response, Status, fixed};
 use serialport::{SerialPort as _, TTYPort};
@@ -125,4 +125,34 @@ fn a_stop_is_written_until_the_controller_confirms_it() {
     );
     drop(port);
     assert!(halt::sockets_of(&path).is_empty(), "the socket goes with the port");
+}
+
+/// Writes a Stop or Pause through the door of a port whose far end does not answer.
+fn halt_unconfirmed(path: &str, halt: Halt) {
+    let socket = door(path);
+    std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
+}
+
+/// A motion that waits for its turn, as in a queue, was requested before the Stop: no time makes a new request of it.
+#[test]
+fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
+    let (_far, path) = pair();
+    let mut port = SerialPort::open(&path, 115_200).unwrap();
+    let none = Halts::default();
+    assert_eq!(port.halts(), none);
+    // A motion passes before the Stop.
+    port.ask_to_move_after(none.all).unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
+    halt_unconfirmed(&path, Halt::Stop);
+    assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
+    // Longer than a new request has to wait.
+    std::thread::sleep(Duration::from_millis(3100));
+    for _ in 0..10 {
+        port.ask_to_move_after(none.all).unwrap();
+        let error = port.write_all(&fixed::EXECUTE).expect_err("requested before the Stop");
+        assert!(matches!(error, PortError::Halted { by: Some(_) }), "{error}");
+    }
+    // One that was requested after it passes.
+    port.ask_to_move_after(1).unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
 }

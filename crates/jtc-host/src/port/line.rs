@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use jtc_wire::{
 };
 
 use super::standstill::{Standstill, is_moving};
-use super::{PortError, line_time};
+use super::{Halts, PortError, line_time};
 
 /// Longest time in which a write finds no room.
 const STALL: Duration = Duration::from_secs(5);
@@ -61,6 +61,9 @@ pub struct Line {
     output: Mutex<Output>,
     /// Stops that wait for the output: the owner's next piece waits for them.
     urgent: AtomicUsize,
+    /// Stops and Pauses of other programs, and those of them that are Stops. They change with `Output::halted`.
+    halts: AtomicU64,
+    stops: AtomicU64,
     /// One Stop is written and confirmed after the other.
     turn: Mutex<()>,
     input: Mutex<Input>,
@@ -141,6 +144,8 @@ impl Line {
                 jogged: None,
             }),
             urgent: AtomicUsize::new(0),
+            halts: AtomicU64::new(0),
+            stops: AtomicU64::new(0),
             turn: Mutex::new(()),
             input: Mutex::new(Input {
                 port: reading,
@@ -182,10 +187,20 @@ impl Line {
         Ok(())
     }
 
-    /// The owner requests a motion now: what it sends from now on was requested after the last Stop, unless that has just come.
-    pub fn ask_to_move(&self) {
+    /// Number of Stops and Pauses of other programs so far. It waits for nothing.
+    pub fn halts(&self) -> Halts {
+        // A Stop counts in `halts` first: so no Stop is seen here without its number.
+        let stops = self.stops.load(Ordering::SeqCst);
+        Halts { all: self.halts.load(Ordering::SeqCst), stops }
+    }
+
+    /// The owner sends a motion from now on that was requested after so many halts. The gate opens unless another halt came since, or the
+    /// last one has just come.
+    pub fn ask_to_move(&self, after: u64) {
         let mut output = lock(&self.output);
-        if output.halted.take_if(|halted| halted.at.elapsed() >= CALM).is_some() {
+        if after == self.halts.load(Ordering::SeqCst)
+            && output.halted.take_if(|halted| halted.at.elapsed() >= CALM).is_some()
+        {
             output.given_up = false;
         }
     }
@@ -208,6 +223,10 @@ impl Line {
         // First of all nothing that moves the arm passes any more.
         self.urgently(|output| {
             output.halted = Some(Halted { by: by.to_owned(), at: Instant::now() });
+            self.halts.fetch_add(1, Ordering::SeqCst);
+            if command == ExecCommand::Stop {
+                self.stops.fetch_add(1, Ordering::SeqCst);
+            }
             jogged = output.jogged.is_some_and(|at| at.elapsed() < RECENT);
             Ok(())
         })?;

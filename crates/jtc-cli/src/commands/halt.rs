@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_client::agents::registered;
 use jtc_host::port::halt::{self, Answer, End, Halt};
-use jtc_host::port::{Standstill, is_moving};
+use jtc_host::port::{Standstill, is_moving, is_paused};
 use jtc_host::{Error, LinkError, PortError, Session};
+use jtc_wire::{ControllerState, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -21,6 +22,8 @@ const CHANGES_HANDS: Duration = Duration::from_millis(500);
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Programs that may have the port one after the other while one Stop is waited for.
 const OWNERS: usize = 16;
+/// Time after which a Stop, or the end of teaching, is sent again while statuses do not show it.
+const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
 
@@ -267,13 +270,27 @@ fn directly(
         Err(error) => return Err(error.into()),
     };
     // An arm that is taught is loose, and a Stop holds it.
-    let taught = session.last().is_some_and(|status| status.state == jtc_wire::ControllerState::Teaching);
+    let is_taught = |status: &Status| status.state == ControllerState::Teaching;
+    let taught = session.last().is_some_and(is_taught);
     if taught {
         session.teach(false)?;
     }
-    let (start, mut standstill) = (session.now(), Standstill::default());
+    let (start, mut standstill) = (session.now(), Standstill::after(Halt::Stop));
+    let mut written_at = start;
     loop {
         let status = session.next_status()?;
+        if session.now().saturating_sub(written_at) >= AGAIN {
+            if is_taught(&status) {
+                session.teach(false)?;
+            } else if is_paused(&status) {
+                match session.stop() {
+                    // The next statuses show what the controller does.
+                    Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            written_at = session.now();
+        }
         standstill.see(session.now(), &status);
         if standstill.is_reached() {
             return Ok(Stopped {

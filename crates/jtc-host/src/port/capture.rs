@@ -86,6 +86,9 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         self.port.ask_to_move_after(halts)
     }
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.port.ask_to_resume()
+    }
 }
 
 /// One line of a capture.

@@ -105,8 +105,8 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     let request: Request = read_line(stream, REQUEST_MAX)?;
     let by: String = request.by.chars().filter(|c| !c.is_control()).take(100).collect();
-    let done = line.halt(request.halt.command(), &by);
+    let done = line.halt(request.halt, &by);
     write_line(stream, &Answer::of(line.path.clone(), line.baud, done))?;
-    let Some((status, standstill)) = line.wait_for_rest() else { return Ok(()) };
+    let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };
     write_line(stream, &End::of(&status, &standstill))
 }

@@ -11,14 +11,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use jtc_wire::{ExecCommand, Status};
+use jtc_wire::{ControllerState, ExecCommand, Status};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::PortError;
 use super::line::HaltOutcome;
 #[cfg(unix)]
 use super::runtime;
-use super::standstill::Standstill;
+use super::standstill::{Standstill, is_paused};
 use crate::words;
 
 /// Most bytes of a request.
@@ -121,6 +121,12 @@ impl End {
             Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
             None if stands => None,
             None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
+            None if status.state == ControllerState::Teaching => {
+                Some("teaching does not end: the arm can be led by hand".to_owned())
+            }
+            None if is_paused(status) => {
+                Some("the trajectory is paused and not stopped: it can be resumed".to_owned())
+            }
             None => Some("the arm was not still for long enough".to_owned()),
         };
         Self { stands, moved: standstill.moved(), moving }

@@ -22,7 +22,7 @@ pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
 pub use list::{PortInfo, PortKind, list, only_one};
 pub use serial::{STANDARD_RATES, SerialPort};
-pub use standstill::{Standstill, is_moving};
+pub use standstill::{Standstill, is_moving, is_paused};
 
 /// Number of times that other programs stopped or paused the arm through a port of this program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,6 +70,10 @@ pub trait Port {
         let _ = halts;
         self.ask_to_move()
     }
+    /// Like [`ask_to_move`](Self::ask_to_move), to resume a paused motion: after a Stop no motion goes on.
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.ask_to_move()
+    }
 }
 
 impl<P: Port + ?Sized> Port for Box<P> {
@@ -99,6 +103,9 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         (**self).ask_to_move_after(halts)
+    }
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        (**self).ask_to_resume()
     }
 }
 

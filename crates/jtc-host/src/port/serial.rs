@@ -124,4 +124,9 @@ impl Port for SerialPort {
         self.line.ask_to_move(halts);
         Ok(())
     }
+
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.line.ask_to_resume(self.line.halts().all);
+        Ok(())
+    }
 }

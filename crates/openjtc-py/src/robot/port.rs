@@ -6,8 +6,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use jtc_host::port::sim::SimPort;
 use jtc_host::port::Halts;
+use jtc_host::port::sim::SimPort;
 use jtc_host::{Port, PortError};
 use jtc_wire::{FrameType, fixed};
 
@@ -254,6 +254,14 @@ impl Port for AnyPort {
         }
         let known = self.foreign.all;
         each_line!(mut port, self => port.ask_to_move_after(known))
+    }
+
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.take_foreign_halts();
+        if self.shared.halts() != self.at {
+            return Err(PortError::Halted { by: None });
+        }
+        each_line!(mut port, self => port.ask_to_resume())
     }
 
     fn halts(&self) -> Halts {

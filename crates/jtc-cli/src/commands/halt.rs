@@ -115,8 +115,6 @@ struct Stopped {
     moved: bool,
     state: String,
     trajectory: String,
-    /// What moves without torque.
-    falls: Option<String>,
     /// The program that had the port.
     holder: Option<Answer>,
 }
@@ -124,9 +122,6 @@ struct Stopped {
 impl Stopped {
     fn words(&self) -> String {
         let holder = self.holder.as_ref().map_or(String::new(), |answer| format!("; {}", holder(answer)));
-        if let Some(falls) = &self.falls {
-            return format!("nothing to stop: state {}, without torque {falls}{holder}", self.state);
-        }
         if self.moved {
             return format!("stopped: the arm stands{holder}");
         }
@@ -139,7 +134,6 @@ impl Stopped {
             "moved": self.moved,
             "state": self.state,
             "trajectory": self.trajectory,
-            "moves_without_torque": self.falls,
             "holder": self.holder.as_ref().map(holder_json),
         })
     }
@@ -222,20 +216,24 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
             #[cfg(unix)]
             Arm::Behind(_) => LinkArgs { port, token_file: None, tls_ca: None, baud: answer.baud },
         };
-        let (state, trajectory) = (answer.state.clone(), answer.trajectory.clone());
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
         so_far.moved |= answer.moved;
         match end {
-            Some(End { stands: true, moved, moving: falls }) => {
+            Some(End { stands: true, moved, state, trajectory, .. }) => {
                 let (accepted, moved) = (so_far.accepted, so_far.moved || moved);
-                return Ok(Stopped { accepted, moved, state, trajectory, falls, holder: first });
+                return Ok(Stopped { accepted, moved, state, trajectory, holder: first });
             }
-            Some(End { moving, .. }) => return Err(still_moving(&moving.unwrap_or_default())),
+            Some(end) => return Err(still_moving(&end)),
             None => reached = reach(&link, Halt::Stop),
         }
     }
-    Err(still_moving("one program after the other opens its port"))
+    let failure = Failure::new(
+        ErrorKind::Fault,
+        "still-moving",
+        "one program after the other opens the port of the arm",
+    );
+    Err(failure.hint("press the emergency stop; `jtc status` shows the joints"))
 }
 
 fn reach_arm(arm: &Arm) -> Result<Reached, Failure> {
@@ -298,18 +296,19 @@ fn directly(
                 moved: moved.get() || taught || holder.as_ref().is_some_and(|answer| answer.moved),
                 state: status.state.to_string(),
                 trajectory: status.trajectory.to_string(),
-                falls: End::of(&status, &standstill).moving,
                 holder,
             });
         }
         if session.now().saturating_sub(start) >= REST {
-            return Err(still_moving(&End::of(&status, &standstill).moving.unwrap_or_default()));
+            return Err(still_moving(&End::of(&status, &standstill)));
         }
     }
 }
 
-fn still_moving(what: &str) -> Failure {
-    Failure::new(ErrorKind::Fault, "still-moving", format!("the arm does not come to rest: {what}"))
+fn still_moving(end: &End) -> Failure {
+    let what = end.moving.as_deref().unwrap_or_default();
+    let message = format!("the arm does not come to rest: {what} (state {})", end.state);
+    Failure::new(ErrorKind::Fault, "still-moving", message)
         .hint("press the emergency stop; `jtc status` shows the joints")
 }
 

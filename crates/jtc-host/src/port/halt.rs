@@ -18,7 +18,7 @@ use super::PortError;
 use super::line::HaltOutcome;
 #[cfg(unix)]
 use super::runtime;
-use super::standstill::{Standstill, is_paused};
+use super::standstill::{Standstill, has_torque, is_paused};
 use crate::words;
 
 /// Most bytes of a request.
@@ -91,8 +91,14 @@ pub struct End {
     pub stands: bool,
     /// The arm moved before.
     pub moved: bool,
-    /// What still moves. In a state without torque that is no fault of the Stop.
+    /// What still moves.
     pub moving: Option<String>,
+    /// State of the controller.
+    #[serde(default)]
+    pub state: String,
+    /// Trajectory execution state.
+    #[serde(default)]
+    pub trajectory: String,
 }
 
 impl Answer {
@@ -118,8 +124,11 @@ impl End {
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
         let stands = standstill.is_reached();
         let moving = match words::moving_joint(status) {
+            _ if stands => None,
+            Some((joint, speed)) if !has_torque(status) => {
+                Some(format!("{joint} moves without torque at {speed:.2} rad/s, which no Stop ends"))
+            }
             Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
-            None if stands => None,
             None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
             None if status.state == ControllerState::Teaching => {
                 Some("teaching does not end: the arm can be led by hand".to_owned())
@@ -129,7 +138,8 @@ impl End {
             }
             None => Some("the arm was not still for long enough".to_owned()),
         };
-        Self { stands, moved: standstill.moved(), moving }
+        let (state, trajectory) = (status.state.to_string(), status.trajectory.to_string());
+        Self { stands, moved: standstill.moved(), moving, state, trajectory }
     }
 }
 

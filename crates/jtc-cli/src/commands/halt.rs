@@ -27,12 +27,16 @@ const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
 
+/// The arm does not come to rest after a confirmed Stop.
+const STILL_MOVING: &str = "still-moving";
+const STILL_MOVING_HINT: &str = "press the emergency stop; `jtc status` shows the joints";
+
 /// Stops the arm, and waits until it stands.
 pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let (mut done, mut failed) = (Vec::new(), None);
     for arm in arms(link) {
-        match stop_one(&arm, &progress) {
+        match stop_one(&arm, &progress).map_err(|error| error.told(Halt::Stop)) {
             Ok(stopped) => done.push(stopped),
             Err(failure) => {
                 // Other arms are stopped all the same.
@@ -55,10 +59,14 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 /// Pauses on the path.
 pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    let (answer, words) = match reach(link, Halt::Pause).map_err(may_be_moving)? {
+    let (answer, words) = match reach(link, Halt::Pause).map_err(|error| error.told(Halt::Pause))? {
         Reached::Line(mut session) => {
             progress.watch(&mut session);
-            session.pause()?;
+            session.pause().map_err(|error| match error {
+                // There is nothing to pause.
+                Error::Link(LinkError::Refused { .. }) => error.into(),
+                error => unconfirmed(error).told(Halt::Pause),
+            })?;
             (None, "pausing on the path".to_owned())
         }
         Reached::Holder(answer, _) if answer.accepted || answer.moved => {
@@ -140,11 +148,73 @@ impl Stopped {
 }
 
 fn holder(answer: &Answer) -> String {
-    format!("{}, process {}, has {} and moves the arm no more", answer.program, answer.pid, answer.port)
+    format!(
+        "{}, process {}, has {}: what it requested before is void, and it may request a new motion after 3 s",
+        answer.program, answer.pid, answer.port
+    )
 }
 
 fn holder_json(answer: &Answer) -> Value {
     json!({ "program": answer.program, "pid": answer.pid, "port": answer.port })
+}
+
+/// How far a halt got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Sent {
+    Nothing,
+    /// It may have got to the controller.
+    Unconfirmed,
+    /// The controller has received it.
+    Confirmed,
+}
+
+/// An arm that may be moving.
+#[derive(Debug)]
+struct NotHalted {
+    sent: Sent,
+    failure: Failure,
+}
+
+impl From<Failure> for NotHalted {
+    fn from(failure: Failure) -> Self {
+        Self { sent: Sent::Nothing, failure }
+    }
+}
+
+impl NotHalted {
+    fn after(sent: Sent, failure: impl Into<Failure>) -> Self {
+        Self { sent, failure: failure.into() }
+    }
+
+    /// The same, after an earlier program has got a Stop so far.
+    fn at_least(self, sent: Sent) -> Self {
+        Self { sent: self.sent.max(sent), ..self }
+    }
+
+    /// An operator who wants an arm to stand learns how far the halt got, and what stops the arm in any case.
+    fn told(self, halt: Halt) -> Failure {
+        let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
+        if self.failure.code == STILL_MOVING {
+            return self.failure;
+        }
+        let what = match self.sent {
+            Sent::Nothing => {
+                "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
+                 stops there)"
+                    .to_owned()
+            }
+            Sent::Unconfirmed => {
+                format!("the {name} was sent and is not confirmed: if the arm is moving, press the emergency stop")
+            }
+            Sent::Confirmed => format!(
+                "the controller has confirmed the {name}, but no status shows that the arm stands: if it moves, press the emergency stop"
+            ),
+        };
+        let next = &self.failure.hint;
+        // The words of an error may name the emergency stop alone.
+        let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
+        Failure { hint: hint.trim_end_matches([' ', '.']).to_owned(), ..self.failure }
+    }
 }
 
 /// How an arm is reached.
@@ -156,20 +226,20 @@ enum Reached {
 }
 
 /// Opens the line, or asks the program that has the port.
-fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, Failure> {
+fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
         let (path, busy) = match link.open_unless_busy(None)? {
             Ok(port) => return Ok(Reached::Line(Session::new(port))),
             Err(PortError::Busy { path }) => (path.clone(), PortError::Busy { path }),
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(Failure::from(error).into()),
         };
         if let Some((answer, stands)) = ask(&path, what)? {
             return Ok(Reached::Holder(answer, stands));
         }
         let patience = if is_own(&path) { CHANGES_OWN_HANDS } else { CHANGES_HANDS };
         if start.elapsed() >= patience {
-            return Err(busy.into());
+            return Err(Failure::from(busy).into());
         }
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -188,26 +258,35 @@ fn is_own(_: &str) -> bool {
 
 /// Asks the program that has this port, if it is one of this user that listens.
 #[cfg(unix)]
-fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, Failure> {
+fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     for socket in halt::sockets_of(path) {
-        if let Some(answered) = halt::ask(&socket, what, &who())? {
+        if let Some(answered) = ask_at(&socket, what)? {
             return Ok(Some(answered));
         }
     }
     Ok(None)
 }
 
+/// Asks the program that listens at this socket. One that does not answer may have written the frame.
+#[cfg(unix)]
+fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
+    halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
+}
+
 #[cfg(not(unix))]
-fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, Failure> {
+fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
 /// Stops one arm. A program that was stopped may end before the arm stands: then the port is free, or another program has it.
-fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
+fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
-        let (answer, end) = match reached.map_err(may_be_moving)? {
-            Reached::Line(session) => return directly(session, progress, first),
+        let sent = if first.is_some() { Sent::Confirmed } else { Sent::Nothing };
+        let (answer, end) = match reached.map_err(|error| error.at_least(sent))? {
+            Reached::Line(session) => {
+                return directly(session, progress, first).map_err(|error| error.at_least(sent));
+            }
             Reached::Holder(answer, end) => (answer, end),
         };
         let port = Some(answer.port.clone());
@@ -224,26 +303,24 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
                 let (accepted, moved) = (so_far.accepted, so_far.moved || moved);
                 return Ok(Stopped { accepted, moved, state, trajectory, holder: first });
             }
-            Some(end) => return Err(still_moving(&end)),
+            Some(end) => return Err(NotHalted::after(Sent::Confirmed, still_moving(&end))),
             None => reached = reach(&link, Halt::Stop),
         }
     }
-    let failure = Failure::new(
-        ErrorKind::Fault,
-        "still-moving",
-        "one program after the other opens the port of the arm",
-    );
-    Err(failure.hint("press the emergency stop; `jtc status` shows the joints"))
+    let message = "one program after the other opens the port of the arm";
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT);
+    Err(NotHalted::after(Sent::Confirmed, failure))
 }
 
-fn reach_arm(arm: &Arm) -> Result<Reached, Failure> {
+fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     match arm {
         Arm::Of(link) => reach(link, Halt::Stop),
         #[cfg(unix)]
-        Arm::Behind(socket) => match halt::ask(socket, Halt::Stop, &who())? {
+        Arm::Behind(socket) => match ask_at(socket, Halt::Stop)? {
             Some((answer, end)) => Ok(Reached::Holder(answer, end)),
             None => Err(Failure::new(ErrorKind::NoLink, "port", "the program that had the port has ended")
-                .hint("`jtc stop --port PATH` stops the arm at its port")),
+                .hint("`jtc stop --port PATH` stops the arm at its port")
+                .into()),
         },
     }
 }
@@ -253,7 +330,7 @@ fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,
     holder: Option<Answer>,
-) -> Result<Stopped, Failure> {
+) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
     // Statuses that come in before the Stop is confirmed count, too.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
@@ -265,26 +342,27 @@ fn directly(
     let accepted = match session.stop() {
         Ok(()) => true,
         Err(Error::Link(LinkError::Refused { .. })) => false,
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(unconfirmed(error)),
     };
+    let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
     // An arm that is taught is loose, and a Stop holds it.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
-        session.teach(false)?;
+        session.teach(false).map_err(confirmed)?;
     }
     let (start, mut standstill) = (session.now(), Standstill::after(Halt::Stop));
     let mut written_at = start;
     loop {
-        let status = session.next_status()?;
+        let status = session.next_status().map_err(|error| confirmed(error.into()))?;
         if session.now().saturating_sub(written_at) >= AGAIN {
             if is_taught(&status) {
-                session.teach(false)?;
+                session.teach(false).map_err(confirmed)?;
             } else if is_paused(&status) {
                 match session.stop() {
                     // The next statuses show what the controller does.
                     Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
-                    Err(error) => return Err(error.into()),
+                    Err(error) => return Err(confirmed(error)),
                 }
             }
             written_at = session.now();
@@ -300,7 +378,8 @@ fn directly(
             });
         }
         if session.now().saturating_sub(start) >= REST {
-            return Err(still_moving(&End::of(&status, &standstill)));
+            let end = End::of(&status, &standstill);
+            return Err(NotHalted::after(Sent::Confirmed, still_moving(&end)));
         }
     }
 }
@@ -308,16 +387,14 @@ fn directly(
 fn still_moving(end: &End) -> Failure {
     let what = end.moving.as_deref().unwrap_or_default();
     let message = format!("the arm does not come to rest: {what} (state {})", end.state);
-    Failure::new(ErrorKind::Fault, "still-moving", message)
-        .hint("press the emergency stop; `jtc status` shows the joints")
+    Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT)
 }
 
-/// Whoever wants an arm to stand and has no port must know that nothing was sent.
-fn may_be_moving(failure: Failure) -> Failure {
-    let hint = format!(
-        "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
-         stops there). {}",
-        failure.hint
-    );
-    Failure { hint, ..failure }
+/// An error of a frame that was written, or that an agent refused.
+fn unconfirmed(error: Error) -> NotHalted {
+    let sent = match error {
+        Error::Link(LinkError::Denied { .. }) => Sent::Nothing,
+        _ => Sent::Unconfirmed,
+    };
+    NotHalted::after(sent, error)
 }

@@ -1,13 +1,16 @@
 //! `jtc stop` and `jtc traj pause`: directly, through an agent, or through the program of this user that has the port.
 
 use std::cell::Cell;
+use std::panic::resume_unwind;
+#[cfg(unix)]
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output};
-use jtc_client::agents::registered;
+use jtc_client::agents::{Registered, is_same_port, registered};
 use jtc_host::port::halt::{self, Answer, End, Halt};
-use jtc_host::port::{Standstill, is_moving, is_paused};
+use jtc_host::port::{Standstill, is_moving, is_paused, usb_names};
 use jtc_host::{Error, LinkError, PortError, Session};
 use jtc_wire::{ControllerState, Status};
 use serde_json::{Value, json};
@@ -33,27 +36,58 @@ const STILL_MOVING_HINT: &str = "press the emergency stop; `jtc status` shows th
 
 /// Stops the arm, and waits until it stands.
 pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let progress = Progress::begin(out)?;
-    let (mut done, mut failed) = (Vec::new(), None);
-    for arm in arms(link) {
-        match stop_one(&arm, &progress).map_err(|error| error.told(Halt::Stop)) {
-            Ok(stopped) => done.push(stopped),
-            Err(failure) => {
-                // Other arms are stopped all the same.
-                if let Some(earlier) = failed.replace(failure) {
-                    out.failure(&earlier);
-                }
-            }
-        }
+    let arms = arms(link);
+    let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
+    out.stream()?;
+    // No arm waits for the end of another one's Stop.
+    let ends: Vec<Result<Stopped, Failure>> = std::thread::scope(|scope| {
+        let stops: Vec<_> =
+            arms.iter().map(|arm| scope.spawn(|| stop_one(arm, &Progress::begin(out)?))).collect();
+        let ends = stops.into_iter().map(|stop| stop.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        ends.map(|end| end.map_err(|error| error.told(Halt::Stop))).collect()
+    });
+    let mut failed: Vec<&Failure> = ends.iter().filter_map(|end| end.as_ref().err()).collect();
+    if let [_] = ends[..]
+        && !failed.is_empty()
+    {
+        return ends.into_iter().next().map_or(Ok(()), |end| end.map(drop));
     }
-    if let Some(failure) = failed {
-        done.iter().for_each(|stopped| out.note(stopped.words()));
-        return Err(failure);
+    let words: Vec<String> = ends.iter().flatten().map(Stopped::words).collect();
+    failed.iter().for_each(|failure| out.warn(&failure.message, &failure.hint));
+    if !not_asked.is_empty() {
+        out.note(format_args!(
+            "jtc: not asked, no program of this user has it: {}; `jtc stop --port PATH` stops an arm there",
+            not_asked.join(", ")
+        ));
     }
-    let arms: Vec<Value> = done.iter().map(Stopped::json).collect();
-    let value = json!({ "command": "stop", "accepted": done.iter().any(|one| one.accepted), "arms": arms });
-    out.result(&value, || done.iter().map(Stopped::words).collect::<Vec<_>>().join("\n"));
-    Ok(())
+    let arms: Vec<Value> =
+        ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
+    let accepted = ends.iter().flatten().any(|one| one.accepted);
+    let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
+    // The most urgent one: an arm moves.
+    failed.sort_by_key(|failure| failure.code != STILL_MOVING);
+    if let Some(failure) = failed.first() {
+        value["error"] = failure.to_json();
+    }
+    if out.is_json() || !words.is_empty() {
+        out.result(&value, || words.join("\n"));
+    }
+    failed.first().map_or(Ok(()), |failure| Err(Failure::printed(failure.kind)))
+}
+
+fn failed_json(failure: &Failure) -> Value {
+    json!({ "error": failure.to_json() })
+}
+
+/// The ports on USB where no arm is stopped.
+fn not_asked(arms: &[Arm]) -> Vec<String> {
+    let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
+    if asked.is_empty() {
+        // The only port there is.
+        return Vec::new();
+    }
+    let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
+    usb_names().into_iter().filter(|name| !is_asked(name)).collect()
 }
 
 /// Pauses on the path.
@@ -94,25 +128,72 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 /// port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
-        return vec![Arm::Of(link.clone())];
+        return vec![Arm::Of { link: link.clone(), port: None }];
     }
-    let of_agent = |url: String| Arm::Of(LinkArgs { port: Some(url), ..link.clone() });
-    let mut arms: Vec<Arm> = registered().into_iter().map(|agent| of_agent(agent.url)).collect();
+    let of_agent = |agent: Registered| {
+        let link = LinkArgs { port: Some(agent.url), ..link.clone() };
+        Arm::Of { link, port: Some(agent.port) }
+    };
+    let agents = registered();
     #[cfg(unix)]
-    arms.extend(halt::sockets().into_iter().filter(|socket| halt::is_alive(socket)).map(Arm::Behind));
+    let behind = behind(link, &agents);
+    let mut arms: Vec<Arm> = agents.into_iter().map(of_agent).collect();
+    #[cfg(unix)]
+    arms.extend(behind);
     if arms.is_empty() {
-        arms.push(Arm::Of(link.clone()));
+        arms.push(Arm::Of { link: link.clone(), port: None });
     }
     arms
 }
 
+/// The arms behind sockets. That of a program that was killed counts, too: its arm may be moving on.
+#[cfg(unix)]
+fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
+    let (alive, stale): (Vec<_>, Vec<_>) =
+        halt::sockets().into_iter().partition(|socket| halt::is_alive(socket));
+    let arm = |socket: PathBuf| {
+        let port = halt::port_of(&socket);
+        let link = LinkArgs { port: port.clone(), token_file: None, tls_ca: None, baud: link.baud };
+        Arm::Behind { socket, link }
+    };
+    let is_reached = |socket: &PathBuf, port: &str| {
+        alive.iter().any(|other| other.file_name() == socket.file_name())
+            || agents.iter().any(|agent| is_same_port(&agent.port, port))
+    };
+    let left: Vec<Arm> = stale
+        .into_iter()
+        .filter(|socket| halt::port_of(socket).is_some_and(|port| !is_reached(socket, &port)))
+        .map(arm)
+        .collect();
+    alive.iter().cloned().map(arm).chain(left).collect()
+}
+
 /// An arm to stop.
 enum Arm {
-    /// At a port, or of an agent.
-    Of(LinkArgs),
-    /// Of the program that listens at this socket.
+    /// At a port, or of an agent that has this port.
+    Of { link: LinkArgs, port: Option<String> },
+    /// Of the program that listens at this socket, or did; with its port, if it is there.
     #[cfg(unix)]
-    Behind(std::path::PathBuf),
+    Behind { socket: PathBuf, link: LinkArgs },
+}
+
+impl Arm {
+    /// The port, where it is known.
+    fn port(&self) -> Option<&str> {
+        match self {
+            Self::Of { port, .. } => port.as_deref(),
+            #[cfg(unix)]
+            Self::Behind { link, .. } => link.port.as_deref(),
+        }
+    }
+
+    fn link(&self) -> &LinkArgs {
+        match self {
+            Self::Of { link, .. } => link,
+            #[cfg(unix)]
+            Self::Behind { link, .. } => link,
+        }
+    }
 }
 
 /// An arm that stands now.
@@ -290,11 +371,8 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             Reached::Holder(answer, end) => (answer, end),
         };
         let port = Some(answer.port.clone());
-        let link = match arm {
-            Arm::Of(link) => LinkArgs { port, ..link.clone() },
-            #[cfg(unix)]
-            Arm::Behind(_) => LinkArgs { port, token_file: None, tls_ca: None, baud: answer.baud },
-        };
+        let baud = if matches!(arm, Arm::Of { .. }) { arm.link().baud } else { answer.baud };
+        let link = LinkArgs { port, baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
         so_far.moved |= answer.moved;
@@ -314,14 +392,26 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
 
 fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     match arm {
-        Arm::Of(link) => reach(link, Halt::Stop),
+        Arm::Of { link, .. } => reach(link, Halt::Stop),
         #[cfg(unix)]
-        Arm::Behind(socket) => match ask_at(socket, Halt::Stop)? {
-            Some((answer, end)) => Ok(Reached::Holder(answer, end)),
-            None => Err(Failure::new(ErrorKind::NoLink, "port", "the program that had the port has ended")
-                .hint("`jtc stop --port PATH` stops the arm at its port")
-                .into()),
-        },
+        Arm::Behind { socket, link } => {
+            let start = Instant::now();
+            loop {
+                if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
+                    return Ok(Reached::Holder(answer, end));
+                }
+                // The program has ended, or answers others: the port is free, or the next program has it.
+                if link.port.is_some() {
+                    return reach(link, Halt::Stop);
+                }
+                if start.elapsed() >= CHANGES_OWN_HANDS {
+                    let message = "the program that had the port has ended, and its port is not found";
+                    let failure = Failure::new(ErrorKind::NoLink, "port", message);
+                    return Err(failure.hint("`jtc stop --port PATH` stops the arm at its port").into());
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+        }
     }
 }
 

@@ -207,6 +207,27 @@ pub fn sockets() -> Vec<PathBuf> {
     files.flatten().map(|file| file.path()).filter(named).collect()
 }
 
+/// The port of a socket, if its device is the one for which the program listened. A device that was plugged in, or a pseudo-terminal that
+/// was opened, after that may be another one with the same number.
+#[cfg(unix)]
+pub fn port_of(socket: &Path) -> Option<String> {
+    use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
+    let name = socket.file_name()?.to_str()?;
+    let number = u64::from_str_radix(name.strip_prefix("line-")?.strip_suffix(".sock")?, 16).ok()?;
+    let found = std::fs::symlink_metadata(socket).ok()?;
+    let listened = (found.mtime(), found.mtime_nsec());
+    let files =
+        ["/dev", "/dev/pts"].into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
+    let port = files.flatten().map(|file| file.path()).find(|path| {
+        std::fs::symlink_metadata(path).is_ok_and(|node| {
+            node.file_type().is_char_device()
+                && node.rdev() == number
+                && (node.ctime(), node.ctime_nsec()) <= listened
+        })
+    })?;
+    Some(port.display().to_string())
+}
+
 /// A program listens at this socket.
 #[cfg(unix)]
 pub fn is_alive(socket: &Path) -> bool {

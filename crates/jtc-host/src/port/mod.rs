@@ -20,7 +20,7 @@ use std::time::Duration;
 
 pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
-pub use list::{PortInfo, PortKind, list, only_one};
+pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 

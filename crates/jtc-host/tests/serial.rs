@@ -303,3 +303,37 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
         thread.join().unwrap();
     }
 }
+
+/// Two programs of the superuser may have one port: the later one takes no socket from the earlier, and removes none that is not its own.
+#[test]
+fn a_socket_of_a_living_program_is_left_alone() {
+    let (_far, path) = pair();
+    let port = SerialPort::open(&path, 115_200).unwrap();
+    let socket = door(&path);
+    let kept = socket.with_extension("kept");
+    std::fs::rename(&socket, &kept).unwrap();
+    // Another program listens at the same place by now.
+    let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    drop(port);
+    assert!(socket.exists(), "it is not the port's own");
+    std::fs::remove_file(kept).unwrap();
+    let port = SerialPort::open(&path, 115_200).unwrap();
+    drop(port);
+    assert!(halt::is_alive(&socket));
+    drop(other);
+    std::fs::remove_file(&socket).unwrap();
+}
+
+/// A request whose bytes come slowly has one deadline: it does not keep the port from being closed.
+#[test]
+fn a_request_that_comes_byte_by_byte_is_given_up() {
+    let (_far, path) = pair();
+    let _port = SerialPort::open(&path, 115_200).unwrap();
+    let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
+    // The door hangs up before the line is whole: far more than a second of bytes.
+    let closed = (0..100).any(|_| {
+        std::thread::sleep(Duration::from_millis(100));
+        stream.write_all(b" ").is_err()
+    });
+    assert!(closed);
+}

@@ -103,6 +103,8 @@ pub struct End {
 
 impl Answer {
     pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
+        // The asker may work in another folder.
+        let port = std::path::absolute(&port).map_or(port, |absolute| absolute.display().to_string());
         let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
         match done {
             Ok(Some(HaltOutcome { accepted, moved, status })) => Self {

@@ -120,6 +120,22 @@ struct Seen {
     answered: VecDeque<(u64, Response)>,
 }
 
+/// Counts while it lives, also when its thread panics.
+pub(super) struct Counted<'a>(&'a AtomicUsize);
+
+impl<'a> Counted<'a> {
+    pub fn new(counter: &'a AtomicUsize) -> Self {
+        counter.fetch_add(1, Ordering::SeqCst);
+        Self(counter)
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -455,10 +471,8 @@ impl Line {
 
     /// Does something with the output before the owner writes its next piece.
     fn urgently(&self, work: impl FnOnce(&mut Output) -> Result<(), PortError>) -> Result<(), PortError> {
-        self.urgent.fetch_add(1, Ordering::SeqCst);
-        let done = work(&mut lock(&self.output));
-        self.urgent.fetch_sub(1, Ordering::SeqCst);
-        done
+        let _counted = Counted::new(&self.urgent);
+        work(&mut lock(&self.output))
     }
 
     /// A lock is not handed over in turn: the owner waits for Stops that wait for it. They take as long as one short write.

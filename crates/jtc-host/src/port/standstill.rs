@@ -98,11 +98,11 @@ mod tests {
             for (velocity, stands) in [(0.0, true), (0.019, true), (0.05, false), (-0.3, false), (2.0, false)]
             {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
-                assert_eq!(reached, stands, "{state} {velocity}");
+                assert_eq!(reached, stands, "{state:?} {velocity}");
             }
             // Still for a moment only.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
-            assert!(!stands_after(Halt::Stop, swings), "{state}");
+            assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }
     }
 
@@ -112,8 +112,8 @@ mod tests {
         let paused = |state| Status { trajectory: TrajectoryState::Pause.into(), ..status(state, 0.0) };
         assert!(!stands_after(Halt::Stop, |_| status(Teaching, 0.0)));
         for state in [HoldPos, Operate] {
-            assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state}");
-            assert!(stands_after(Halt::Pause, |_| paused(state)), "{state}");
+            assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
+            assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
         // Without torque nothing is resumed.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));

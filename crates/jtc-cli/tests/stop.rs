@@ -35,12 +35,11 @@ impl Cell {
 
     /// Starts a command, and waits for a line of its stderr that fits.
     fn start(&self, words: &[&str], fits: impl Fn(&str) -> bool) -> Child {
-        let mut child = self
-            .command(&[&["--json"], words].concat())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        Self::started(self.command(&[&["--json"], words].concat()), words, fits)
+    }
+
+    fn started(mut command: Command, words: &[&str], fits: impl Fn(&str) -> bool) -> Child {
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut err = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
         while !fits(&line) {
@@ -112,6 +111,8 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm stands; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
+    // What the program may do is not denied.
+    assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
@@ -290,22 +291,37 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
 }
 
+/// No Stop holds an arm without brakes that has no torque: as long as it falls, the Stop is no success.
 #[test]
-fn nothing_to_stop_is_a_success_in_error_and_without_torque() {
+fn an_arm_that_falls_without_torque_does_not_stand() {
+    let stops = |cell: &Cell, state: &str| {
+        let stopped = cell.jtc(&["stop"]);
+        if stopped.code == 0 {
+            assert!(
+                stopped.out.starts_with(&format!("nothing was moving: state {state}")),
+                "{}",
+                stopped.out
+            );
+        } else {
+            let stopped = stopped.ends(5);
+            let words = format!("(state {state})");
+            assert!(
+                stopped.err.contains("moves without torque") && stopped.err.contains(&words),
+                "{}",
+                stopped.err
+            );
+            assert!(stopped.err.contains("emergency stop"), "{}", stopped.err);
+        }
+    };
     let fault = "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nat_point = 500\n";
     let cell = Cell(Sim::with_faults(&["--no-throttle"], fault).held());
     let file = cell.0.file("motion.csv", &slow_motion(50));
     cell.jtc(&["traj", "run", &file]).ends(5);
-    // An arm without brakes falls then, which no Stop ends.
-    let stopped = cell.jtc(&["stop"]).ends(0);
-    let told = ["nothing was moving: state Error", "nothing to stop: state Error, without torque joint "];
-    assert!(told.iter().any(|told| stopped.out.starts_with(told)), "{}", stopped.out);
+    stops(&cell, "Error");
     // Without torque the controller is in Init, with drives that were enabled before.
     let cell = Cell(Sim::start(&["--no-throttle"]).held());
     cell.jtc(&["disable", "--yes"]).ends(0);
-    let stopped = cell.jtc(&["stop"]).ends(0);
-    let told = ["nothing was moving: state Init", "nothing to stop: state Init, without torque joint "];
-    assert!(told.iter().any(|told| stopped.out.starts_with(told)), "{}", stopped.out);
+    stops(&cell, "Init");
 }
 
 #[test]
@@ -335,6 +351,8 @@ fn a_program_that_does_not_answer_is_named() {
     let silent = cell.jtc(&["stop"]).ends(3);
     let words = format!("the program that has this port (process {}) did not answer within 3 s", child.id());
     assert!(silent.err.contains(&words) && silent.err.contains("emergency stop"), "{}", silent.err);
+    assert!(silent.err.contains("the Stop was sent and is not confirmed"), "{}", silent.err);
+    assert!(!silent.err.contains("nothing was sent"), "{}", silent.err);
     signal(&child, "-CONT");
     child.kill().unwrap();
     child.wait().unwrap();
@@ -383,6 +401,70 @@ fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let stopped = run(stop, &[], "").ends(0);
     assert!(stopped.out.starts_with("stopped: the arm stands; jtc traj run"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
+}
+
+/// Two arms whose programs have one folder for sockets; what `jtc stop` without a port says.
+struct Two(Cell, Child, Cell, Child);
+
+impl Two {
+    fn moving() -> Self {
+        let (one, other) = (Cell::held(), Cell::held());
+        let file = one.0.file("motion.csv", &slow_motion(200));
+        let first = one.moving(&["traj", "run", &file], "", 1.0);
+        let words = ["--json", "traj", "run", &file];
+        let mut second = other.0.command(&words);
+        second.env("XDG_RUNTIME_DIR", one.0.dir.path());
+        let second = Cell::started(second, &words, |line| {
+            let event: Value = serde_json::from_str(line).unwrap_or_default();
+            event["path_s"].as_f64().is_some_and(|s| s > 1.0)
+        });
+        Self(one, first, other, second)
+    }
+
+    fn stop(&self) -> CommandOutput {
+        let mut stop = command();
+        let folder = self.0.0.dir.path();
+        stop.env("XDG_RUNTIME_DIR", folder).env("TMPDIR", folder).args(["--json", "stop"]);
+        run(stop, &[], "")
+    }
+}
+
+/// The controller goes on with the motion of a program that was killed: the socket that it left names the arm.
+#[test]
+fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
+    let mut two = Two::moving();
+    two.1.kill().unwrap();
+    two.1.wait().unwrap();
+    let stopped = two.stop().ends(0).json();
+    let arms = stopped["arms"].as_array().unwrap();
+    assert_eq!(arms.len(), 2, "{stopped}");
+    assert!(arms.iter().all(|arm| arm["moved"] == true), "{stopped}");
+    let Two(one, _, other, second) = two;
+    assert_eq!(ends(second, 5)["outcome"], "stopped");
+    one.stands();
+    other.stands();
+}
+
+/// A program that hangs delays no other arm's Stop, and one JSON object tells of all arms.
+#[test]
+fn a_program_that_hangs_delays_no_other_stop() {
+    let two = Two::moving();
+    signal(&two.1, "-STOP");
+    let stopped = two.stop();
+    assert_eq!(stopped.code, 3, "{}", stopped.err);
+    let lines: Vec<&str> = stopped.out.lines().collect();
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    let value: Value = serde_json::from_str(lines[0]).unwrap();
+    let arms = value["arms"].as_array().unwrap();
+    let of = |key: &str| arms.iter().filter(|arm| !arm[key].is_null()).count();
+    assert_eq!((arms.len(), of("moved"), of("error")), (2, 1, 1), "{value}");
+    assert!(value["error"]["hint"].as_str().unwrap().contains("emergency stop"), "{value}");
+    let Two(_, mut first, other, second) = two;
+    assert_eq!(ends(second, 5)["outcome"], "stopped");
+    other.stands();
+    signal(&first, "-CONT");
+    first.kill().unwrap();
+    first.wait().unwrap();
 }
 
 #[test]

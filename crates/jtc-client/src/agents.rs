@@ -53,9 +53,8 @@ pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
 
 /// The agents that are there.
 pub fn registered() -> Vec<Registered> {
-    let Some(folder) = runtime::folder().filter(|folder| runtime::is_own(folder)) else { return Vec::new() };
-    let files = fs::read_dir(folder).into_iter().flatten().flatten();
-    files.filter_map(|file| alive(&file.path())).collect()
+    let files = runtime::folders().into_iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
+    files.flatten().filter_map(|file| alive(&file.path())).collect()
 }
 
 /// The agent of this file, if it holds the lock; one that was killed does not any more.

@@ -5,9 +5,9 @@ use std::io::{Read, Write};
 use std::time::Duration;
 
 use jtc_host::port::halt::{self, Halt};
-use jtc_host::port::{PortError, STANDARD_RATES, SerialPort};
+use jtc_host::port::{Halts, PortError, STANDARD_RATES, SerialPort};
 use jtc_host::{Diagnose, Port, frame};
-use jtc_wire::{DataStatus, FrameType, RawPoint, Response, Status, fixed};
+use jtc_wire::{ControllerState, DataStatus, FrameType, RawPoint, Response, Status, TrajectoryState, fixed};
 use serialport::{SerialPort as _, TTYPort};
 
 /// The far end, and the path of the near one.
@@ -84,11 +84,13 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     // Nothing that moves the arm passes any more, and what does not still does.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
-    port.write_all(&fixed::PAUSE).unwrap();
+    // A Pause would make a pause of the Stop.
+    assert!(port.write_all(&fixed::PAUSE).is_err());
+    port.write_all(&fixed::STOP).unwrap();
     port.write_all(&fixed::GET_INFO).unwrap();
-    let mut got = vec![0; fixed::PAUSE.len() + fixed::GET_INFO.len()];
+    let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
-    assert_eq!(got, [&fixed::PAUSE[..], &fixed::GET_INFO].concat());
+    assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
     // The owner does not read: the record is found all the same, and the owner has its bytes later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
@@ -125,4 +127,213 @@ fn a_stop_is_written_until_the_controller_confirms_it() {
     );
     drop(port);
     assert!(halt::sockets_of(&path).is_empty(), "the socket goes with the port");
+}
+
+/// Writes a Stop or Pause through the door of a port whose far end does not answer.
+fn halt_unconfirmed(path: &str, halt: Halt) {
+    let socket = door(path);
+    std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
+}
+
+/// A motion that waits for its turn, as in a queue, was requested before the Stop: no time makes a new request of it.
+#[test]
+fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
+    let (_far, path) = pair();
+    let mut port = SerialPort::open(&path, 115_200).unwrap();
+    let none = Halts::default();
+    assert_eq!(port.halts(), none);
+    // A motion passes before the Stop.
+    port.ask_to_move_after(none.all).unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
+    halt_unconfirmed(&path, Halt::Stop);
+    assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
+    // Longer than a new request has to wait.
+    std::thread::sleep(Duration::from_millis(3100));
+    for _ in 0..10 {
+        port.ask_to_move_after(none.all).unwrap();
+        let error = port.write_all(&fixed::EXECUTE).expect_err("requested before the Stop");
+        assert!(matches!(error, PortError::Halted { by: Some(_) }), "{error}");
+    }
+    // One that was requested after it passes.
+    port.ask_to_move_after(1).unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
+}
+
+/// J-33: a controller that gets a Pause while it slows down for a Stop pauses. So no Pause is written after a Stop, by whomever.
+#[test]
+fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
+    let (mut far, path) = pair();
+    let mut port = SerialPort::open(&path, 115_200).unwrap();
+    let read = |far: &mut TTYPort, frames: &[[u8; 7]]| {
+        for frame in frames {
+            let mut got = vec![0; frame.len()];
+            far.read_exact(&mut got).unwrap();
+            assert_eq!(got, frame);
+        }
+    };
+    halt_unconfirmed(&path, Halt::Pause);
+    read(&mut far, &[fixed::PAUSE; 8]);
+    // A Pause may follow a Pause, and a Stop replaces it.
+    port.write_all(&fixed::PAUSE).unwrap();
+    halt_unconfirmed(&path, Halt::Stop);
+    read(&mut far, &[fixed::PAUSE; 1]);
+    read(&mut far, &[fixed::STOP; 8]);
+    for _ in 0..5 {
+        assert!(port.write_all(&fixed::PAUSE).is_err());
+        halt_unconfirmed(&path, Halt::Pause);
+    }
+    std::thread::sleep(Duration::from_millis(3100));
+    port.ask_to_resume().unwrap();
+    assert!(port.write_all(&fixed::EXECUTE).is_err(), "a stopped motion is not resumed");
+    port.ask_to_move().unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
+    read(&mut far, &[fixed::EXECUTE; 1]);
+    // After a Pause alone it is resumed.
+    halt_unconfirmed(&path, Halt::Pause);
+    std::thread::sleep(Duration::from_millis(3100));
+    port.ask_to_resume().unwrap();
+    port.write_all(&fixed::EXECUTE).unwrap();
+    read(&mut far, &[fixed::PAUSE; 8]);
+    read(&mut far, &[fixed::EXECUTE; 1]);
+}
+
+/// The controller loses what the closure says, and shows these statuses. Bytes that it received, and the end.
+fn controller(
+    mut far: TTYPort,
+    mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
+) -> (std::sync::Arc<std::sync::atomic::AtomicBool>, std::thread::JoinHandle<()>) {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let over = std::sync::Arc::<AtomicBool>::default();
+    let end = std::sync::Arc::clone(&over);
+    far.set_timeout(Duration::from_millis(20)).unwrap();
+    let thread = std::thread::spawn(move || {
+        let mut buffer = [0; 256];
+        while !end.load(Ordering::SeqCst) {
+            let n = far.read(&mut buffer).unwrap_or(0);
+            far.write_all(&next(&buffer[..n]).emit()).unwrap();
+        }
+    });
+    (over, thread)
+}
+
+fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
+    bytes.windows(frame.len()).any(|window| window == frame)
+}
+
+/// The end of teaching is written until statuses show it, and the arm does not stand before.
+#[test]
+fn the_end_of_teaching_is_written_until_statuses_show_it() {
+    for heard in [1, 2, 5, u32::MAX] {
+        let (far, path) = pair();
+        let _port = SerialPort::open(&path, 115_200).unwrap();
+        let mut ends = 0;
+        let (over, thread) = controller(far, move |bytes| {
+            ends += u32::from(is_in(bytes, &fixed::TEACHING_MODE_DISABLE));
+            let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 1);
+            let taught = ends < heard;
+            Status {
+                state: if taught { ControllerState::Teaching } else { ControllerState::HoldPos }.into(),
+                response: if is_in(bytes, &fixed::STOP) { record } else { Response::default() },
+                ..Status::default()
+            }
+        });
+        let (answer, end) = halt::ask(&door(&path), Halt::Stop, "a test").unwrap().unwrap();
+        let end = end.expect("the program has the port still");
+        assert!(answer.confirmed && answer.moved, "{answer:?}");
+        assert_eq!(end.stands, heard != u32::MAX, "{end:?}");
+        assert!(
+            end.stands || end.moving.as_ref().is_some_and(|moving| moving.contains("teaching")),
+            "{end:?}"
+        );
+        over.store(true, std::sync::atomic::Ordering::SeqCst);
+        thread.join().unwrap();
+    }
+}
+
+/// Teaching that was requested, and did not begin yet, begins as soon as the arm rests: its end counts when a record of it came.
+#[test]
+fn teaching_that_did_not_begin_is_ended_with_a_record() {
+    for heard in [1, 3, u32::MAX] {
+        let (far, path) = pair();
+        let mut port = SerialPort::open(&path, 115_200).unwrap();
+        port.write_all(&fixed::TEACHING_MODE_ENABLE).unwrap();
+        let mut ends = 0;
+        let (over, thread) = controller(far, move |bytes| {
+            let is_end = is_in(bytes, &fixed::TEACHING_MODE_DISABLE);
+            ends += u32::from(is_end);
+            let good = |frame| Response::good(frame, DataStatus::NoError, 1);
+            let response = match () {
+                () if is_in(bytes, &fixed::STOP) => good(FrameType::TrajSetExecStatus),
+                () if is_end && ends >= heard => good(FrameType::TeachingModeDisable),
+                () => Response::default(),
+            };
+            Status { state: ControllerState::HoldPos.into(), response, ..Status::default() }
+        });
+        let (_, end) = halt::ask(&door(&path), Halt::Stop, "a test").unwrap().unwrap();
+        assert_eq!(end.expect("an end").stands, heard != u32::MAX, "{heard}");
+        over.store(true, std::sync::atomic::Ordering::SeqCst);
+        thread.join().unwrap();
+    }
+}
+
+/// A trajectory that is paused after a Stop is stopped again.
+#[test]
+fn a_pause_that_came_after_the_stop_is_stopped() {
+    for heard in [2, 3, u32::MAX] {
+        let (far, path) = pair();
+        let _port = SerialPort::open(&path, 115_200).unwrap();
+        let mut stops = 0;
+        let (over, thread) = controller(far, move |bytes| {
+            let is_stop = is_in(bytes, &fixed::STOP);
+            stops += u32::from(is_stop);
+            let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NoError, 1);
+            let paused = stops < heard;
+            Status {
+                state: ControllerState::HoldPos.into(),
+                trajectory: if paused { TrajectoryState::Pause } else { TrajectoryState::Stop }.into(),
+                response: if is_stop { record } else { Response::default() },
+                ..Status::default()
+            }
+        });
+        let (_, end) = halt::ask(&door(&path), Halt::Stop, "a test").unwrap().unwrap();
+        let end = end.expect("an end");
+        assert_eq!(end.stands, heard != u32::MAX, "{end:?}");
+        assert!(end.stands || end.moving.as_ref().is_some_and(|moving| moving.contains("paused")), "{end:?}");
+        over.store(true, std::sync::atomic::Ordering::SeqCst);
+        thread.join().unwrap();
+    }
+}
+
+/// Two programs of the superuser may have one port: the later one takes no socket from the earlier, and removes none that is not its own.
+#[test]
+fn a_socket_of_a_living_program_is_left_alone() {
+    let (_far, path) = pair();
+    let port = SerialPort::open(&path, 115_200).unwrap();
+    let socket = door(&path);
+    let kept = socket.with_extension("kept");
+    std::fs::rename(&socket, &kept).unwrap();
+    // Another program listens at the same place by now.
+    let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    drop(port);
+    assert!(socket.exists(), "it is not the port's own");
+    std::fs::remove_file(kept).unwrap();
+    let port = SerialPort::open(&path, 115_200).unwrap();
+    drop(port);
+    assert!(halt::is_alive(&socket));
+    drop(other);
+    std::fs::remove_file(&socket).unwrap();
+}
+
+/// A request whose bytes come slowly has one deadline: it does not keep the port from being closed.
+#[test]
+fn a_request_that_comes_byte_by_byte_is_given_up() {
+    let (_far, path) = pair();
+    let _port = SerialPort::open(&path, 115_200).unwrap();
+    let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
+    // The door hangs up before the line is whole: far more than a second of bytes.
+    let closed = (0..100).any(|_| {
+        std::thread::sleep(Duration::from_millis(100));
+        stream.write_all(b" ").is_err()
+    });
+    assert!(closed);
 }

@@ -7,8 +7,10 @@ import contextlib
 import os
 import pty
 import signal
+import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
@@ -335,6 +337,43 @@ def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):
             second.wait(30)
         executed = wire.sent.count(encode.execute())
         assert stands(robot) and wire.sent.count(encode.execute()) == executed
+
+
+@pytest.mark.parametrize("busy", ["upload", "flight_log", "jog"])
+def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
+    wire: Wire, busy: str, monkeypatch: pytest.MonkeyPatch
+):
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as ends:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        robot = ends.enter_context(openjtc.connect(wire.path))
+        robot.use_defaults()
+        robot.wait_ready()
+        # What the connection is busy with when the Stop comes, and what waits behind it.
+        if busy == "jog":
+            Aside(lambda: robot.jog(0.1, 5.0, joint=1))
+        elif busy == "flight_log":
+            Aside(robot.flight_log)
+        waiting = [robot.start(openjtc.example("motion"), approach=True) for _ in range(5)]
+        halt_as_another_program(wire.path, folder)
+        executed = wire.sent.count(encode.execute())
+        # Longer than a new request has to wait.
+        time.sleep(4.0)
+        for motion in waiting:
+            with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
+                motion.wait(30)
+        assert stands(robot) and wire.sent.count(encode.execute()) == executed
+        # What is requested now is done.
+        assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
+
+
+def halt_as_another_program(port: str, folder: str) -> None:
+    """A Stop through the socket where the program that has the port listens."""
+    name = f"openjtc/line-{os.stat(port).st_rdev:x}.sock"
+    with socket.socket(socket.AF_UNIX) as asker:
+        asker.settimeout(10.0)
+        asker.connect(str(Path(folder) / name))
+        asker.sendall(b'{"halt":"stop","by":"a test"}\n')
+        assert b'"confirmed":true' in asker.makefile("rb").readline()
 
 
 def test_an_arm_that_others_move_is_left_alone_by_the_end_of_a_connection(wire: Wire):

@@ -1,14 +1,18 @@
 //! `jtc stop` and `jtc traj pause`: directly, through an agent, or through the program of this user that has the port.
 
 use std::cell::Cell;
+use std::panic::resume_unwind;
+#[cfg(unix)]
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Output};
-use jtc_client::agents::registered;
+use jtc_client::agents::{Registered, is_same_port, registered};
 use jtc_host::port::halt::{self, Answer, End, Halt};
-use jtc_host::port::{Standstill, is_moving};
+use jtc_host::port::{Standstill, is_moving, is_paused, usb_names};
 use jtc_host::{Error, LinkError, PortError, Session};
+use jtc_wire::{ControllerState, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -21,42 +25,83 @@ const CHANGES_HANDS: Duration = Duration::from_millis(500);
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Programs that may have the port one after the other while one Stop is waited for.
 const OWNERS: usize = 16;
+/// Time after which a Stop, or the end of teaching, is sent again while statuses do not show it.
+const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
 
+/// The arm does not come to rest after a confirmed Stop.
+const STILL_MOVING: &str = "still-moving";
+const STILL_MOVING_HINT: &str = "press the emergency stop; `jtc status` shows the joints";
+
 /// Stops the arm, and waits until it stands.
 pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let progress = Progress::begin(out)?;
-    let (mut done, mut failed) = (Vec::new(), None);
-    for arm in arms(link) {
-        match stop_one(&arm, &progress) {
-            Ok(stopped) => done.push(stopped),
-            Err(failure) => {
-                // Other arms are stopped all the same.
-                if let Some(earlier) = failed.replace(failure) {
-                    out.failure(&earlier);
-                }
-            }
-        }
+    let arms = arms(link);
+    let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
+    out.stream()?;
+    // No arm waits for the end of another one's Stop.
+    let ends: Vec<Result<Stopped, Failure>> = std::thread::scope(|scope| {
+        let stops: Vec<_> =
+            arms.iter().map(|arm| scope.spawn(|| stop_one(arm, &Progress::begin(out)?))).collect();
+        let ends = stops.into_iter().map(|stop| stop.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        ends.map(|end| end.map_err(|error| error.told(Halt::Stop))).collect()
+    });
+    let mut failed: Vec<&Failure> = ends.iter().filter_map(|end| end.as_ref().err()).collect();
+    if let [_] = ends[..]
+        && !failed.is_empty()
+    {
+        return ends.into_iter().next().map_or(Ok(()), |end| end.map(drop));
     }
-    if let Some(failure) = failed {
-        done.iter().for_each(|stopped| out.note(stopped.words()));
-        return Err(failure);
+    let words: Vec<String> = ends.iter().flatten().map(Stopped::words).collect();
+    failed.iter().for_each(|failure| out.warn(&failure.message, &failure.hint));
+    if !not_asked.is_empty() {
+        out.note(format_args!(
+            "jtc: not asked, no program of this user has it: {}; `jtc stop --port PATH` stops an arm there",
+            not_asked.join(", ")
+        ));
     }
-    let arms: Vec<Value> = done.iter().map(Stopped::json).collect();
-    let value = json!({ "command": "stop", "accepted": done.iter().any(|one| one.accepted), "arms": arms });
-    out.result(&value, || done.iter().map(Stopped::words).collect::<Vec<_>>().join("\n"));
-    Ok(())
+    let arms: Vec<Value> =
+        ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
+    let accepted = ends.iter().flatten().any(|one| one.accepted);
+    let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
+    // The most urgent one: an arm moves.
+    failed.sort_by_key(|failure| failure.code != STILL_MOVING);
+    if let Some(failure) = failed.first() {
+        value["error"] = failure.to_json();
+    }
+    if out.is_json() || !words.is_empty() {
+        out.result(&value, || words.join("\n"));
+    }
+    failed.first().map_or(Ok(()), |failure| Err(Failure::printed(failure.kind)))
+}
+
+fn failed_json(failure: &Failure) -> Value {
+    json!({ "error": failure.to_json() })
+}
+
+/// The ports on USB where no arm is stopped.
+fn not_asked(arms: &[Arm]) -> Vec<String> {
+    let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
+    if asked.is_empty() {
+        // The only port there is.
+        return Vec::new();
+    }
+    let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
+    usb_names().into_iter().filter(|name| !is_asked(name)).collect()
 }
 
 /// Pauses on the path.
 pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    let (answer, words) = match reach(link, Halt::Pause).map_err(may_be_moving)? {
+    let (answer, words) = match reach(link, Halt::Pause).map_err(|error| error.told(Halt::Pause))? {
         Reached::Line(session) => {
             let mut session = *session;
             progress.watch(&mut session);
-            session.pause()?;
+            session.pause().map_err(|error| match error {
+                // There is nothing to pause.
+                Error::Link(LinkError::Refused { .. }) => error.into(),
+                error => unconfirmed(error).told(Halt::Pause),
+            })?;
             (None, "pausing on the path".to_owned())
         }
         Reached::Holder(answer, _) if answer.accepted || answer.moved => {
@@ -84,25 +129,72 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 /// port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
-        return vec![Arm::Of(link.clone())];
+        return vec![Arm::Of { link: link.clone(), port: None }];
     }
-    let of_agent = |url: String| Arm::Of(LinkArgs { port: Some(url), ..link.clone() });
-    let mut arms: Vec<Arm> = registered().into_iter().map(|agent| of_agent(agent.url)).collect();
+    let of_agent = |agent: Registered| {
+        let link = LinkArgs { port: Some(agent.url), ..link.clone() };
+        Arm::Of { link, port: Some(agent.port) }
+    };
+    let agents = registered();
     #[cfg(unix)]
-    arms.extend(halt::sockets().into_iter().filter(|socket| halt::is_alive(socket)).map(Arm::Behind));
+    let behind = behind(link, &agents);
+    let mut arms: Vec<Arm> = agents.into_iter().map(of_agent).collect();
+    #[cfg(unix)]
+    arms.extend(behind);
     if arms.is_empty() {
-        arms.push(Arm::Of(link.clone()));
+        arms.push(Arm::Of { link: link.clone(), port: None });
     }
     arms
 }
 
+/// The arms behind sockets. That of a program that was killed counts, too: its arm may be moving on.
+#[cfg(unix)]
+fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
+    let (alive, stale): (Vec<_>, Vec<_>) =
+        halt::sockets().into_iter().partition(|socket| halt::is_alive(socket));
+    let arm = |socket: PathBuf| {
+        let port = halt::port_of(&socket);
+        let link = LinkArgs { port: port.clone(), token_file: None, tls_ca: None, baud: link.baud };
+        Arm::Behind { socket, link }
+    };
+    let is_reached = |socket: &PathBuf, port: &str| {
+        alive.iter().any(|other| other.file_name() == socket.file_name())
+            || agents.iter().any(|agent| is_same_port(&agent.port, port))
+    };
+    let left: Vec<Arm> = stale
+        .into_iter()
+        .filter(|socket| halt::port_of(socket).is_some_and(|port| !is_reached(socket, &port)))
+        .map(arm)
+        .collect();
+    alive.iter().cloned().map(arm).chain(left).collect()
+}
+
 /// An arm to stop.
 enum Arm {
-    /// At a port, or of an agent.
-    Of(LinkArgs),
-    /// Of the program that listens at this socket.
+    /// At a port, or of an agent that has this port.
+    Of { link: LinkArgs, port: Option<String> },
+    /// Of the program that listens at this socket, or did; with its port, if it is there.
     #[cfg(unix)]
-    Behind(std::path::PathBuf),
+    Behind { socket: PathBuf, link: LinkArgs },
+}
+
+impl Arm {
+    /// The port, where it is known.
+    fn port(&self) -> Option<&str> {
+        match self {
+            Self::Of { port, .. } => port.as_deref(),
+            #[cfg(unix)]
+            Self::Behind { link, .. } => link.port.as_deref(),
+        }
+    }
+
+    fn link(&self) -> &LinkArgs {
+        match self {
+            Self::Of { link, .. } => link,
+            #[cfg(unix)]
+            Self::Behind { link, .. } => link,
+        }
+    }
 }
 
 /// An arm that stands now.
@@ -113,8 +205,6 @@ struct Stopped {
     moved: bool,
     state: String,
     trajectory: String,
-    /// What moves without torque.
-    falls: Option<String>,
     /// The program that had the port.
     holder: Option<Answer>,
 }
@@ -122,9 +212,6 @@ struct Stopped {
 impl Stopped {
     fn words(&self) -> String {
         let holder = self.holder.as_ref().map_or(String::new(), |answer| format!("; {}", holder(answer)));
-        if let Some(falls) = &self.falls {
-            return format!("nothing to stop: state {}, without torque {falls}{holder}", self.state);
-        }
         if self.moved {
             return format!("stopped: the arm stands{holder}");
         }
@@ -137,18 +224,79 @@ impl Stopped {
             "moved": self.moved,
             "state": self.state,
             "trajectory": self.trajectory,
-            "moves_without_torque": self.falls,
             "holder": self.holder.as_ref().map(holder_json),
         })
     }
 }
 
 fn holder(answer: &Answer) -> String {
-    format!("{}, process {}, has {} and moves the arm no more", answer.program, answer.pid, answer.port)
+    format!(
+        "{}, process {}, has {}: what it requested before is void, and it may request a new motion after 3 s",
+        answer.program, answer.pid, answer.port
+    )
 }
 
 fn holder_json(answer: &Answer) -> Value {
     json!({ "program": answer.program, "pid": answer.pid, "port": answer.port })
+}
+
+/// How far a halt got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Sent {
+    Nothing,
+    /// It may have got to the controller.
+    Unconfirmed,
+    /// The controller has received it.
+    Confirmed,
+}
+
+/// An arm that may be moving.
+#[derive(Debug)]
+struct NotHalted {
+    sent: Sent,
+    failure: Failure,
+}
+
+impl From<Failure> for NotHalted {
+    fn from(failure: Failure) -> Self {
+        Self { sent: Sent::Nothing, failure }
+    }
+}
+
+impl NotHalted {
+    fn after(sent: Sent, failure: impl Into<Failure>) -> Self {
+        Self { sent, failure: failure.into() }
+    }
+
+    /// The same, after an earlier program has got a Stop so far.
+    fn at_least(self, sent: Sent) -> Self {
+        Self { sent: self.sent.max(sent), ..self }
+    }
+
+    /// An operator who wants an arm to stand learns how far the halt got, and what stops the arm in any case.
+    fn told(self, halt: Halt) -> Failure {
+        let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
+        if self.failure.code == STILL_MOVING {
+            return self.failure;
+        }
+        let what = match self.sent {
+            Sent::Nothing => {
+                "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
+                 stops there)"
+                    .to_owned()
+            }
+            Sent::Unconfirmed => {
+                format!("the {name} was sent and is not confirmed: if the arm is moving, press the emergency stop")
+            }
+            Sent::Confirmed => format!(
+                "the controller has confirmed the {name}, but no status shows that the arm stands: if it moves, press the emergency stop"
+            ),
+        };
+        let next = &self.failure.hint;
+        // The words of an error may name the emergency stop alone.
+        let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
+        Failure { hint: hint.trim_end_matches([' ', '.']).to_owned(), ..self.failure }
+    }
 }
 
 /// How an arm is reached.
@@ -160,20 +308,20 @@ enum Reached {
 }
 
 /// Opens the line, or asks the program that has the port.
-fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, Failure> {
+fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
         let (path, busy) = match link.open_unless_busy(None)? {
             Ok(port) => return Ok(Reached::Line(Box::new(Session::new(port)))),
             Err(PortError::Busy { path }) => (path.clone(), PortError::Busy { path }),
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(Failure::from(error).into()),
         };
         if let Some((answer, stands)) = ask(&path, what)? {
             return Ok(Reached::Holder(answer, stands));
         }
         let patience = if is_own(&path) { CHANGES_OWN_HANDS } else { CHANGES_HANDS };
         if start.elapsed() >= patience {
-            return Err(busy.into());
+            return Err(Failure::from(busy).into());
         }
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -192,59 +340,79 @@ fn is_own(_: &str) -> bool {
 
 /// Asks the program that has this port, if it is one of this user that listens.
 #[cfg(unix)]
-fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, Failure> {
+fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     for socket in halt::sockets_of(path) {
-        if let Some(answered) = halt::ask(&socket, what, &who())? {
+        if let Some(answered) = ask_at(&socket, what)? {
             return Ok(Some(answered));
         }
     }
     Ok(None)
 }
 
+/// Asks the program that listens at this socket. One that does not answer may have written the frame.
+#[cfg(unix)]
+fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
+    halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
+}
+
 #[cfg(not(unix))]
-fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, Failure> {
+fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
 /// Stops one arm. A program that was stopped may end before the arm stands: then the port is free, or another program has it.
-fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, Failure> {
+fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
-        let (answer, end) = match reached.map_err(may_be_moving)? {
-            Reached::Line(session) => return directly(*session, progress, first),
+        let sent = if first.is_some() { Sent::Confirmed } else { Sent::Nothing };
+        let (answer, end) = match reached.map_err(|error| error.at_least(sent))? {
+            Reached::Line(session) => {
+                return directly(*session, progress, first).map_err(|error| error.at_least(sent));
+            }
             Reached::Holder(answer, end) => (answer, end),
         };
         let port = Some(answer.port.clone());
-        let link = match arm {
-            Arm::Of(link) => LinkArgs { port, ..link.clone() },
-            #[cfg(unix)]
-            Arm::Behind(_) => LinkArgs { port, token_file: None, tls_ca: None, baud: answer.baud },
-        };
-        let (state, trajectory) = (answer.state.clone(), answer.trajectory.clone());
+        let baud = if matches!(arm, Arm::Of { .. }) { arm.link().baud } else { answer.baud };
+        let link = LinkArgs { port, baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
         so_far.moved |= answer.moved;
         match end {
-            Some(End { stands: true, moved, moving: falls }) => {
+            Some(End { stands: true, moved, state, trajectory, .. }) => {
                 let (accepted, moved) = (so_far.accepted, so_far.moved || moved);
-                return Ok(Stopped { accepted, moved, state, trajectory, falls, holder: first });
+                return Ok(Stopped { accepted, moved, state, trajectory, holder: first });
             }
-            Some(End { moving, .. }) => return Err(still_moving(&moving.unwrap_or_default())),
+            Some(end) => return Err(NotHalted::after(Sent::Confirmed, still_moving(&end))),
             None => reached = reach(&link, Halt::Stop),
         }
     }
-    Err(still_moving("one program after the other opens its port"))
+    let message = "one program after the other opens the port of the arm";
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT);
+    Err(NotHalted::after(Sent::Confirmed, failure))
 }
 
-fn reach_arm(arm: &Arm) -> Result<Reached, Failure> {
+fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     match arm {
-        Arm::Of(link) => reach(link, Halt::Stop),
+        Arm::Of { link, .. } => reach(link, Halt::Stop),
         #[cfg(unix)]
-        Arm::Behind(socket) => match halt::ask(socket, Halt::Stop, &who())? {
-            Some((answer, end)) => Ok(Reached::Holder(answer, end)),
-            None => Err(Failure::new(ErrorKind::NoLink, "port", "the program that had the port has ended")
-                .hint("`jtc stop --port PATH` stops the arm at its port")),
-        },
+        Arm::Behind { socket, link } => {
+            let start = Instant::now();
+            loop {
+                if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
+                    return Ok(Reached::Holder(answer, end));
+                }
+                // The program has ended, or answers others: the port is free, or the next program has it.
+                if link.port.is_some() {
+                    return reach(link, Halt::Stop);
+                }
+                if start.elapsed() >= CHANGES_OWN_HANDS {
+                    let message = "the program that had the port has ended, and its port is not found";
+                    let failure = Failure::new(ErrorKind::NoLink, "port", message);
+                    return Err(failure.hint("`jtc stop --port PATH` stops the arm at its port").into());
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+        }
     }
 }
 
@@ -253,7 +421,7 @@ fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,
     holder: Option<Answer>,
-) -> Result<Stopped, Failure> {
+) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
     // Statuses that come in before the Stop is confirmed count, too.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
@@ -265,16 +433,31 @@ fn directly(
     let accepted = match session.stop() {
         Ok(()) => true,
         Err(Error::Link(LinkError::Refused { .. })) => false,
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(unconfirmed(error)),
     };
+    let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
     // An arm that is taught is loose, and a Stop holds it.
-    let taught = session.last().is_some_and(|status| status.state == jtc_wire::ControllerState::Teaching);
+    let is_taught = |status: &Status| status.state == ControllerState::Teaching;
+    let taught = session.last().is_some_and(is_taught);
     if taught {
-        session.teach(false)?;
+        session.teach(false).map_err(confirmed)?;
     }
-    let (start, mut standstill) = (session.now(), Standstill::default());
+    let (start, mut standstill) = (session.now(), Standstill::after(Halt::Stop));
+    let mut written_at = start;
     loop {
-        let status = session.next_status()?;
+        let status = session.next_status().map_err(|error| confirmed(error.into()))?;
+        if session.now().saturating_sub(written_at) >= AGAIN {
+            if is_taught(&status) {
+                session.teach(false).map_err(confirmed)?;
+            } else if is_paused(&status) {
+                match session.stop() {
+                    // The next statuses show what the controller does.
+                    Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
+                    Err(error) => return Err(confirmed(error)),
+                }
+            }
+            written_at = session.now();
+        }
         standstill.see(session.now(), &status);
         if standstill.is_reached() {
             return Ok(Stopped {
@@ -282,27 +465,27 @@ fn directly(
                 moved: moved.get() || taught || holder.as_ref().is_some_and(|answer| answer.moved),
                 state: status.state.to_string(),
                 trajectory: status.trajectory.to_string(),
-                falls: End::of(&status, &standstill).moving,
                 holder,
             });
         }
         if session.now().saturating_sub(start) >= REST {
-            return Err(still_moving(&End::of(&status, &standstill).moving.unwrap_or_default()));
+            let end = End::of(&status, &standstill);
+            return Err(NotHalted::after(Sent::Confirmed, still_moving(&end)));
         }
     }
 }
 
-fn still_moving(what: &str) -> Failure {
-    Failure::new(ErrorKind::Fault, "still-moving", format!("the arm does not come to rest: {what}"))
-        .hint("press the emergency stop; `jtc status` shows the joints")
+fn still_moving(end: &End) -> Failure {
+    let what = end.moving.as_deref().unwrap_or_default();
+    let message = format!("the arm does not come to rest: {what} (state {})", end.state);
+    Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT)
 }
 
-/// Whoever wants an arm to stand and has no port must know that nothing was sent.
-fn may_be_moving(failure: Failure) -> Failure {
-    let hint = format!(
-        "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
-         stops there). {}",
-        failure.hint
-    );
-    Failure { hint, ..failure }
+/// An error of a frame that was written, or that an agent refused.
+fn unconfirmed(error: Error) -> NotHalted {
+    let sent = match error {
+        Error::Link(LinkError::Denied { .. }) => Sent::Nothing,
+        _ => Sent::Unconfirmed,
+    };
+    NotHalted::after(sent, error)
 }

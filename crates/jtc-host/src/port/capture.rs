@@ -8,7 +8,7 @@
 use std::io::{self, BufRead, Write};
 use std::time::Duration;
 
-use super::{Port, PortError};
+use super::{Halts, Port, PortError};
 
 /// Which way bytes went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,21 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     }
     fn name(&self) -> String {
         self.port.name()
+    }
+    fn take_denial(&mut self) -> Option<String> {
+        self.port.take_denial()
+    }
+    fn ask_to_move(&mut self) -> Result<(), PortError> {
+        self.port.ask_to_move()
+    }
+    fn halts(&self) -> Halts {
+        self.port.halts()
+    }
+    fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
+        self.port.ask_to_move_after(halts)
+    }
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.port.ask_to_resume()
     }
 }
 

@@ -2,30 +2,34 @@
 
 use std::fs;
 use std::io;
-use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::halt::{Answer, End, REQUEST_MAX, Request, may_ask, peer, read_line, socket_name, write_line};
-use super::line::Line;
+use super::line::{Counted, Line};
 use super::runtime;
 
 /// Programs that are answered at the same time.
 const ASKERS: usize = 8;
 /// How often the door looks whether it is closed, without anything else to wake it.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+/// Pause after a connection that could not be taken.
+const RETRY: Duration = Duration::from_millis(20);
 /// Time for a request and for taking an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// An open door. It is closed before the port is: who opens the port next has a door at the same place.
 pub struct Door {
     path: PathBuf,
+    /// Device and number of the socket: another program may have one at the same path later.
+    file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,
 }
@@ -34,14 +38,16 @@ impl Door {
     /// Opens the door of a port that this program has. `None`: there is no place for it; the port works without.
     pub fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
-        let (path, listener) = runtime::candidates().into_iter().find_map(|folder| {
+        let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
             let path = runtime::create_at(folder).ok()??.join(&name);
-            Some((path.clone(), listen(&path).ok()?))
+            let listener = listen(&path).ok()?;
+            let file = file_of(&path)?;
+            Some((path, listener, file))
         })?;
         let own = Arc::clone(line);
         let thread = std::thread::Builder::new().name("stop".into()).spawn(move || serve(&listener, &own));
         match thread {
-            Ok(thread) => Some(Self { path, line: Arc::clone(line), thread: Some(thread) }),
+            Ok(thread) => Some(Self { path, file, line: Arc::clone(line), thread: Some(thread) }),
             Err(_) => {
                 let _ = fs::remove_file(path);
                 None
@@ -58,13 +64,22 @@ impl Drop for Door {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
-        // It may be gone already.
-        let _ = fs::remove_file(&self.path);
+        if file_of(&self.path) == Some(self.file) {
+            // It may be gone already.
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }
 
-/// The port is this program's alone, so a socket that is there belongs to a program that was killed.
-fn listen(path: &std::path::Path) -> io::Result<UnixListener> {
+fn file_of(path: &Path) -> Option<(u64, u64)> {
+    fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
+}
+
+/// A socket that is there belongs to a program that was killed, or to one of the superuser, whom no port is closed to. That one keeps it.
+fn listen(path: &Path) -> io::Result<UnixListener> {
+    if UnixStream::connect(path).is_ok() {
+        return Err(io::ErrorKind::AddrInUse.into());
+    }
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}
@@ -80,33 +95,57 @@ fn serve(listener: &UnixListener, line: &Line) {
     std::thread::scope(|scope| {
         while !line.is_closing() {
             let _ = poll(&mut [PollFd::new(listener, PollFlags::IN)], Some(&LOOK));
-            let Ok((stream, _)) = listener.accept() else { continue };
+            let stream = match listener.accept() {
+                Ok((stream, _)) => stream,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
+                Err(_) => {
+                    // For example too many open files: the next attempt fails at once, too.
+                    std::thread::sleep(RETRY);
+                    continue;
+                }
+            };
             if line.is_closing()
                 || busy.load(Ordering::SeqCst) >= ASKERS
                 || !peer(&stream).is_some_and(may_ask)
             {
                 continue;
             }
-            busy.fetch_add(1, Ordering::SeqCst);
-            let busy = &busy;
-            scope.spawn(move || {
+            let counted = Counted::new(&busy);
+            // Without a thread the asker is disconnected, and asks again.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, move || {
+                let _counted = counted;
                 // An asker that has disconnected has no use for an answer.
                 let _ = answer(&stream, line);
-                busy.fetch_sub(1, Ordering::SeqCst);
             });
         }
     });
 }
 
+/// One request for one deadline, however slowly its bytes come.
+struct Within<'a> {
+    stream: &'a UnixStream,
+    end: Instant,
+}
+
+impl io::Read for Within<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let left = self.end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        self.stream.set_read_timeout(Some(left))?;
+        io::Read::read(&mut self.stream, buffer)
+    }
+}
+
 /// Does what one program asks for.
 fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    let request: Request = read_line(stream, REQUEST_MAX)?;
+    let request: Request = read_line(Within { stream, end: Instant::now() + PATIENCE }, REQUEST_MAX)?;
     let by: String = request.by.chars().filter(|c| !c.is_control()).take(100).collect();
-    let done = line.halt(request.halt.command(), &by);
+    let done = line.halt(request.halt, &by);
     write_line(stream, &Answer::of(line.path.clone(), line.baud, done))?;
-    let Some((status, standstill)) = line.wait_for_rest() else { return Ok(()) };
+    let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };
     write_line(stream, &End::of(&status, &standstill))
 }

@@ -11,14 +11,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use jtc_wire::{ExecCommand, Status};
+use jtc_wire::{ControllerState, ExecCommand, Status};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::PortError;
 use super::line::HaltOutcome;
 #[cfg(unix)]
 use super::runtime;
-use super::standstill::Standstill;
+use super::standstill::{Standstill, has_torque, is_paused};
 use crate::words;
 
 /// Most bytes of a request.
@@ -91,12 +91,20 @@ pub struct End {
     pub stands: bool,
     /// The arm moved before.
     pub moved: bool,
-    /// What still moves. In a state without torque that is no fault of the Stop.
+    /// What still moves.
     pub moving: Option<String>,
+    /// State of the controller.
+    #[serde(default)]
+    pub state: String,
+    /// Trajectory execution state.
+    #[serde(default)]
+    pub trajectory: String,
 }
 
 impl Answer {
     pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
+        // The asker may work in another folder.
+        let port = std::path::absolute(&port).map_or(port, |absolute| absolute.display().to_string());
         let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
         match done {
             Ok(Some(HaltOutcome { accepted, moved, status })) => Self {
@@ -118,12 +126,22 @@ impl End {
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
         let stands = standstill.is_reached();
         let moving = match words::moving_joint(status) {
+            _ if stands => None,
+            Some((joint, speed)) if !has_torque(status) => {
+                Some(format!("{joint} moves without torque at {speed:.2} rad/s, which no Stop ends"))
+            }
             Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
-            None if stands => None,
             None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
+            None if status.state == ControllerState::Teaching => {
+                Some("teaching does not end: the arm can be led by hand".to_owned())
+            }
+            None if is_paused(status) => {
+                Some("the trajectory is paused and not stopped: it can be resumed".to_owned())
+            }
             None => Some("the arm was not still for long enough".to_owned()),
         };
-        Self { stands, moved: standstill.moved(), moving }
+        let (state, trajectory) = (status.state.to_string(), status.trajectory.to_string());
+        Self { stands, moved: standstill.moved(), moving, state, trajectory }
     }
 }
 
@@ -189,6 +207,27 @@ pub fn sockets() -> Vec<PathBuf> {
             .is_some_and(|name| name.starts_with("line-") && name.ends_with(".sock"))
     };
     files.flatten().map(|file| file.path()).filter(named).collect()
+}
+
+/// The port of a socket, if its device is the one for which the program listened. A device that was plugged in, or a pseudo-terminal that
+/// was opened, after that may be another one with the same number.
+#[cfg(unix)]
+pub fn port_of(socket: &Path) -> Option<String> {
+    use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
+    let name = socket.file_name()?.to_str()?;
+    let number = u64::from_str_radix(name.strip_prefix("line-")?.strip_suffix(".sock")?, 16).ok()?;
+    let found = std::fs::symlink_metadata(socket).ok()?;
+    let listened = (found.mtime(), found.mtime_nsec());
+    let files =
+        ["/dev", "/dev/pts"].into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
+    let port = files.flatten().map(|file| file.path()).find(|path| {
+        std::fs::symlink_metadata(path).is_ok_and(|node| {
+            node.file_type().is_char_device()
+                && node.rdev() == number
+                && (node.ctime(), node.ctime_nsec()) <= listened
+        })
+    })?;
+    Some(port.display().to_string())
 }
 
 /// A program listens at this socket.

@@ -7,17 +7,18 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use jtc_wire::{
-    ControllerState, DataStatus, ExecCommand, FrameRef, FrameStatus, FrameType, FromDevice, Response,
-    STATUS_LEN, Status, StatusReceiver, fixed,
+    ControllerState, DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, STATUS_LEN, Status,
+    StatusReceiver, fixed,
 };
 
-use super::standstill::{Standstill, is_moving};
-use super::{PortError, line_time};
+use super::halt::Halt;
+use super::standstill::{Standstill, is_moving, is_paused};
+use super::{Halts, PortError, line_time};
 
 /// Longest time in which a write finds no room.
 const STALL: Duration = Duration::from_secs(5);
@@ -37,6 +38,8 @@ const RECORD_TIME: Duration = Duration::from_secs(1);
 const CALM: Duration = Duration::from_secs(3);
 /// A status or a jog of this age still describes the arm.
 const RECENT: Duration = Duration::from_millis(300);
+/// Time after which a Stop, or the end of teaching, is written again while statuses do not show it.
+const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
 /// Bytes that are kept for an owner that does not read.
@@ -61,6 +64,9 @@ pub struct Line {
     output: Mutex<Output>,
     /// Stops that wait for the output: the owner's next piece waits for them.
     urgent: AtomicUsize,
+    /// Stops and Pauses of other programs, and those of them that are Stops. They change with `Output::halted`.
+    halts: AtomicU64,
+    stops: AtomicU64,
     /// One Stop is written and confirmed after the other.
     turn: Mutex<()>,
     input: Mutex<Input>,
@@ -80,13 +86,12 @@ struct Output {
     given_up: bool,
     /// The last Stop or Pause of another program, until the owner requests a motion anew.
     halted: Option<Halted>,
-    /// The owner has switched teaching on.
-    teaching: bool,
     /// When the owner jogged last.
     jogged: Option<Instant>,
 }
 
 struct Halted {
+    halt: Halt,
     by: String,
     at: Instant,
 }
@@ -107,10 +112,28 @@ struct Seen {
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
+    /// The owner has switched teaching on, and no record says that it is off again.
+    teaching: bool,
     /// Frames Execute, Pause and Stop without a record, oldest first, with the number of those that the door wrote.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
     answered: VecDeque<(u64, Response)>,
+}
+
+/// Counts while it lives, also when its thread panics.
+pub(super) struct Counted<'a>(&'a AtomicUsize);
+
+impl<'a> Counted<'a> {
+    pub fn new(counter: &'a AtomicUsize) -> Self {
+        counter.fetch_add(1, Ordering::SeqCst);
+        Self(counter)
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -137,10 +160,11 @@ impl Line {
                 free_at: start,
                 given_up: false,
                 halted: None,
-                teaching: false,
                 jogged: None,
             }),
             urgent: AtomicUsize::new(0),
+            halts: AtomicU64::new(0),
+            stops: AtomicU64::new(0),
             turn: Mutex::new(()),
             input: Mutex::new(Input {
                 port: reading,
@@ -182,10 +206,28 @@ impl Line {
         Ok(())
     }
 
-    /// The owner requests a motion now: what it sends from now on was requested after the last Stop, unless that has just come.
-    pub fn ask_to_move(&self) {
+    /// Number of Stops and Pauses of other programs so far. It waits for nothing.
+    pub fn halts(&self) -> Halts {
+        // A Stop counts in `halts` first: so no Stop is seen here without its number.
+        let stops = self.stops.load(Ordering::SeqCst);
+        Halts { all: self.halts.load(Ordering::SeqCst), stops }
+    }
+
+    /// The owner sends a motion from now on that was requested after so many halts. The gate opens unless another halt came since, or the
+    /// last one has just come.
+    pub fn ask_to_move(&self, after: u64) {
+        self.open_gate(after, |_| true);
+    }
+
+    /// Like `ask_to_move`, to resume a paused motion. No motion goes on after a Stop.
+    pub fn ask_to_resume(&self, after: u64) {
+        self.open_gate(after, |halt| halt == Halt::Pause);
+    }
+
+    fn open_gate(&self, after: u64, opens: impl Fn(Halt) -> bool) {
         let mut output = lock(&self.output);
-        if output.halted.take_if(|halted| halted.at.elapsed() >= CALM).is_some() {
+        let over = |halted: &mut Halted| opens(halted.halt) && halted.at.elapsed() >= CALM;
+        if after == self.halts.load(Ordering::SeqCst) && output.halted.take_if(over).is_some() {
             output.given_up = false;
         }
     }
@@ -203,11 +245,29 @@ impl Line {
 
     /// Writes another program's Stop or Pause, again until the controller has received it. `None`: it is not confirmed. An owner that
     /// closes the port meanwhile waits for that: it ends because of the Stop.
-    pub fn halt(&self, command: ExecCommand, by: &str) -> Result<Option<HaltOutcome>, PortError> {
+    pub fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
+        match self.write_halt(halt, by) {
+            // A Pause after a Stop is not written: there is nothing to pause.
+            Err(PortError::Halted { .. }) => {
+                let status = lock(&self.seen).status.map(|(_, status)| status);
+                Ok(status.map(|status| HaltOutcome { accepted: false, moved: false, status }))
+            }
+            done => done,
+        }
+    }
+
+    fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
         // First of all nothing that moves the arm passes any more.
         self.urgently(|output| {
-            output.halted = Some(Halted { by: by.to_owned(), at: Instant::now() });
+            if halt == Halt::Pause && output.is_stopped() {
+                return Err(output.refusal());
+            }
+            output.halted = Some(Halted { halt, by: by.to_owned(), at: Instant::now() });
+            self.halts.fetch_add(1, Ordering::SeqCst);
+            if halt == Halt::Stop {
+                self.stops.fetch_add(1, Ordering::SeqCst);
+            }
             jogged = output.jogged.is_some_and(|at| at.elapsed() < RECENT);
             Ok(())
         })?;
@@ -216,7 +276,7 @@ impl Line {
         let first = lock(&self.seen).numbers;
         let mut record = None;
         for _ in 0..TRIES {
-            self.write_urgent(&fixed::exec(command), true)?;
+            self.write_urgent(&fixed::exec(halt.command()), true)?;
             record = self.record_since(first);
             if record.is_some() {
                 break;
@@ -225,7 +285,7 @@ impl Line {
         let status = lock(&self.seen).status.map(|(_, status)| status);
         // An arm that is taught is loose, and a Stop holds it.
         let taught = status.is_some_and(|status| status.state == ControllerState::Teaching);
-        if command == ExecCommand::Stop && (taught || lock(&self.output).teaching) {
+        if halt == Halt::Stop && (taught || lock(&self.seen).teaching) {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
@@ -237,8 +297,9 @@ impl Line {
     }
 
     /// Waits until the arm stands: the last status, and whether it stands.
-    pub fn wait_for_rest(&self) -> Option<(Status, Standstill)> {
-        let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::default(), None);
+    pub fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
+        let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
+        let mut written_at = Instant::now();
         while Instant::now() < end && !self.is_closing() {
             let (statuses, status) = {
                 let seen = lock(&self.seen);
@@ -247,7 +308,16 @@ impl Line {
             if let Some((at, status)) = status
                 && count.replace(statuses) != Some(statuses)
             {
+                if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
+                    written_at = Instant::now();
+                    // A line that takes nothing more shows as an arm that does not stand.
+                    let _ = self.insist(&status);
+                }
                 standstill.see(at.duration_since(self.start), &status);
+                // Teaching that was requested may begin as soon as the arm rests.
+                if lock(&self.seen).teaching && halt == Halt::Stop {
+                    standstill.begin_again();
+                }
                 if standstill.is_reached() {
                     return Some((status, standstill));
                 }
@@ -256,6 +326,18 @@ impl Line {
         }
         let status = lock(&self.seen).status.filter(|_| !self.is_closing());
         status.map(|(_, status)| (status, standstill))
+    }
+
+    /// Writes again what a Stop brings about and statuses do not show: the end of teaching, and a Stop where the Pause of another sender came
+    /// after it.
+    fn insist(&self, status: &Status) -> Result<(), PortError> {
+        if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
+            self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
+        }
+        if is_paused(status) {
+            self.write_urgent(&fixed::STOP, true)?;
+        }
+        Ok(())
     }
 
     /// A status of a moving arm was read since then.
@@ -349,14 +431,16 @@ impl Line {
             || is(FrameType::TeachingModeEnable)
             // An upload leads to a motion.
             || is(FrameType::Trajectory);
-        if moves && output.halted.is_some() {
+        // A Pause in the deceleration of a Stop would leave a motion that can be resumed.
+        let weakens = bytes == fixed::PAUSE && output.is_stopped();
+        if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
         }
         if jogs {
             output.jogged = Some(Instant::now());
         }
-        if is(FrameType::TeachingModeEnable) || is(FrameType::TeachingModeDisable) {
-            output.teaching = is(FrameType::TeachingModeEnable);
+        if is(FrameType::TeachingModeEnable) {
+            lock(&self.seen).teaching = true;
         }
         if is(FrameType::TrajSetExecStatus) {
             lock(&self.seen).write(None);
@@ -368,6 +452,9 @@ impl Line {
     /// Writes a frame ahead of the rest of what the owner writes.
     fn write_urgent(&self, frame: &[u8], has_number: bool) -> Result<(), PortError> {
         self.urgently(|output| {
+            if frame == fixed::PAUSE && output.is_stopped() {
+                return Err(output.refusal());
+            }
             if output.rest > 0 {
                 (output.rest, output.given_up) = (0, true);
                 std::thread::sleep((output.free_at + GAP).saturating_duration_since(Instant::now()));
@@ -377,8 +464,6 @@ impl Line {
                 let number = seen.numbers;
                 seen.numbers += 1;
                 seen.write(Some(number));
-            } else {
-                output.teaching = false;
             }
             self.put(output, frame)
         })
@@ -386,10 +471,8 @@ impl Line {
 
     /// Does something with the output before the owner writes its next piece.
     fn urgently(&self, work: impl FnOnce(&mut Output) -> Result<(), PortError>) -> Result<(), PortError> {
-        self.urgent.fetch_add(1, Ordering::SeqCst);
-        let done = work(&mut lock(&self.output));
-        self.urgent.fetch_sub(1, Ordering::SeqCst);
-        done
+        let _counted = Counted::new(&self.urgent);
+        work(&mut lock(&self.output))
     }
 
     /// A lock is not handed over in turn: the owner waits for Stops that wait for it. They take as long as one short write.
@@ -424,6 +507,11 @@ impl Line {
 }
 
 impl Output {
+    /// The last halt was a Stop.
+    fn is_stopped(&self) -> bool {
+        self.halted.as_ref().is_some_and(|halted| halted.halt == Halt::Stop)
+    }
+
     fn refusal(&self) -> PortError {
         PortError::Halted { by: self.halted.as_ref().map(|halted| halted.by.clone()) }
     }
@@ -450,6 +538,9 @@ impl Seen {
                 if let Some((_, Some(number))) = self.written.pop_front() {
                     self.answered.push_back((number, response));
                 }
+            }
+            FrameStatus::NoError if response.frame_type == FrameType::TeachingModeDisable as u8 => {
+                self.teaching = false;
             }
             FrameStatus::NoError => {}
             _ => self.damaged += 1,

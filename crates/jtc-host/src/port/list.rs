@@ -64,6 +64,16 @@ pub fn list() -> Result<Vec<PortInfo>, PortError> {
     Ok(ports)
 }
 
+/// Names of the ports with an adapter or board on USB. None is opened.
+pub fn usb_names() -> Vec<String> {
+    let found = serialport::available_ports().unwrap_or_default();
+    let is_usb = |kind: &SerialPortType| matches!(kind, SerialPortType::UsbPort(_));
+    let mut names: Vec<String> =
+        found.into_iter().filter(|port| is_usb(&port.port_type)).map(|port| port.port_name).collect();
+    names.sort();
+    names
+}
+
 /// The name of the only port that can be used.
 ///
 /// # Errors

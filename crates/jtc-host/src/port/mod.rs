@@ -20,9 +20,18 @@ use std::time::Duration;
 
 pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
-pub use list::{PortInfo, PortKind, list, only_one};
+pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
-pub use standstill::{Standstill, is_moving};
+pub use standstill::{Standstill, is_moving, is_paused};
+
+/// Number of times that other programs stopped or paused the arm through a port of this program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Halts {
+    /// Stops and Pauses.
+    pub all: u64,
+    /// Stops.
+    pub stops: u64,
+}
 
 /// A byte stream to a controller, polled by one thread.
 ///
@@ -51,6 +60,20 @@ pub trait Port {
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
+    /// Number of Stops and Pauses of other programs so far. Only a port that other programs reach directly counts them.
+    fn halts(&self) -> Halts {
+        Halts::default()
+    }
+    /// Like [`ask_to_move`](Self::ask_to_move) for a motion that was requested after so many [`halts`](Self::halts): one that has waited since,
+    /// as in a queue, does not pass if the arm was stopped meanwhile.
+    fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
+        let _ = halts;
+        self.ask_to_move()
+    }
+    /// Like [`ask_to_move`](Self::ask_to_move), to resume a paused motion: after a Stop no motion goes on.
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.ask_to_move()
+    }
 }
 
 impl<P: Port + ?Sized> Port for Box<P> {
@@ -74,6 +97,15 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         (**self).ask_to_move()
+    }
+    fn halts(&self) -> Halts {
+        (**self).halts()
+    }
+    fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
+        (**self).ask_to_move_after(halts)
+    }
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        (**self).ask_to_resume()
     }
 }
 

@@ -15,10 +15,28 @@ pub(super) fn candidates() -> Vec<PathBuf> {
     by_environment().into_iter().chain(by_user()).collect()
 }
 
-/// All folders of this user: another program may have started without `XDG_RUNTIME_DIR`, or found its path too long for a socket.
-#[cfg(unix)]
-pub(super) fn folders() -> Vec<PathBuf> {
-    candidates().into_iter().filter(|folder| is_own(folder)).collect()
+/// All folders of this user: another program may have started with other variables, as under `su` or `cron`, or found a path too long for
+/// a socket.
+pub fn folders() -> Vec<PathBuf> {
+    let given = std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
+    let all = own_name().map_or(Vec::new(), |name| all_of(given, &std::env::temp_dir(), &name));
+    all.into_iter().filter(|folder| is_own(folder)).collect()
+}
+
+/// The folders with these variables. A runtime folder that is not the usual one keeps its programs apart: then only that one, and the
+/// folder for temporary files, count.
+fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
+    let user = name.trim_start_matches("openjtc-");
+    let usual = Path::new("/run/user").join(user);
+    let is_apart = given.as_ref().is_some_and(|given| *given != usual);
+    let mut all: Vec<PathBuf> = given.into_iter().map(|given| given.join("openjtc")).collect();
+    all.push(temporary.join(name));
+    if !is_apart {
+        all.extend([usual.join("openjtc"), Path::new("/tmp").join(name)]);
+    }
+    let mut seen = std::collections::HashSet::new();
+    all.retain(|folder| seen.insert(folder.clone()));
+    all
 }
 
 fn by_environment() -> Option<PathBuf> {
@@ -74,4 +92,28 @@ pub(super) fn create_at(folder: PathBuf) -> io::Result<Option<PathBuf>> {
         _ => {}
     }
     Ok(is_own(&folder).then_some(folder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A program that asks finds the folder of one that started with other variables.
+    #[test]
+    fn the_folders_of_programs_with_other_variables_are_found() {
+        let all = |given: Option<&str>, temporary: &str| -> Vec<String> {
+            let all = all_of(given.map(PathBuf::from), Path::new(temporary), "openjtc-1000");
+            all.iter().map(|folder| folder.display().to_string()).collect()
+        };
+        let (runtime, tmp) = ("/run/user/1000/openjtc", "/tmp/openjtc-1000");
+        // Without variables, as under su and cron.
+        assert_eq!(all(None, "/tmp"), [tmp, runtime]);
+        assert_eq!(all(None, "/var/x"), ["/var/x/openjtc-1000", runtime, tmp]);
+        assert_eq!(all(Some("/run/user/1000"), "/tmp"), [runtime, tmp]);
+        assert_eq!(all(Some("/run/user/1000/"), "/tmp"), [runtime, tmp]);
+        assert_eq!(all(Some("/run/user/1000"), "/y"), [runtime, "/y/openjtc-1000", tmp]);
+        // Kept apart.
+        assert_eq!(all(Some("/z"), "/y"), ["/z/openjtc", "/y/openjtc-1000"]);
+        assert_eq!(all(Some("/run/user/0"), "/tmp"), ["/run/user/0/openjtc", tmp]);
+    }
 }

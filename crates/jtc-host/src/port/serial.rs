@@ -10,7 +10,7 @@ use std::time::Duration;
 #[cfg(unix)]
 use super::door::Door;
 use super::line::Line;
-use super::{Port, PortError};
+use super::{Halts, Port, PortError};
 
 /// Rates up to 15 MBd that adapters know; any other number may work too.
 pub const STANDARD_RATES: [u32; 16] = [
@@ -113,7 +113,20 @@ impl Port for SerialPort {
     }
 
     fn ask_to_move(&mut self) -> Result<(), PortError> {
-        self.line.ask_to_move();
+        self.ask_to_move_after(self.line.halts().all)
+    }
+
+    fn halts(&self) -> Halts {
+        self.line.halts()
+    }
+
+    fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
+        self.line.ask_to_move(halts);
+        Ok(())
+    }
+
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.line.ask_to_resume(self.line.halts().all);
         Ok(())
     }
 }

@@ -221,7 +221,7 @@ impl<P: Port> Session<P> {
     /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
     /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
-        self.ask_to_move()?;
+        self.port.ask_to_resume().map_err(LinkError::Port)?;
         let status = self.fresh_status()?;
         if status.trajectory != TrajectoryState::Pause {
             return Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into());

@@ -146,9 +146,11 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// A pause or stop may cross with the end of the motion: it is refused then, and that is no failure.
+/// A pause or stop may cross with the end of the motion, or a pause with the Stop of another program: it is refused then, and that is no
+/// failure.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
+        Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),
         Err(Error::Link(LinkError::Refused { trajectory, .. }))
             if trajectory.is_in(&[
                 TrajectoryState::Stop,

@@ -111,6 +111,7 @@ impl Machine {
     /// The arm can be led by hand from now on.
     pub fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.same_arm()?;
+        self.session.ask_to_move()?;
         let before = self.teaching;
         // Whatever comes of it, the end of the connection ends it, too.
         self.teaching = true;

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use jtc_host::port::Halts;
 use jtc_host::port::sim::SimPort;
 use jtc_host::{Port, PortError};
 use jtc_wire::{FrameType, fixed};
@@ -53,6 +54,8 @@ pub struct AnyPort {
     at: u64,
     /// Halts and Stops that were acted upon.
     done: (u64, u64),
+    /// Stops and Pauses of other programs that are known here.
+    foreign: Halts,
     /// Bytes of the frame being written that are still to come, and when its last piece was written.
     rest: (usize, Duration),
     /// When the last Stop was written.
@@ -69,6 +72,7 @@ impl AnyPort {
             shared,
             at: 0,
             done: (0, 0),
+            foreign: Halts::default(),
             rest: (0, Duration::ZERO),
             stopped: None,
             begun: (Duration::ZERO, 0),
@@ -102,8 +106,33 @@ impl AnyPort {
         self.now() >= self.begun.0 + time && self.shared.seen() >= self.begun.1 + statuses
     }
 
+    /// Another program's Stop voids what was requested here before it, also what still waits for its turn. A Pause of a motion leaves the
+    /// rest: it follows only after the motion is resumed. Where nothing moves, a Pause voids as a Stop does.
+    fn take_foreign_halts(&mut self) {
+        let now = each_line!(port, self => port.halts());
+        if now == self.foreign {
+            return;
+        }
+        let stopped = now.stops != self.foreign.stops;
+        self.foreign = now;
+        if stopped || !self.shared.moves() {
+            self.shared.halt();
+        }
+    }
+
+    /// The line withheld a frame because of another program's Stop or Pause: what waits here was requested before that, too. A motion that
+    /// stays paused, because its Execute came too early, is no reason.
+    fn withheld(&mut self, frame: &[u8], moved: bool) {
+        self.take_foreign_halts();
+        let stays_paused = moved && frame == fixed::EXECUTE;
+        if !stays_paused && self.shared.halts() == self.at {
+            self.shared.halt();
+        }
+    }
+
     /// Writes a Stop where one is asked for, or where what moves here was overtaken by a halt.
     fn act(&mut self) -> Result<(), PortError> {
+        self.take_foreign_halts();
         let now = (self.shared.halts(), self.shared.stops());
         if now == self.done {
             return Ok(());
@@ -181,6 +210,7 @@ impl Port for AnyPort {
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.act()?;
+        let moved = self.shared.moves();
         self.pass(bytes)?;
         if bytes == fixed::STOP {
             self.stopped = Some(self.now());
@@ -191,7 +221,11 @@ impl Port for AnyPort {
             // Pieces are longer than a header.
             length(bytes)
         };
-        each_line!(mut port, self => port.write_all(bytes))?;
+        let written = each_line!(mut port, self => port.write_all(bytes));
+        if let Err(PortError::Halted { by: Some(_) }) = written {
+            self.withheld(bytes, moved);
+        }
+        written?;
         self.rest = (whole.saturating_sub(bytes.len()), self.now());
         Ok(())
     }
@@ -212,7 +246,25 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
+    /// The request counts from when it was made, and not from when its turn comes.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
-        each_line!(mut port, self => port.ask_to_move())
+        self.take_foreign_halts();
+        if self.shared.halts() != self.at {
+            return Err(PortError::Halted { by: None });
+        }
+        let known = self.foreign.all;
+        each_line!(mut port, self => port.ask_to_move_after(known))
+    }
+
+    fn ask_to_resume(&mut self) -> Result<(), PortError> {
+        self.take_foreign_halts();
+        if self.shared.halts() != self.at {
+            return Err(PortError::Halted { by: None });
+        }
+        each_line!(mut port, self => port.ask_to_resume())
+    }
+
+    fn halts(&self) -> Halts {
+        self.foreign
     }
 }

@@ -8,6 +8,7 @@ use crate::execution::phase::Phase;
 use crate::extension::Extensions;
 use crate::host::overtaking::Overtaking;
 use crate::host::slices::SliceProgress;
+use crate::host::upload::LineUpload;
 use crate::late::LateTicks;
 use crate::motion::Motion;
 use crate::nodes::{Goal, Nodes};
@@ -48,6 +49,7 @@ pub struct Controller<M> {
     // The link to the host.
     pub(crate) slice_progress: SliceProgress,
     pub(crate) overtaking: [Overtaking; HOST_LINES],
+    pub(crate) uploads: [LineUpload; HOST_LINES],
     pub(crate) records: ResponseQueues,
     pub(crate) since_status_ms: u16,
     pub(crate) late_ticks: LateTicks,
@@ -77,6 +79,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             motion: Motion::default(),
             slice_progress: SliceProgress::Begin,
             overtaking: [Overtaking::default(); HOST_LINES],
+            uploads: [LineUpload::default(); HOST_LINES],
             records: ResponseQueues::new(),
             since_status_ms: 0,
             late_ticks: LateTicks::default(),

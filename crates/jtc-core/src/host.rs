@@ -1,7 +1,7 @@
 //! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
 pub(crate) mod overtaking;
 pub(crate) mod slices;
-mod upload;
+pub(crate) mod upload;
 
 use jtc_wire::{
     Command, DataStatus, EVENTS_MAX, ExecCommand, FrameType, FrictionImage, LinkEvent, RawPoint, Response,
@@ -18,6 +18,7 @@ use crate::nodes::GRIPPER;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 use overtaking::Overtaking;
 use slices::{SliceOutcome, SliceProgress};
+use upload::LineUpload;
 
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
@@ -75,6 +76,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Serves one event, or a slice of it; when it is done it has its record.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
         let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
+        let mut plain = received.plain;
         if !received.overtaken {
             *overtaking = Overtaking::default();
         }
@@ -85,6 +87,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let (data, served) = match Command::parse(frame) {
                     Err(status) => (status, Served::Quickly),
                     Ok(command) => {
+                        if let Some(upload) = self.uploads.get_mut(received.line) {
+                            plain = upload.in_plain_words(&command, plain);
+                        }
                         let (progress, served) = match command {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
@@ -115,7 +120,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         }
                     }
                 };
-                let data = if received.plain { in_plain_words(data) } else { data };
+                let data = if plain { in_plain_words(data) } else { data };
                 (Response::good(frame.frame_type, data, frame.bytes.len() as u16), false, served)
             }
         };
@@ -297,11 +302,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
                 self.check_friction()?;
-                self.start_path()
+                self.start_path()?;
+                self.uploads.iter_mut().for_each(LineUpload::executed);
+                Ok(())
             }
             (TrajectoryState::Pause, ExecCommand::Execute) => {
                 self.check_friction()?;
-                self.resume_path()
+                self.resume_path()?;
+                self.uploads.iter_mut().for_each(LineUpload::executed);
+                Ok(())
             }
             (TrajectoryState::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
                 self.leave_path(command);

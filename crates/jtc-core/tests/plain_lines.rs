@@ -221,10 +221,80 @@ fn j51_numbers_above_6_are_6_on_a_plain_line() {
         assert_eq!(rig.records().last().map(|record| record.data), Some(data), "a Stop with nothing to stop");
     }
     // 8: the arm is not at the first point.
-    rig.upload(&[rest(5_000); 3], 10);
     for plain in [true, false] {
         rig.plain = plain;
+        rig.upload(&[rest(5_000); 3], 10);
         let data = if plain { DataStatus::IncorrectValue } else { DataStatus::StartPositionMismatch };
         assert_eq!(rig.exec(ExecCommand::Execute), data);
+    }
+}
+
+/// Segment `segment` of three.
+fn of_three(segment: u16) -> Vec<u8> {
+    segment_body(9, segment, 3, 10, &[rest(5_000); 20])
+}
+
+/// What its segment 0 has found holds, whatever the line is for the frames behind it.
+#[test]
+fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
+    use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed, StartPositionMismatch};
+    let in_words = |plain, data| if plain { IncorrectValue } else { data };
+    for plain in [true, false] {
+        for later in 0u8..16 {
+            let case = format!("segment 0 on a plain line: {plain}, later frames {later:#06b}");
+            let at = |n: u8| later >> n & 1 == 1;
+            let mut rig = Rig::holding();
+            rig.plain = plain;
+            assert_eq!(rig.ask(SEGMENT, &of_three(0)), NoError);
+            rig.plain = at(0);
+            assert_eq!(rig.ask(SEGMENT, &of_three(1)), NoError);
+            assert_eq!(rig.exec(ExecCommand::Execute), in_words(plain, NotAllowed), "{case}");
+            assert_eq!(rig.ask(SEGMENT, &of_three(1)), IncorrectSegmentOrder, "{case}");
+            rig.plain = at(1);
+            assert_eq!(rig.ask(SEGMENT, &of_three(2)), NoError);
+            rig.plain = at(2);
+            for _ in 0..2 {
+                let data = rig.exec(ExecCommand::Execute);
+                assert_eq!(data, in_words(plain, StartPositionMismatch), "{case}");
+            }
+            // Other frames are those of their own time.
+            rig.plain = at(3);
+            let data = rig.exec(ExecCommand::Stop);
+            assert_eq!(data, in_words(at(3), NotAllowed), "{case}");
+            // The state forbids the segments of an upload that has been begun.
+            rig.plain = plain;
+            assert_eq!(rig.ask(SEGMENT, &of_three(0)), NoError);
+            rig.press_stop(1);
+            rig.run(5);
+            rig.plain = at(0);
+            assert_eq!(rig.ask(SEGMENT, &of_three(1)), in_words(plain, NotAllowed), "{case}");
+        }
+    }
+}
+
+/// A drop is told in the words of segment 0.
+#[test]
+fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(SEGMENT, &of_three(0)), DataStatus::NoError);
+    rig.plain = true;
+    rig.urgent(1, UrgentCommand::Stop);
+    rig.run(5);
+    assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
+}
+
+/// After its Execute a trajectory may be executed by another client, which has not shown that it knows more than 6.
+#[test]
+fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
+    for plain in [true, false] {
+        let mut rig = Rig::holding();
+        rig.plain = plain;
+        rig.upload(&[rest(0); 60], 10);
+        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+        for again in [true, false, true] {
+            rig.plain = again;
+            let data = if plain || again { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
+            assert_eq!(rig.exec(ExecCommand::Execute), data, "{plain} {again}");
+        }
     }
 }

@@ -1,10 +1,11 @@
 //! Segments of a trajectory: which are taken (J-30), checked and copied in slices (J-36).
-use jtc_wire::{DataStatus, ExecCommand, RawPoint, Segment};
+use jtc_wire::{Command, DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
 use crate::check::{TrajectoryCheck, Violation};
 use crate::controller::Controller;
 use crate::io::HostEvent;
+use crate::remembered::remembered;
 use crate::{ControllerState, TrajectoryState};
 
 /// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
@@ -13,6 +14,33 @@ const COPY_TICKS: usize = 10;
 /// Points of a short segment checked and copied in one tick.
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
+
+/// What a line is to the upload that was begun on it last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LineUpload {
+    /// Its segment 0 came on a plain line (J-51). `None` before the first, and after the Execute of one that did not.
+    plain: Option<bool>,
+}
+
+remembered!(LineUpload { plain });
+
+impl LineUpload {
+    /// Whether the record of a `command` has plain words: as the segment 0 of its upload has, which a segment 0 decides.
+    pub fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
+        match command {
+            Command::Trajectory(segment) if segment.segment == 0 => *self.plain.insert(plain),
+            Command::Trajectory(_) | Command::TrajSetExecStatus(ExecCommand::Execute) => {
+                self.plain.unwrap_or(plain)
+            }
+            _ => plain,
+        }
+    }
+
+    /// A trajectory is executed. Another client that executes it once more is one that has not shown yet what it knows.
+    pub fn executed(&mut self) {
+        self.plain = self.plain.filter(|plain| *plain);
+    }
+}
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.

@@ -16,7 +16,7 @@ use crate::{JOINTS, NODES};
 pub const HOST_BYTES: usize = 48;
 /// Bytes of frames of hosts that are recorded, on average in a tick and at once.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// What an event takes beside its bytes.
+/// Bytes that an event counts for beside its own: it takes 15 to 20 bits.
 const EVENT_BYTES: u16 = 2;
 
 /// What the next inputs are written against.

@@ -11,6 +11,7 @@ use crate::controller::Controller;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
 use crate::host::overtaking::Overtaking;
+use crate::host::upload::LineUpload;
 use crate::late::LateTicks;
 use crate::motion::Motion;
 use crate::nodes::Nodes;
@@ -84,6 +85,7 @@ pub(crate) struct Dynamic {
     braking_ms: Option<u16>,
     motion: Motion,
     overtaking: [Overtaking; HOST_LINES],
+    uploads: [LineUpload; HOST_LINES],
     late_ticks: LateTicks,
     observed: Observed,
     hosts_silent_ms: u32,
@@ -105,6 +107,7 @@ remembered!(Dynamic {
     braking_ms,
     motion,
     overtaking,
+    uploads,
     late_ticks,
     observed,
     hosts_silent_ms,
@@ -178,6 +181,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             motion,
             slice_progress: _,
             overtaking,
+            uploads,
             records: _,
             since_status_ms: _,
             late_ticks,
@@ -200,6 +204,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         braking_ms.write(to);
         motion.write(to);
         overtaking.write(to);
+        uploads.write(to);
         late_ticks.write(to);
         observed.write(to);
         extensions.hosts_silent_ms.write(to);
@@ -223,6 +228,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             braking_ms,
             motion,
             overtaking,
+            uploads,
             late_ticks,
             observed,
             hosts_silent_ms,
@@ -235,7 +241,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.store.restore(&store);
         (self.trajectory, self.clock, self.phase) = (trajectory, clock, phase);
         (self.braking_ms, self.motion) = (braking_ms, motion);
-        (self.overtaking, self.late_ticks, self.observed) = (overtaking, late_ticks, observed);
+        (self.overtaking, self.uploads) = (overtaking, uploads);
+        (self.late_ticks, self.observed) = (late_ticks, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;
     }
 

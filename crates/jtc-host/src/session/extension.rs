@@ -300,7 +300,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] outside HoldPos, beside a paused path or during an upload, or for a velocity beyond its limit;
+    /// [`LinkError::Refused`] outside HoldPos, beside a paused path, or for a velocity beyond its limit;
     /// [`LinkError::NoExtension`], and those of the line.
     pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
         let mut frame = [0; 30];

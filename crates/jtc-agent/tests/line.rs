@@ -645,7 +645,7 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
         let mut frame = [0; 16];
         let setting = jtc_core::settings::named("host_timeout_ms").expect("it is a setting").number;
         let value = SettingValue { setting, joint: 0, value: timeout_ms as f64 };
-        let n = jtc_wire::set_settings(&mut frame, [value].into_iter()).expect("it fits");
+        let n = jtc_wire::set_settings(&mut frame, [value]).expect("it fits");
         board.send(anna, &frame[..n]);
         board.run_ms(500);
         board.status.state = ControllerState::Operate.into();
@@ -696,7 +696,7 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         let mut frame = [0; 16];
         let setting = jtc_core::settings::named("host_timeout_ms").expect("it is a setting").number;
         let value = SettingValue { setting, joint: 0, value: f64::from(timeout_ms) };
-        let n = jtc_wire::set_settings(&mut frame, [value].into_iter()).expect("it fits");
+        let n = jtc_wire::set_settings(&mut frame, [value]).expect("it fits");
         board.status.state = HoldPos.into();
         board.run_ms(100);
         board.send(anna, &frame[..n]);

@@ -24,7 +24,7 @@ fn arm(sim: &Sim) -> String {
 fn j52_a_move_without_a_speed_is_slow() {
     let sim = ready();
     let default = "at 25 % of the limits; --speed sets it";
-    let mut to = |words: &[&str]| {
+    let to = |words: &[&str]| {
         let output = sim.jtc(&[&["--json", "move", "--to", "0.4,0.2,-0.3,0,0,0"], words].concat()).ends(0);
         sim.jtc(&["move", "--to", "0,0,0,0,0,0", "--speed", "100"]).ends(0);
         (output.json()["executed_s"].as_f64().unwrap(), output.err)
@@ -37,7 +37,7 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!(slow > 1.7 * full, "{slow} s, {full} s");
     let motion = sim.path("motion.csv");
     sim.jtc(&["example", "motion", "-o", &motion]).ends(0);
-    let mut approach = |words: &[&str]| {
+    let approach = |words: &[&str]| {
         sim.jtc(&["move", "--to", "0.4,0.2,-0.3,0,0,0", "--speed", "100"]).ends(0);
         sim.jtc(&[&["traj", "run", &motion, "--approach"], words].concat()).ends(0).err
     };

@@ -300,6 +300,7 @@ impl NotHalted {
 }
 
 /// How an arm is reached.
+#[expect(clippy::large_enum_variant, reason = "there is one for each arm, for a moment")]
 enum Reached {
     /// By a line of our own.
     Line(Box<Session<LinkPort>>),

@@ -108,8 +108,7 @@ pub(super) fn mass_matrices(model: &ArmModel, ranges: &Ranges) -> Vec<Matrix> {
 /// Whether a symmetric matrix is positive definite (Cholesky).
 fn is_positive(mut a: Matrix) -> bool {
     for k in 0..JOINTS {
-        // NaN is not positive.
-        if !(a[k][k] > 0.0) {
+        if a[k][k].is_nan() || a[k][k] <= 0.0 {
             return false;
         }
         for i in k + 1..JOINTS {

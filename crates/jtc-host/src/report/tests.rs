@@ -253,7 +253,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
 /// A joint that stands still, moves by next to nothing, is far away or has no numbers: the picture stays small, and each axis readable.
 #[test]
 fn a_picture_is_small_whatever_the_joints_do() {
-    let lead: [(&str, fn(f64) -> f64); 11] = [
+    type Lead = fn(f64) -> f64;
+    let lead: [(&str, Lead); 11] = [
         ("zero", |_| 0.0),
         ("stands", |_| -0.7),
         ("by 1e-12", |t| 0.3 + 1e-12 * t),

@@ -111,11 +111,11 @@ fn is_positive(mut a: Matrix) -> bool {
         if a[k][k].is_nan() || a[k][k] <= 0.0 {
             return false;
         }
-        for i in k + 1..JOINTS {
-            let factor = a[i][k] / a[k][k];
-            for j in k + 1..=i {
-                a[i][j] -= factor * a[j][k];
-            }
+        // The column below it, before it is changed.
+        let column: JointVec = std::array::from_fn(|i| a[i][k]);
+        for (i, row) in a.iter_mut().enumerate().skip(k + 1) {
+            let factor = column[i] / column[k];
+            row.iter_mut().zip(&column).take(i + 1).skip(k + 1).for_each(|(v, c)| *v -= factor * c);
         }
     }
     true

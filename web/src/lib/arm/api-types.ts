@@ -1464,9 +1464,9 @@ export interface components {
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: double
-             * @description % of what the limits allow.
+             * @description % of what the limits allow; missing: 10, and 25 where the controller is a simulator.
              */
-            speed_percent?: number;
+            speed_percent?: number | null;
             to_flange?: components["schemas"]["FlangeObject"] | null;
             /** @description A named pose, of those that `GET /api/poses` lists. */
             to_pose?: string | null;
@@ -1693,7 +1693,10 @@ export interface components {
         RunRequest: {
             /** @description The controller cannot be asked for its limits, and those that are built into it are safe for this arm. */
             accept_device_limits?: boolean;
-            /** @description Where the arm stands elsewhere it is moved to the first point, at half of the limits at most. */
+            /**
+             * @description Where the arm stands elsewhere it is moved to the first point, at `speed_percent` of the limits and at half of them at most. Without
+             *     `speed_percent` at 10 % of the limits, and at 25 % where the controller is a simulator.
+             */
             approach?: boolean;
             /** @description Digest of the trajectory that was looked at: where the number has another one by now nothing is sent. */
             digest?: string | null;
@@ -1705,9 +1708,9 @@ export interface components {
             repeat?: number;
             /**
              * Format: double
-             * @description % of the trajectory's own speed.
+             * @description % of the trajectory's own speed; missing: 100.
              */
-            speed_percent?: number;
+            speed_percent?: number | null;
             /**
              * Format: u-int16
              * @description Its number.

@@ -973,12 +973,12 @@ export interface components {
         };
         /** @description An update. */
         UpdateRequest: {
-            /** @description What cannot be verified is as good as what was. */
+            /** @description What cannot be verified is as good as what was: also a board that shows the program, of whose flash nothing is known. */
             accept_unverified?: boolean;
             addresses?: components["schemas"]["Unit"] | null;
             /** @description The boards. */
             boards: components["schemas"]["TargetRequest"][];
-            /** @description Flash date, as `2009-06-01`; missing: today. */
+            /** @description Flash date, as `2009-06-01`; missing: today, and a board that shows the program keeps its date. */
             date?: string | null;
             /** @description Only the checks. */
             dry_run?: boolean;
@@ -987,13 +987,17 @@ export interface components {
              * @description Program ID that the boards must show at the end.
              */
             expect_program_id?: number | null;
-            /** @description Also when boards run, or the image is there already. */
+            /** @description Gaps between records are filled with FF. */
+            fill_gaps?: boolean;
+            /** @description Also when boards run, another PC is on the bus, or the board shows the program already. */
             force?: boolean;
             format?: components["schemas"]["ImageFormat"] | null;
             /** @description All boards at once, by broadcast. */
             group?: boolean;
             /** @description The image, as base64. */
             image: string;
+            /** @description Also when the board shows the program already; lifts no check. */
+            rewrite?: boolean;
             /** @description What the other cycle carries, as base64, where the profile's plan sends two images. */
             second?: string | null;
             /** @description Start the application at the end. */
@@ -1017,7 +1021,7 @@ export interface components {
              * @description Who it is.
              */
             flash_number?: number | null;
-            /** @description `not-started`, `cancelled`, `up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`. */
+            /** @description `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`. */
             outcome: string;
             /**
              * Format: u-int16
@@ -1034,7 +1038,10 @@ export interface components {
              * @description s.
              */
             time_s: number;
-            /** @description What the board showed when it was read back is what was sent. */
+            /**
+             * @description The board shows the Program ID and date of the image, and the agent or its inventory has it that exactly this image was
+             *     written to this address: now, or before.
+             */
             verified: boolean;
         };
         /** @description A value. */

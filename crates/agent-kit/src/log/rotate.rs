@@ -49,7 +49,7 @@ impl Target for Rotated {
             return Ok(false);
         }
         // A file that this limit did not make, of an earlier version or of another program, is not replaced.
-        if std::fs::metadata(before).is_ok_and(|found| found.len() > self.limit) {
+        if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
             std::fs::rename(before, kept)?;

@@ -157,8 +157,8 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
-    let sim = Sim::with_faults(&["--no-throttle"], fault).with_parameters();
-    // It waits until all drives are enabled, which takes 4 s, and would then jog for a minute.
+    // The drives are enabled 4 s after the arm is in HoldPos. Without the fault it would jog for a minute.
+    let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
     let error = &output.json()["error"];
     let message = error["message"].as_str().unwrap();

@@ -88,9 +88,10 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let (healthy, found) = findings(&served);
     assert!(!healthy && found.iter().any(|f| f["what"] == "joint 2: motor-control fault"), "{found:?}");
 
-    // Another one alone does not help.
+    // Another one alone does not help, and is refused (J-21).
     is_for_the_one_who_commands(&served, "POST /api/clear", &json!({ "joints": [2] }));
-    assert_eq!(anna.ask("POST /api/clear", Some(json!({ "joints": [5], "gripper": true }))).0, 204);
+    let (status, error) = anna.ask("POST /api/clear", Some(json!({ "joints": [5], "gripper": true })));
+    assert_eq!((status, error["code"].as_str()), (409, Some("refused")), "{error}");
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "Error");
     assert_eq!(anna.ask("POST /api/clear", Some(json!({ "joints": [9] }))).0, 422);

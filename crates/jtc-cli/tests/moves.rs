@@ -22,7 +22,8 @@ fn arm(sim: &Sim) -> String {
 /// A move and an approach for which the user names no speed are slow, and the speed is printed.
 #[test]
 fn j52_a_move_without_a_speed_is_slow() {
-    let sim = ready();
+    // In real time, which is what a run reports.
+    let sim = Sim::start(&["--no-throttle"]).held();
     let default = "at 25 % of the limits; --speed sets it";
     let to = |words: &[&str]| {
         let output = sim.jtc(&[&["--json", "move", "--to", "0.4,0.2,-0.3,0,0,0"], words].concat()).ends(0);
@@ -32,7 +33,7 @@ fn j52_a_move_without_a_speed_is_slow() {
     let (slow, said) = to(&[]);
     assert!(said.contains(default), "{said}");
     let (same, named) = to(&["--speed", "25"]);
-    assert!((slow - same).abs() < 0.1 && !named.contains("of the limits"), "{slow} s, {same} s: {named}");
+    assert!((slow - same).abs() < 0.4 && !named.contains("of the limits"), "{slow} s, {same} s: {named}");
     let (full, _) = to(&["--speed", "100"]);
     assert!(slow > 1.7 * full, "{slow} s, {full} s");
     let motion = sim.path("motion.csv");

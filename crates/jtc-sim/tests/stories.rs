@@ -53,6 +53,7 @@ fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::IncorrectValue);
     operator.ask(&jtc_wire::fixed::GET_INFO).unwrap();
+    operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::StartPositionMismatch);
     let before = operator.world.truth().q;

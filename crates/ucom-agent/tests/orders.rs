@@ -91,7 +91,7 @@ fn a_lease_lapses_in_the_middle_of_an_update() {
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     let key = served.lease("anna", 1.0, "stop");
     let last = served.last_event();
-    let image = base64::engine::general_purpose::STANDARD.encode(vec![0x5A; 60_000]);
+    let image = base64::engine::general_purpose::STANDARD.encode(vec![0xA5; 60_000]);
     let body = json!({ "boards": [{ "board": 2 }], "image": image, "format": "bin", "force": true });
     let job = served.begin("POST /api/updates", &key, Some(body));
     let (halted, _) = served.event(last, "halt", is("halt"));

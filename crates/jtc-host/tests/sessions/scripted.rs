@@ -80,12 +80,16 @@ fn j34_resume_only_after_a_pause() {
         Duration::MAX,
     );
     s.resume().unwrap();
-    // The host may ask who the device is, and nothing else, before it goes on.
+    // The host may ask who the device is and for its settings, and nothing else, before it goes on.
     let written = written.borrow();
     let (before, last) = written.split_last_chunk::<7>().unwrap();
     assert_eq!(*last, jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
-    assert!(before.as_chunks::<6>().0.iter().all(|frame| *frame == jtc_wire::fixed::GET_INFO));
-    assert!(before.len().is_multiple_of(6));
+    let mut rest = before;
+    while let Some(length) = rest.get(2..4) {
+        let (frame, more) = rest.split_at(usize::from(u16::from_be_bytes([length[0], length[1]])));
+        assert!(frame == jtc_wire::fixed::GET_INFO || frame == jtc_wire::fixed::get_settings(0), "{frame:?}");
+        rest = more;
+    }
 }
 
 /// A link that is lost in motion: the error states that the arm may be moving, and a stop goes out that may still arrive.

@@ -36,8 +36,9 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!((slow - same).abs() < 0.4 && !named.contains("of the limits"), "{slow} s, {same} s: {named}");
     let (full, _) = to(&["--speed", "100"]);
     assert!(slow > 1.7 * full, "{slow} s, {full} s");
-    let motion = sim.path("motion.csv");
-    sim.jtc(&["example", "motion", "-o", &motion]).ends(0);
+    let folder = sim.path("examples");
+    sim.jtc(&["example", "motion", "-o", &folder]).ends(0);
+    let motion = format!("{folder}/motion.csv");
     let approach = |words: &[&str]| {
         sim.jtc(&["move", "--to", "0.4,0.2,-0.3,0,0,0", "--speed", "100"]).ends(0);
         sim.jtc(&[&["traj", "run", &motion, "--approach"], words].concat()).ends(0).err

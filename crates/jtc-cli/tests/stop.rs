@@ -156,7 +156,10 @@ fn an_upload_does_not_go_on_after_a_stop() {
         assert_eq!(stopped["arms"][0]["holder"]["pid"], child.id(), "{stopped}");
         let ended = ends(child, 5);
         let message = ended["error"]["message"].as_str().unwrap_or_default();
-        assert!(message.contains("jtc stop stopped the arm after this motion was requested"), "{ended}");
+        assert!(
+            message.contains("stopped") && message.contains("after this motion was requested"),
+            "{ended}"
+        );
         cell.stands();
     }
     // A command of its own is a new request.
@@ -209,8 +212,9 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // Nothing is executed any more.
-    let refused = cell.jtc(&["traj", "pause"]).ends(1);
+    // Once the arm stands nothing is executed any more.
+    let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
+    let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
     // What is paused moves no more, and its program ends.
     cell.jtc(&["stop"]).ends(0);

@@ -145,7 +145,12 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     let request: Request = read_line(Within { stream, end: Instant::now() + PATIENCE }, REQUEST_MAX)?;
     let by: String = request.by.chars().filter(|c| !c.is_control()).take(100).collect();
     let done = line.halt(request.halt, &by);
-    write_line(stream, &Answer::of(line.path.clone(), line.baud, done))?;
+    let answer = Answer::of(line.path.clone(), line.baud, done);
+    write_line(stream, &answer)?;
+    if !answer.confirmed {
+        // The asker reports that, and waits for nothing.
+        return Ok(());
+    }
     let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };
     write_line(stream, &End::of(&status, &standstill))
 }

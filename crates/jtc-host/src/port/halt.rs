@@ -1,6 +1,6 @@
 //! A Stop or Pause by another program of the same user: what is said at the [door](super) of the program that has the port.
 //!
-//! The asker sends one line, a [`Request`] as JSON. The program that has the port writes the frame to the line, answers with an
+//! The asker sends one line, a request as JSON. The program that has the port writes the frame to the line, answers with an
 //! [`Answer`], and with an [`End`] when the arm stands.
 
 use std::io;

@@ -12,7 +12,7 @@ use super::{Flow, Session};
 use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, UploadError, accepted};
 use crate::frame;
-use crate::port::{Port, line_time};
+use crate::port::{Port, PortError, line_time};
 use crate::trajectory::UploadOptions;
 
 /// Times that one segment is sent.
@@ -88,6 +88,8 @@ struct Upload {
     tries: u32,
     retries: u32,
     restarts: u32,
+    /// Stops and Pauses of other programs before it.
+    halts: u64,
     window: usize,
     chunk: usize,
     start: Duration,
@@ -126,6 +128,7 @@ impl Upload {
             tries: 0,
             retries: 0,
             restarts: 0,
+            halts: 0,
             window: window.clamp(3, WINDOW_MAX),
             // 10 ms of line, so that statuses are taken in meanwhile.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
@@ -227,6 +230,7 @@ impl<P: Port> Session<P> {
         self.forget_the_past()?;
         let (baud, start) = (self.port.baud(), self.port.now());
         let mut up = Upload::new(points, step_ms, options, baud, start)?;
+        up.halts = self.port.halts().all;
         loop {
             while up.confirmed < segments {
                 if self.advance(&mut up)? && progress(&up.progress(self.port.now())) == Flow::Cancel {
@@ -344,6 +348,10 @@ impl<P: Port> Session<P> {
             code => {
                 if let Some(reason) = self.port.take_denial() {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
+                }
+                if self.port.halts().all != up.halts {
+                    // The controller dropped the upload at the Stop of another program before the port withheld the rest.
+                    return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
                     .into())

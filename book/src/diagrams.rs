@@ -30,7 +30,8 @@ pub fn with_script(book: &mut Book) -> usize {
 /// Copies the script into the book: mdbook-mermaid brings it with its source.
 pub fn copy_script(root: &Path, out: &Path) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let words = ["metadata", "--format-version", "1", "--locked", "--offline", "--manifest-path"];
+    // It reads the manifests for every platform, of which the build for this computer may have fetched a part only.
+    let words = ["metadata", "--format-version", "1", "--locked", "--manifest-path"];
     let asked = Command::new(cargo).args(words).arg(root.join("book/Cargo.toml")).output()?;
     ensure!(asked.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&asked.stderr));
     let metadata: Value = serde_json::from_slice(&asked.stdout)?;

@@ -157,6 +157,17 @@ fn firmware(page: &mut Page) {
     });
 }
 
+/// Two threads write to one pipe here: the result may come before or after the last note. Behind it comes the error.
+fn result_last(mut printed: Printed) -> Printed {
+    let result = "not stopped for certain: 1\n";
+    if let Some(before) = printed.text.find(&format!("\n{result}")) {
+        printed.text.replace_range(before + 1..before + 1 + result.len(), "");
+        let error = printed.text.find("ucom: not stopped").expect("the error follows");
+        printed.text.insert_str(error, result);
+    }
+    printed
+}
+
 fn running(page: &mut Page) {
     page.group("ucom: while boards run");
     let run = "ucom run 1,2 --for 4";
@@ -167,7 +178,7 @@ fn running(page: &mut Page) {
         // Until the start is over.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
-        of_a_moment(sim.all_of(child))
+        result_last(of_a_moment(sim.all_of(child)))
     });
     page.case_of_a_moment("The adapter is pulled out", run, || {
         let sim = numbered(&["--boards", "2"]);

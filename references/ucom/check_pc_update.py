@@ -60,8 +60,11 @@ def golden(bench: Bench) -> None:
                 header = "4355010001000000 00000000F4010000 3F4BC13AFFFFFFFF".split() + ["F" * 16] * 4
                 named = [f"2C1#{part}" for part in (*header, "FFFFFFFFFFFFDC22", "0B30557A9FC4E90E")]
                 bench.same("13.4", "first frames", frames[:9], named)
-            said = told(bench, "U-3", begin(chain, image), 0)
-            bench.same("U-3", "outcome of the same image again", (said["outcome"], played.attempts), ("up-to-date", 1))
+            # D-62: no inventory names what was written to this board, so its Program ID and date prove nothing.
+            said = told(bench, "U-3", begin(chain, image), 4)
+            bench.same("U-3", "outcome of the same image again", (said["outcome"], played.attempts), ("program-up-to-date", 1))
+            said = told(bench, "U-3", begin(chain, image, "--unverified"), 0)
+            bench.same("U-3", "outcome", said["outcome"], "program-up-to-date")
     bench.ok("13.4")
 
 

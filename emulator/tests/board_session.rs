@@ -65,6 +65,8 @@ fn a_whole_session() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
     let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
+    // J-51: segment 0 decides that this upload has all numbers.
+    rig.ask(HOST, &fixed::GET_INFO);
     rig.upload(&motion(), 4);
 
     // J-33: pause on the way, at rest after its ramp; resume; stop.
@@ -87,7 +89,7 @@ fn a_whole_session() {
     assert!(accepted(rig.exec(ExecCommand::Stop)));
     let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
     // J-34: from somewhere on the path it cannot be started.
-    // J-51: only a host that asks receives the reason.
+    // J-51: only a host that has asked lately receives the reason.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::IncorrectValue);
     rig.ask(HOST, &fixed::GET_INFO);
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);

@@ -68,7 +68,8 @@ impl Session {
         let counter = rig.board.machine.count("control_step")?;
         let recorder = rig.board.machine.count("record_step")?;
         let mut long = vec![0; 60_000];
-        let n = trajectory(&mut long, (1, 0, 1), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
+        // Not segment 0, which would stop the arm (J-30).
+        let n = trajectory(&mut long, (1, 1, 2), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
         // What a host could send at any time: refused, good, and bytes that are none, full of headers.
         let traffic = vec![

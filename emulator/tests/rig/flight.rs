@@ -5,6 +5,8 @@ use jtc_wire::{UrgentCommand, UrgentCommands};
 
 /// Bytes of the record.
 pub const FLIGHT_SIZE: usize = 848;
+/// The version of the layout that is read here.
+const LAYOUT: u16 = 3;
 
 /// A tick as the board recorded it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,7 +91,7 @@ impl Flight {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);
         let head = (b.take::<4>(), b.u16(), b.u16());
-        if head != (*b"JTCF", 2, FLIGHT_SIZE as u16) {
+        if head != (*b"JTCF", LAYOUT, FLIGHT_SIZE as u16) {
             return None;
         }
         let (phase, cause, tick) = (b.u32(), b.u32(), b.u64());

@@ -95,6 +95,9 @@ impl Terminal {
                 None => own.env_remove(name),
             };
         }
+        if let Some(folder) = command.get_current_dir() {
+            own.current_dir(folder);
+        }
         own.env("TERM", "xterm");
         own.stdin(Stdio::from(self.end())).stdout(self.end()).stderr(self.end());
         own.spawn().expect("it starts")

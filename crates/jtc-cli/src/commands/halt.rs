@@ -93,7 +93,7 @@ fn not_asked(arms: &[Arm]) -> Vec<String> {
 /// Pauses on the path.
 pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    let (answer, words) = match reach(link, Halt::Pause).map_err(|error| error.told(Halt::Pause))? {
+    let (answer, words) = match reach(link, Halt::Pause, false).map_err(|error| error.told(Halt::Pause))? {
         Reached::Line(session) => {
             let mut session = *session;
             progress.watch(&mut session);
@@ -308,8 +308,8 @@ enum Reached {
     Holder(Answer, Option<End>),
 }
 
-/// Opens the line, or asks the program that has the port.
-fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, NotHalted> {
+/// Opens the line, or asks the program that has the port. `own`: a program of this user had it a moment ago.
+fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
         let (path, busy) = match link.open_unless_busy(None)? {
@@ -320,7 +320,8 @@ fn reach(link: &LinkArgs, what: Halt) -> Result<Reached, NotHalted> {
         if let Some((answer, stands)) = ask(&path, what)? {
             return Ok(Reached::Holder(answer, stands));
         }
-        let patience = if is_own(&path) { CHANGES_OWN_HANDS } else { CHANGES_HANDS };
+        own |= is_own(&path);
+        let patience = if own { CHANGES_OWN_HANDS } else { CHANGES_HANDS };
         if start.elapsed() >= patience {
             return Err(Failure::from(busy).into());
         }
@@ -384,7 +385,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
                 return Ok(Stopped { accepted, moved, state, trajectory, holder: first });
             }
             Some(end) => return Err(NotHalted::after(Sent::Confirmed, still_moving(&end))),
-            None => reached = reach(&link, Halt::Stop),
+            None => reached = reach(&link, Halt::Stop, true),
         }
     }
     let message = "one program after the other opens the port of the arm";
@@ -394,7 +395,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
 
 fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     match arm {
-        Arm::Of { link, .. } => reach(link, Halt::Stop),
+        Arm::Of { link, .. } => reach(link, Halt::Stop, false),
         #[cfg(unix)]
         Arm::Behind { socket, link } => {
             let start = Instant::now();
@@ -404,7 +405,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 }
                 // The program has ended, or answers others: the port is free, or the next program has it.
                 if link.port.is_some() {
-                    return reach(link, Halt::Stop);
+                    return reach(link, Halt::Stop, true);
                 }
                 if start.elapsed() >= CHANGES_OWN_HANDS {
                     let message = "the program that had the port has ended, and its port is not found";

@@ -9,6 +9,7 @@ use std::net::{TcpStream, ToSocketAddrs as _};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use jtc_host::port::Halts;
 use jtc_host::{Port, PortError};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use tungstenite::client::IntoClientRequest as _;
@@ -57,6 +58,8 @@ enum Notice {
     },
     Halted {
         number: u64,
+        /// An older agent does not count them.
+        of_others: Option<Halts>,
     },
     #[serde(other)]
     Other,
@@ -73,6 +76,8 @@ pub struct AgentPort {
     denied: Option<String>,
     /// The last Stop or Pause that this end knows of, by number, where there was one.
     halted: Option<u64>,
+    /// Those of others.
+    halts: Halts,
 }
 
 impl AgentPort {
@@ -143,6 +148,7 @@ impl AgentPort {
             received: Vec::new(),
             denied: None,
             halted: None,
+            halts: Halts::default(),
         };
         while port.hello.port.is_empty() {
             if Instant::now() >= end {
@@ -173,7 +179,12 @@ impl AgentPort {
             Ok(Message::Text(text)) => match serde_json::from_str(&text) {
                 Ok(Notice::Hello(hello)) => self.hello = hello,
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
-                Ok(Notice::Halted { number }) => self.halted = Some(number),
+                Ok(Notice::Halted { number, of_others }) => {
+                    self.halted = Some(number);
+                    // Without a count one is enough: it voids what was requested before.
+                    let one_more = Halts { all: self.halts.all + 1, stops: self.halts.stops + 1 };
+                    self.halts = of_others.unwrap_or(one_more);
+                }
                 Ok(Notice::Other) | Err(_) => {}
             },
             Ok(Message::Close(frame)) => {
@@ -252,6 +263,15 @@ impl Port for AgentPort {
             Some(number) => self.send(Message::Text(format!("{{\"asked_after\":{number}}}").into())),
             None => Ok(()),
         }
+    }
+
+    fn halts(&self) -> Halts {
+        self.halts
+    }
+
+    fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
+        // The agent refuses what follows for as long as nobody asks anew.
+        if halts == self.halts.all { self.ask_to_move() } else { Ok(()) }
     }
 
     fn now(&self) -> Duration {

@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 use common::Served;
 use jtc_client::AgentPort;
 use jtc_host::check::CheckOptions;
+use jtc_host::port::{Halts, Port as _};
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, PortError, Session, plan};
 use jtc_wire::{ControllerState, TrajectoryState};
+use test_kit::patience::{LONGEST, Patience, until};
 use test_kit::written::text_with;
-
-const WAIT: Duration = Duration::from_secs(30);
 
 /// The controller has its parameters and holds the arm.
 fn hold(session: &mut Session<AgentPort>) {
     session.use_defaults().expect("it takes them");
-    session.wait_ready(WAIT).expect("it holds the arm");
+    session.wait_ready(LONGEST).expect("it holds the arm");
 }
 
 /// A motion of some seconds from the zero pose, checked.
@@ -54,7 +54,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
 
     // With anna gone bob commands at once.
     drop(anna);
-    std::thread::sleep(Duration::from_millis(200));
+    until("the end of her lease", || served.line.with(|line, _| line.lease().is_none()));
     bob.gripper(true).expect("nobody else commands");
     let words = ["\"joined\"", "anna", "\"denied\"", "TrajSetExecStatus", "\"lease\"", "\"left\""];
     text_with(&served.log, &words);
@@ -142,16 +142,14 @@ fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     anna.gripper(false).expect("nobody else commands");
     assert!(matches!(bob.gripper(false), Err(LinkError::Denied { .. })));
     // She does not read what comes.
-    for _ in 0..80 {
-        std::thread::sleep(Duration::from_millis(100));
+    let mut patience = Patience::begin();
+    while served.line.with(|line, _| line.lease().is_some()) {
+        patience.pause("the end of her lease");
         bob.fresh_status().expect("it reports");
-        if served.line.with(|line, _| line.lease().is_none()) {
-            break;
-        }
     }
     bob.gripper(false).expect("nobody commands");
     drop(bob);
-    std::thread::sleep(Duration::from_millis(200));
+    until("the end of his lease", || served.line.with(|line, _| line.lease().is_none()));
     // What she believes of the arm is old.
     let gone = anna.gripper(false).expect_err("she was put out");
     assert!(matches!(gone, LinkError::Port(PortError::AgentGone { .. })), "{gone}");
@@ -169,4 +167,39 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     }
     let status = looks.fresh_status().expect("it reports");
     assert_eq!(status.state, ControllerState::HoldPos);
+}
+
+/// What waits in a queue was requested before a Stop, however late its turn comes: a client knows how many Stops of others there were.
+#[test]
+fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
+    let served = Served::start(921_600);
+    let mut anna = served.operator("anna");
+    hold(&mut anna);
+    let known = |anna: &mut Session<AgentPort>| {
+        for _ in 0..5 {
+            anna.fresh_status().expect("it reports");
+        }
+        anna.port().halts()
+    };
+    assert_eq!(known(&mut anna), Halts::default());
+    // Its own is none of others.
+    let _ = anna.stop();
+    assert_eq!(known(&mut anna), Halts::default());
+    assert_eq!(served.get("POST /api/stop").0, 200);
+    assert_eq!(known(&mut anna), Halts { all: 1, stops: 1 });
+    let _ = anna.stop();
+    assert_eq!(served.get("POST /api/pause").0, 200);
+    assert_eq!(known(&mut anna), Halts { all: 2, stops: 1 });
+    // Longer than a new request has to wait.
+    std::thread::sleep(Duration::from_millis(3_500));
+    let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
+        Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
+        _ => Ok(()),
+    };
+    for before in [0, 1] {
+        anna.port_mut().ask_to_move_after(before).expect("it is there");
+        sent(&mut anna).expect_err("it was requested before the last of them");
+    }
+    anna.port_mut().ask_to_move_after(2).expect("it is there");
+    sent(&mut anna).expect("it was requested after them");
 }

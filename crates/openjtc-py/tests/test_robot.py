@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import pickle
 import signal
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import openjtc
 import pytest
+from robot_agent import agent
 
 HOME = np.array([0.0, 0.5, -1.0, 0.0, 0.5, 0.0])
 #: Distance that a held arm may have from where it was moved, rad.
@@ -509,21 +509,13 @@ def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
                 assert robot.move([0.1, 0.2, -0.4, 0, 0.2, 0]).outcome == "finished"
         finally:
             sim.terminate()
-    token = tmp_path / "tokens"
-    serve = [jtc, "serve", "--sim", "--listen", "127.0.0.1:0", "--token-file", token, "--json"]
-    with subprocess.Popen(serve, stdout=subprocess.PIPE, env=env, text=True) as agent:
-        try:
-            line = next(line for line in agent.stdout if "http://" in line)
-            url = json.loads(line).get("url") or line[line.index("http://") :].split('"')[0]
-            operator = next(row.split('"')[1] for row in token.read_text().splitlines() if row.startswith("operator"))
-            with openjtc.connect(url, token=operator, name="test") as robot:
-                if robot.status.state == "Init":
-                    robot.use_defaults()
-                robot.wait_ready()
-                run = robot.move([0.1, 0.2, -0.4, 0, 0.2, 0])
-                assert run.outcome == "finished" and len(run) > 5
-            # Who has a token that is none is not let in.
-            with pytest.raises(openjtc.RefusedError, match="does not let this program in"):
-                openjtc.connect(url, token="x" * 30)
-        finally:
-            agent.terminate()
+    with agent(tmp_path) as (url, operator):
+        with openjtc.connect(url, token=operator, name="test") as robot:
+            if robot.status.state == "Init":
+                robot.use_defaults()
+            robot.wait_ready()
+            run = robot.move([0.1, 0.2, -0.4, 0, 0.2, 0])
+            assert run.outcome == "finished" and len(run) > 5
+        # Who has a token that is none is not let in.
+        with pytest.raises(openjtc.RefusedError, match="does not let this program in"):
+            openjtc.connect(url, token="x" * 30)

@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 import tty
+import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ import openjtc.motion
 import pytest
 from openjtc.control import encode
 from openjtc.sim import Simulator
+from robot_agent import agent
 
 HOME = np.array([0.0, 0.5, -1.0, 0.0, 0.5, 0.0])
 needs_jtc = pytest.mark.skipif("JTC" not in os.environ, reason="the environment names no program jtc")
@@ -363,6 +365,27 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
                 motion.wait(30)
         assert stands(robot) and wire.sent.count(encode.execute()) == executed
         # What is requested now is done.
+        assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
+
+
+@needs_jtc
+def test_a_stop_at_the_agent_voids_what_waits_however_late_its_turn_comes(tmp_path: Path):
+    with agent(tmp_path) as (url, operator), openjtc.connect(url, token=operator, name="test") as robot:
+        robot.use_defaults()
+        robot.wait_ready()
+        Aside(lambda: robot.jog(0.1, 5.0, joint=1))
+        waiting = [robot.start(openjtc.example("motion"), approach=True) for _ in range(3)]
+        time.sleep(1.0)
+        stop = urllib.request.Request(f"{url}/api/stop", method="POST")
+        with urllib.request.urlopen(stop, timeout=10) as answer:
+            assert answer.status == 200
+        before = robot.position
+        # Longer than a new request has to wait.
+        time.sleep(4.0)
+        for motion in waiting:
+            with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
+                motion.wait(30)
+        assert stands(robot) and np.allclose(robot.position, before, atol=0.05)
         assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
 
 

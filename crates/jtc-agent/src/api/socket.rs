@@ -9,6 +9,7 @@ use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgr
 use axum::response::Response;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
+use jtc_host::port::Halts;
 use serde_json::json;
 use tokio::time::MissedTickBehavior;
 
@@ -75,6 +76,8 @@ pub enum Notice {
         by: String,
         /// What for.
         command: String,
+        /// Stops and Pauses of others since this client came.
+        of_others: Halts,
     },
     /// Another client asks for the lease.
     LeaseWanted {
@@ -182,7 +185,8 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
             let number = line.last_halt();
             let halt = (number != known).then(|| {
                 let (by, command) = line.last_halt_by();
-                Notice::Halted { number, by: by.to_owned(), command: command.name().to_owned() }
+                let of_others = line.halts_of_others(client);
+                Notice::Halted { number, by: by.to_owned(), command: command.name().to_owned(), of_others }
             });
             known = number;
             (line.take_deliveries(client), halt)

@@ -3,6 +3,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use agent_kit::access::Role;
+use jtc_host::port::Halts;
 use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 
 use super::Denied;
@@ -130,6 +131,8 @@ pub(super) struct Client {
     pub calm_until: Duration,
     /// The last halt, by number, that what it does now was asked for after.
     pub asked_after: u64,
+    /// Stops and Pauses of others since it came.
+    pub halts: Halts,
     /// For how long it commands without showing that it is there; `None`: as long as it is connected.
     pub lasts: Option<Duration>,
     /// When it has shown last that it is there.
@@ -156,6 +159,7 @@ impl Client {
             unread: 0,
             calm_until: Duration::ZERO,
             asked_after: 0,
+            halts: Halts::default(),
             lasts: None,
             lapsed: false,
             shown_at: Duration::ZERO,

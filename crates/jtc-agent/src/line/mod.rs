@@ -184,6 +184,8 @@ impl SharedLine {
         self.calm_until = now + CALM;
         for (_, other) in self.clients.iter_mut().filter(|(id, _)| **id != own) {
             other.calm_until = now + CALM;
+            other.halts.all += 1;
+            other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
         // Whoever stops an arm wants it held: one that is taught, or will be as soon as it stands, is loose.
@@ -353,6 +355,11 @@ impl SharedLine {
     /// The last halt that this client has asked for its motion after; that before it came, where it has not.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
+    }
+
+    /// Stops and Pauses of others since this client came.
+    pub fn halts_of_others(&self, id: ClientId) -> jtc_host::port::Halts {
+        self.clients.get(&id).map(|client| client.halts).unwrap_or_default()
     }
 
     /// Number of the last halt.

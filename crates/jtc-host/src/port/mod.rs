@@ -24,8 +24,8 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of times that other programs stopped or paused the arm through a port of this program.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Number of times that other programs stopped or paused the arm: through a port of this program, or through the agent that has the port.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {
     /// Stops and Pauses.
     pub all: u64,
@@ -60,7 +60,7 @@ pub trait Port {
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
-    /// Number of Stops and Pauses of other programs so far. Only a port that other programs reach directly counts them.
+    /// Number of Stops and Pauses of other programs that are known so far.
     fn halts(&self) -> Halts {
         Halts::default()
     }

@@ -265,9 +265,14 @@ impl<P: Port> Session<P> {
             self.presence.command(self.port.now());
         }
         let retries = self.statistics.retries;
-        let mut record = self
-            .request(&fixed::exec(command))
-            .map_err(|e| self.link_lost(e, matches!(command, ExecCommand::Stop)))?;
+        let mut record = match self.request(&fixed::exec(command)) {
+            Ok(record) => record,
+            // Only its record was lost.
+            Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
+                return Ok(());
+            }
+            Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
+        };
         if stopping && record.data == DataStatus::IncorrectValue {
             // For want of an introduction: there is nothing to be wrong about a Stop but its time (J-51).
             record.data = DataStatus::NotAllowed;

@@ -30,7 +30,7 @@ use std::time::Duration;
 use extension::Extensions;
 pub use jtc_core::Payload;
 use jtc_wire::{
-    DataStatus, FrameStatus, FrameType, FromDevice, Response, Status, StatusReceiver, TrajectoryState,
+    DataStatus, FrameStatus, FrameType, FromDevice, Response, Status, StatusReceiver, TrajectoryState, fixed,
 };
 
 pub use clock::StatusClock;
@@ -296,22 +296,26 @@ impl<P: Port> Session<P> {
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record; frames that arrive damaged are sent again. Not public: a frame can start a motion.
+    /// Sends a frame and waits for its record; frames that arrive damaged, or without a record, are sent again. One that sets the arm in
+    /// motion, or lets go of it, is not sent again without a record: it may have arrived, and another line may have stopped the arm since. Not public: a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
-        let mut bad = None;
+        let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
+        let (mut bad, mut due) = (None, true);
         self.forget_the_past()?;
         for attempt in 0..self.timeouts.tries {
-            self.statistics.retries += u64::from(attempt > 0);
-            self.write(frame)?;
+            if due {
+                self.statistics.retries += u64::from(attempt > 0);
+                self.write(frame)?;
+            }
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
                 // Once may be a damaged frame; twice it is a type that the device does not know.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
-                Some(record) => bad = Some(record),
-                None => {}
+                Some(record) => (bad, due) = (Some(record), true),
+                None => due = !once,
             }
         }
         if self.port.now() - self.last_received > self.timeouts.status {

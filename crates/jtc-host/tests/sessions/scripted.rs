@@ -125,3 +125,73 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert!(text.contains("paused at point 700") && !text.contains("MAY BE MOVING"), "{text}");
     assert_eq!(written.borrow().len(), 0);
 }
+
+/// A frame without a record may have come, and another line may have stopped the arm since: what moves it, or lets go of it, is sent
+/// again only where the record says that it came damaged.
+#[test]
+fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
+    use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
+    let paused = Status {
+        state: ControllerState::HoldPos.into(),
+        trajectory: TrajectoryState::Pause.into(),
+        ..Status::default()
+    };
+    // The records that this frame gets, one after the other; then it gets none. The controller does what it says, or not.
+    let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
+        let (written, mut count) = (answers::Written::default(), 0);
+        let taken = std::rc::Rc::clone(&written);
+        let (mut status, mut next) = (paused, Duration::ZERO);
+        let port = jtc_host::port::test::ScriptedPort::new(None, move |now, bytes: &[u8]| {
+            let mut out = Vec::new();
+            if let [_, frame_type, ..] = *bytes {
+                let mut record = Some(FrameStatus::NoError);
+                if bytes == of {
+                    taken.borrow_mut().extend_from_slice(bytes);
+                    record = records.get(count).copied();
+                    count += 1;
+                    if done {
+                        status.trajectory = TrajectoryState::Execute.into();
+                    }
+                }
+                if let Some(arrived) = record {
+                    let length = bytes.len() as u16;
+                    let response =
+                        Response { frame_type, status: arrived, data: DataStatus::NoError, length };
+                    out.extend(Status { response, ..status }.emit());
+                }
+            }
+            if now >= next {
+                next = now + Duration::from_millis(40);
+                out.extend(status.emit());
+            }
+            out
+        });
+        (jtc_host::Session::new(port), written)
+    };
+    let count = |written: &answers::Written, frame: &[u8]| written.borrow().len() / frame.len();
+    use FrameStatus::{DiscontinuousFrame, IncorrectCrc, NoError};
+    for (records, done, sent, good) in [
+        (&[][..], false, 1, false),
+        (&[], true, 1, true),
+        (&[IncorrectCrc], false, 2, false),
+        (&[IncorrectCrc, DiscontinuousFrame, NoError], false, 3, true),
+    ] {
+        let (mut s, written) = session(&fixed::EXECUTE, records, done);
+        let resumed = s.resume();
+        assert_eq!(count(&written, &fixed::EXECUTE), sent, "{records:?}");
+        match resumed {
+            Ok(()) => assert!(good, "{records:?}"),
+            Err(error) => {
+                assert!(!good, "{records:?}: {error}");
+                assert_eq!(error.code(), "link-lost", "{error}");
+            }
+        }
+    }
+    let (mut s, written) = session(&fixed::TEACHING_MODE_ENABLE, &[], false);
+    s.teach(true).unwrap_err();
+    assert_eq!(count(&written, &fixed::TEACHING_MODE_ENABLE), 1);
+    // A Stop is sent until it is confirmed.
+    let (mut s, written) = session(&fixed::STOP, &[], false);
+    s.stop().unwrap_err();
+    assert_eq!(count(&written, &fixed::STOP), 4);
+}

@@ -27,18 +27,24 @@ impl LinkArgs {
 
     /// The same; `policy` is what becomes of a motion when this program goes, which needs an agent.
     pub fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
-        Ok(self.open_unless_busy(policy)??)
+        Ok(self.open_as(policy, true)??)
     }
 
-    /// The same. The inner error is that of a serial port which no agent of this user owns.
-    pub fn open_unless_busy(
+    /// Opens it for a Stop or a Pause, for which an agent on this computer needs no token: one that it does not know keeps neither away. The
+    /// inner error is that of a serial port which no agent of this user owns.
+    pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
+        self.open_as(None, true).or_else(|error| self.open_as(None, false).map_err(|_| error))
+    }
+
+    fn open_as(
         &self,
         policy: Option<&'static str>,
+        with_token: bool,
     ) -> Result<Result<LinkPort, PortError>, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
             let agent = registered().into_iter().find(|agent| agent.url == name.trim_end_matches('/'));
-            let options = self.options(agent.as_ref(), policy)?;
+            let options = self.options(agent.as_ref(), policy, with_token)?;
             return Ok(Ok(Box::new(AgentPort::open(&name, &options)?)));
         }
         let Some(agent) = owner_of(&name) else {
@@ -51,7 +57,7 @@ impl LinkArgs {
             }
             return Ok(SerialPort::open(&name, self.baud).map(|port| Box::new(port) as LinkPort));
         };
-        let port = AgentPort::open(&agent.url, &self.options(Some(&agent), policy)?)?;
+        let port = AgentPort::open(&agent.url, &self.options(Some(&agent), policy, with_token)?)?;
         if !is_same_port(&port.hello().port, &name) {
             let what = format!("{}: the agent there has {}, not {name}", agent.url, port.hello().port);
             return Err(
@@ -62,8 +68,14 @@ impl LinkArgs {
     }
 
     /// How this program presents itself to an agent. A token goes to agents of this user only, and where its file was named.
-    fn options(&self, agent: Option<&Registered>, policy: Option<&'static str>) -> Result<Options, Failure> {
+    fn options(
+        &self,
+        agent: Option<&Registered>,
+        policy: Option<&'static str>,
+        with_token: bool,
+    ) -> Result<Options, Failure> {
         let file = self.token_file.as_ref().or(agent.map(|agent| &agent.token_file));
+        let file = file.filter(|_| with_token);
         let token = file.map(|file| Tokens::load(file)).transpose()?.map(|tokens| tokens.operator);
         let certificates = self.tls_ca.clone().or_else(|| agent?.certificate.clone());
         Ok(Options { name: who(), token, policy, certificates })

@@ -48,6 +48,30 @@ fn another_terminal_looks_and_stops_while_one_runs() {
     assert_eq!(report["outcome"], "stopped", "{report}");
 }
 
+/// On the agent's own computer neither Stop nor Pause needs a token.
+#[test]
+fn no_token_file_keeps_a_stop_away() {
+    let agent = Agent::start(&["--sim", "--baud", "921600"]);
+    agent.jtc(&["recover", "--defaults"]).ends(0);
+    let token = |name: &str, text: &str| {
+        let path = agent.dir.path().join(name);
+        std::fs::write(&path, text).expect("a file");
+        Command::new("chmod").arg("600").arg(&path).status().expect("chmod");
+        path.to_str().expect("a name").to_owned()
+    };
+    let other = format!("operator = \"{}\"\nviewer = \"{}\"\n", "o".repeat(32), "v".repeat(32));
+    for file in [token("other.toml", &other), token("bad.toml", "operator = 1"), "/does/not/exist".into()] {
+        let refused = agent.jtc(&["gripper", "off", "--token-file", &file]);
+        assert_ne!(refused.code, 0, "{}", refused.out);
+        for words in [&["stop"][..], &["traj", "stop"]] {
+            let stopped = agent.jtc(&[words, &["--token-file", &file]].concat()).ends(0);
+            assert!(stopped.out.contains("nothing was moving"), "{}", stopped.out);
+        }
+        let paused = agent.jtc(&["traj", "pause", "--token-file", &file]).ends(1);
+        assert!(paused.err.contains("trajectory"), "{}", paused.err);
+    }
+}
+
 #[test]
 fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gone() {
     let sim = Sim::start(&["--baud", "921600"]);

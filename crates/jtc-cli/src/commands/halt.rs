@@ -312,7 +312,7 @@ enum Reached {
 fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
-        let (path, busy) = match link.open_unless_busy(None)? {
+        let (path, busy) = match link.open_to_halt()? {
             Ok(port) => return Ok(Reached::Line(Box::new(Session::new(port)))),
             Err(PortError::Busy { path }) => (path.clone(), PortError::Busy { path }),
             Err(error) => return Err(Failure::from(error).into()),

@@ -3,6 +3,7 @@
 //! Cargo runs one test program after the other, and many of ours wait for what takes its time on a real line: leases that lapse, boards
 //! that are silent. They use little of a processor, so several run at once.
 use std::io::Write as _;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -55,6 +56,8 @@ fn build() -> Result<Vec<Program>> {
     Ok(programs)
 }
 
+/// Tests of one program that run at once, for each processor: most of them wait, too.
+const TESTS_FOR_A_PROCESSOR: usize = 2;
 /// What `env` of the GNU tools is given to begin a program that heeds these signals.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
@@ -78,6 +81,8 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
     };
     // A run behind `nohup` or in the background of a script ignores signals that tests send to what they start, and it inherits that.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
+    let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let threads = (TESTS_FOR_A_PROCESSOR * processors).to_string();
     // In the directory of its package, as cargo does.
     let run = |program: &Program, log: &Path| {
         let mut command = if heeds_signals {
@@ -88,6 +93,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
             shell::command(&program.executable)
         };
         command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
+        command.env("RUST_TEST_THREADS", &threads);
         beside::run(&mut command, log)
     };
     beside::beside(programs, run, ended)?;

@@ -16,8 +16,8 @@ use jtc_host::{Arm, plan};
 use jtc_sim::{SimConfig, World};
 use jtc_wire::{ControllerState, Status};
 use proptest::prelude::*;
+use test_kit::patience::{LONGEST, until};
 
-const WAIT: Duration = Duration::from_secs(60);
 /// The number before that of the first command.
 const FIRST: u16 = 700;
 const HERE: [u8; 4] = [127, 0, 0, 1];
@@ -92,14 +92,6 @@ fn there_and_back() -> String {
     there.to_exact_csv()
 }
 
-fn until(what: &str, mut reached: impl FnMut() -> bool) {
-    let end = Instant::now() + WAIT;
-    while !reached() {
-        assert!(Instant::now() < end, "{what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
 /// A connection of a PLC.
 struct Client(TcpStream);
 
@@ -111,7 +103,7 @@ impl Client {
 
     /// The next response; `None`: it is closed.
     fn response(&mut self) -> Option<Vec<u8>> {
-        self.0.set_read_timeout(Some(WAIT)).expect("a time");
+        self.0.set_read_timeout(Some(LONGEST)).expect("a time");
         let mut head = [0; 7];
         self.0.read_exact(&mut head).ok()?;
         assert_eq!((head[..5].to_vec(), head[6]), (vec![0, 1, 0, 0, 0], 9));

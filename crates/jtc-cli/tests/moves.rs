@@ -6,6 +6,7 @@ mod common;
 use common::{Sim, at, jtc, moving_while, place, slow_motion};
 use jtc_host::recording::Recording;
 use serde_json::Value;
+use test_kit::patience::Patience;
 
 const FAST: [&str; 3] = ["--speed", "max", "--no-throttle"];
 const WAYPOINTS: &str =
@@ -353,12 +354,14 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
     // As it was led: there and back, 0.3 rad.
     let replay = ["traj", "replay", &recording, "--measured", "--approach"];
-    let output = (0..20).find_map(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(200));
+    let mut patience = Patience::begin();
+    let output = loop {
         let output = sim.jtc(&[&["--json"], &replay[..]].concat());
-        (output.code == 0).then_some(output)
-    });
-    let output = output.expect("it is run again");
+        if output.code == 0 {
+            break output;
+        }
+        patience.pause(format_args!("that it is run again: {}", output.err));
+    };
     assert!(output.err.contains("the last teaching in the recording, as it was measured"), "{}", output.err);
     assert!(output.json()["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap() > 0.25);
     for wrong in ["0", "-1", "nan", "2"] {

@@ -7,12 +7,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
 use std::process::{Child, ChildStderr, Stdio};
-use std::time::{Duration, Instant};
 
 use common::{Sim, jtc, slow_motion};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
+use test_kit::patience::Patience;
 
 /// A terminal: the person's end, and the command's.
 fn terminal() -> (File, OwnedFd) {
@@ -108,13 +108,13 @@ struct Ended {
 
 /// Waits until the controller is in this state.
 fn reaches(sim: &Sim, state: &str) {
-    let end = Instant::now() + Duration::from_secs(60);
+    let mut patience = Patience::begin();
     loop {
         let status = sim.json(&["status"], 0);
         if status["state"] == state {
             return;
         }
-        assert!(Instant::now() < end, "{state} is not reached: {status}");
+        patience.pause(format_args!("{state}: {status}"));
     }
 }
 

@@ -6,6 +6,7 @@ mod common;
 use common::{Sim, jtc, motion};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
+use test_kit::patience::until;
 
 fn ready(options: &[&str]) -> Sim {
     Sim::start(options).with_parameters()
@@ -29,10 +30,7 @@ fn the_simulator_records_each_millisecond() {
         let output = jtc(&["sim", "--record", &record]).ends(4);
         assert!(output.err.contains("is there already"), "{}", output.err);
         // What is younger than 0.2 s may be missing.
-        assert!((0..400).any(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(50));
-            jtc(&["traj", "info", &record]).err.contains("at 1201 places")
-        }));
+        until("1201 places", || jtc(&["traj", "info", &record]).err.contains("at 1201 places"));
         assert_eq!(sim.end("-KILL").0, -1);
         let info = json(&["traj", "info", &record]);
         assert_eq!((&info["form"], &info["duration_s"]), (&"recording".into(), &1.2.into()), "{info}");
@@ -79,13 +77,9 @@ fn a_run_that_is_killed_leaves_its_recording() {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        let moving = (0..400).any(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(50));
-            recorded_ms(&record) > 1_000
-        });
+        until(format_args!("a second of the motion in {name}"), || recorded_ms(&record) > 1_000);
         run.kill().unwrap();
         run.wait().unwrap();
-        assert!(moving, "nothing of the motion is in {name}");
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
         // An MCAP file holds the whole trajectory, 6 s at 20 %, however much of it was run.

@@ -5,15 +5,12 @@ mod common;
 
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 use cli_kit::trial::run;
 use common::agent::{Agent, command_in};
 use jtc_host::recording::Recording;
 use serde_json::Value;
-
-/// Longest that anything here takes on a slow computer.
-const LONG: Duration = Duration::from_secs(60);
+use test_kit::patience::{Patience, until};
 
 /// An agent of a simulated controller that records.
 fn recording() -> Agent {
@@ -31,14 +28,13 @@ fn recording_in(dir: tempfile::TempDir) -> Agent {
 
 /// Recordings with this ending, oldest first, when there are so many.
 fn recorded(agent: &Agent, ending: &str, count: usize) -> Vec<PathBuf> {
-    let end = Instant::now() + LONG;
+    let mut patience = Patience::begin();
     loop {
         let found = recordings(&agent.dir, ending);
         if found.len() >= count {
             return found;
         }
-        assert!(Instant::now() < end, "{found:?} instead of {count} {ending}");
-        std::thread::sleep(Duration::from_millis(50));
+        patience.pause(format_args!("{count} {ending} instead of {found:?}"));
     }
 }
 
@@ -124,13 +120,9 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         .spawn()
         .expect("it starts");
     let part = recorded(&agent, ".part.mcap", 1).remove(0);
-    let end = Instant::now() + LONG;
     let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
     // It is readable while it is written.
-    while Recording::read(&part).map_or(0, |recording| moving(&recording)) < 20 {
-        assert!(Instant::now() < end, "nothing is recorded");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    until("20 samples in motion", || Recording::read(&part).is_ok_and(|recording| moving(&recording) >= 20));
     let (_, dir) = agent.end("-KILL");
     runs.wait().expect("it ends");
     let recording = read(&part);

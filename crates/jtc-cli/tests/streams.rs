@@ -5,11 +5,11 @@ mod common;
 
 use std::io::Write;
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 use cli_kit::trial::CommandOutput;
 use common::{Sim, jtc, motion};
 use serde_json::Value;
+use test_kit::patience::until;
 
 /// The events of a command, and its result.
 fn stream(output: &CommandOutput) -> (Vec<Value>, Value) {
@@ -128,16 +128,11 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();
-    let wait = |until: &mut dyn FnMut() -> bool| {
-        let begin = Instant::now();
-        while !until() {
-            assert!(begin.elapsed() < Duration::from_secs(60), "it does not come");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    };
-    wait(&mut || std::fs::read_to_string(&recording).is_ok_and(|text| text.lines().count() > 25));
+    until("25 lines of the recording", || {
+        std::fs::read_to_string(&recording).is_ok_and(|text| text.lines().count() > 25)
+    });
     cli_kit::trial::signal(&run, "-INT");
-    wait(&mut || run.try_wait().unwrap().is_some());
+    until("its end", || run.try_wait().unwrap().is_some());
     drop(reader);
     let output = run.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(5));

@@ -4,9 +4,10 @@ mod common;
 use std::time::{Duration, Instant};
 
 use common::Served;
-use common::program::{Program, WAIT, event, over};
+use common::program::{Program, event, over};
 use jtc_host::{Arm, plan};
 use serde_json::{Value, json};
+use test_kit::patience::until;
 
 /// A motion from the zero pose and back, at this speed, as a file.
 fn there_and_back(percent: f64) -> String {
@@ -142,14 +143,12 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
         event(&served, last, "executing");
         // Nothing more comes from it. What follows does not renew its lease.
-        let begun = Instant::now();
         let ended = || served.api(&format!("GET /api/jobs/{job}"), None, None).1;
         let paused =
             || served.line.with(|line, _| line.status().map(|(_, s)| s.trajectory.name().to_owned()));
-        while ended()["stage"] == "running" && (left.is_none() || paused().as_deref() != left) {
-            assert!(begun.elapsed() < WAIT, "{policy}");
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        until(format_args!("what {policy} does"), || {
+            ended()["stage"] != "running" || (left.is_some() && paused().as_deref() == left)
+        });
         assert_eq!(ended()["stage"], stage, "{policy}: {}", ended());
         let (_, status) = served.api("GET /api/status", None, None);
         assert!(status["lease"].is_null(), "{policy}: {status}");
@@ -261,11 +260,7 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
         std::thread::sleep(Duration::from_millis(50));
     }
     assert_eq!(served.get("POST /api/stop").0, 200);
-    let asked = Instant::now();
-    while anna.ask("POST /api/recover", Some(json!({}))).0 == 409 {
-        assert!(asked.elapsed() < Duration::from_secs(20), "it is put off");
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    until("the end of the hold-off", || anna.ask("POST /api/recover", Some(json!({}))).0 != 409);
     assert!(!moves(&served));
 }
 

@@ -1,13 +1,12 @@
 //! The arm of a controller as one thing by HTTP: read, given, kept, and refused whole.
 mod common;
 
-use std::time::{Duration, Instant};
-
 use common::Served;
-use common::program::{Program, WAIT, event, is_for_the_one_who_commands};
+use common::program::{Program, event, is_for_the_one_who_commands};
 use jtc_host::Arm;
 use jtc_host::arm::AVENA_TOML;
 use serde_json::{Value, json};
+use test_kit::patience::until;
 use test_kit::written::text_with;
 
 fn arm(served: &Served) -> (Arm, Value) {
@@ -76,11 +75,7 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
     assert_eq!(arm(&served).1, found);
 
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
-    let end = Instant::now() + WAIT;
-    while served.api("GET /api/status", None, None).1["controller"]["state"] != "Init" {
-        assert!(Instant::now() < end, "it keeps its torque");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    until("Init", || served.api("GET /api/status", None, None).1["controller"]["state"] == "Init");
     let job = anna.begin("PUT /api/arm", json!({ "text": AVENA_TOML, "store": true }));
     let done = anna.over(job);
     assert_eq!((&done["stage"], &done["given"]["stored_number"]), (&json!("finished"), &json!(1)), "{done}");

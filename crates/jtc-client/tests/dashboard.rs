@@ -6,12 +6,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use common::Served;
-use common::program::{Program, WAIT, event};
+use common::program::{Program, event};
 use jtc_host::port::sim::LivePort;
 use jtc_host::{Arm, Port, PortError, explain, plan};
 use jtc_sim::{Fault, FaultKind, FaultPlan, SimConfig, Trigger, World};
 use jtc_wire::Joint;
 use serde_json::{Value, json};
+use test_kit::patience::{Patience, until};
 
 const ZERO: [f64; 6] = [0.0; 6];
 
@@ -59,15 +60,15 @@ impl Port for Counted {
 
 /// The arm of the controller once it was asked.
 fn model(served: &Served) -> Value {
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     loop {
         let (status, model) = look(served, "GET /api/arm/model");
         assert_eq!(status, 200, "{model}");
         if model["source"] == "controller" {
             return model;
         }
-        assert!(model["source"] == "agent" && Instant::now() < end, "{model}");
-        std::thread::sleep(Duration::from_millis(50));
+        assert_eq!(model["source"], "agent", "{model}");
+        patience.pause(format_args!("the controller's arm: {model}"));
     }
 }
 
@@ -250,13 +251,13 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
     anna.recover();
     let (after, _) = event(&served, 0, "ended");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true, "speed_percent": 50 }));
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     let followed = loop {
         let now = controller();
         if !now["commanded_rad"].is_null() {
             break now;
         }
-        assert!(Instant::now() < end, "{now}");
+        patience.pause(format_args!("a commanded position: {now}"));
     };
     let commanded = numbers::<6>(&followed["commanded_rad"]);
     for (joint, commanded) in followed["joints"].as_array().expect("joints").iter().zip(commanded) {
@@ -277,10 +278,7 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
     // One that is stopped has one, too; what was before is kept.
     let job = anna.begin("POST /api/moves", json!({ "to_rad": ZERO, "speed_percent": 20 }));
     event(&served, event(&served, 0, "executing").0, "finished");
-    let end = Instant::now() + WAIT;
-    while controller()["state"] != "Operate" {
-        assert!(Instant::now() < end, "it does not move");
-    }
+    until("Operate", || controller()["state"] == "Operate");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(anna.ask("POST /api/stop", None).0, 200);
     let stopped = anna.over(job);

@@ -3,12 +3,13 @@ mod common;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::Served;
-use common::program::{Program, WAIT};
+use common::program::Program;
 use jtc_host::arm::AVENA_TOML;
 use serde_json::{Value, json};
+use test_kit::patience::until;
 use test_kit::written::text_with;
 
 fn positions(served: &Served) -> Vec<f64> {
@@ -114,11 +115,7 @@ fn a_plan_that_nobody_waits_for_any_more_takes_no_number() {
         || served.api("POST /api/plans", None, Some(json!({ "waypoints": two }))).1["code"] == "busy";
     assert!(is_planned(), "it is over before anybody could leave");
     drop(gone);
-    let end = Instant::now() + WAIT;
-    while is_planned() {
-        assert!(Instant::now() < end, "it never ends");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    until("the end of the plan", || !is_planned());
     let (_, list) = served.api("GET /api/trajectories", None, None);
     let names: Vec<&Value> = list.as_array().expect("a list").iter().map(|kept| &kept["name"]).collect();
     assert_eq!(names, ["mine"], "{list}");

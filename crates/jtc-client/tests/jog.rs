@@ -1,20 +1,18 @@
 //! Jogging over a connection that is slow: what comes late moves nothing.
 mod common;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::Served;
-use common::program::{Program, WAIT};
+use common::program::Program;
 use serde_json::{Value, json};
+use test_kit::patience::{Patience, until};
 
 /// The arm is held, and can be jogged: joints whose load has just been caught cannot yet.
 fn ready(anna: &Program<'_>) {
     anna.recover();
-    let end = Instant::now() + WAIT;
-    while anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": vec![0.0; 6] }))).0 != 204 {
-        assert!(Instant::now() < end, "it is not jogged");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    let still = json!({ "rates_rad_s": vec![0.0; 6] });
+    until("an arm that can be jogged", || anna.ask("POST /api/jog", Some(still.clone())).0 == 204);
 }
 
 /// What a person sees who looks now.
@@ -49,15 +47,15 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
     assert!((after - before).abs() < 1e-3, "{before} {after}");
     assert!(now_ms >= old_ms + 1_200, "{old_ms} {now_ms}");
     // What is seen just now moves it.
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     loop {
         let (now_ms, position) = seen(&served);
         if position > before + 0.05 {
             break;
         }
-        assert!(Instant::now() < end, "{before} {position}");
         let (status, error) = jog(&anna, now_ms, 0.3);
         assert_eq!(status, 204, "{error}");
+        patience.pause(format_args!("a jog away from {before}: {position}"));
     }
     // The end of it is taken however late it comes, also with what no agent has shown.
     for as_of_ms in [old_ms, u64::MAX] {

@@ -9,6 +9,7 @@ use common::{Served, socket};
 use jtc_host::check::CheckOptions;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckedTrajectory, plan};
+use test_kit::patience::LONGEST;
 use tungstenite::Message;
 
 const VIEWERS: usize = 50;
@@ -25,7 +26,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
     anna.use_defaults().expect("it takes them");
-    anna.wait_ready(Duration::from_secs(30)).expect("it holds the arm");
+    anna.wait_ready(LONGEST).expect("it holds the arm");
     let (ended, seen) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
     let address = served.address;
     let viewers: Vec<_> = (0..VIEWERS)

@@ -1,30 +1,30 @@
 //! What brings a controller back by HTTP: clearing and resetting nodes, its own arm, a given one, and what a doctor finds.
 mod common;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::Served;
-use common::program::{Program, WAIT, event, is_for_the_one_who_commands, logged};
+use common::program::{Program, event, is_for_the_one_who_commands, logged};
 use jtc_host::Arm;
 use jtc_host::arm::AVENA_TOML;
 use jtc_host::port::sim::LivePort;
 use jtc_sim::{Fault, FaultKind, FaultPlan, SimConfig, Trigger, World};
 use jtc_wire::Joint;
 use serde_json::{Value, json};
+use test_kit::patience::Patience;
 
 fn look(served: &Served, request: &str) -> (u16, Value) {
     served.api_as(Some(&served.tokens.viewer), request, None, None)
 }
 
 fn until(served: &Served, is: impl Fn(&Value) -> bool) -> Value {
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     loop {
         let controller = look(served, "GET /api/status").1["controller"].clone();
         if is(&controller) {
             return controller;
         }
-        assert!(Instant::now() < end, "{controller}");
-        std::thread::sleep(Duration::from_millis(20));
+        patience.pause(format_args!("a change of the controller: {controller}"));
     }
 }
 

@@ -2,16 +2,15 @@
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::http::Http;
+use crate::patience::until;
 
 /// Connections that a flood keeps open: more than an agent has places.
 const CONNECTIONS: usize = 400;
 /// Stops that are sent into each flood.
 const STOPS: usize = 20;
-/// Longest wait until a flood has begun.
-const PATIENCE: Duration = Duration::from_secs(120);
 
 /// How the clients of a flood behave.
 struct Flood {
@@ -92,11 +91,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
         // Whatever becomes of the Stops: the flood ends.
         let _end = End(&over);
-        let begun = Instant::now();
-        while opened.load(Ordering::Relaxed) < CONNECTIONS {
-            assert!(begun.elapsed() < PATIENCE, "{}: it does not begin", flood.what);
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {
             for stop in stops {
                 let (status, answer) = match n % 2 {

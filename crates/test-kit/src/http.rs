@@ -1,12 +1,10 @@
 //! Requests as anybody could send them: by HTTP, with nothing of ours.
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Longest wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(20);
+use crate::patience::{LONGEST, Patience};
 
 /// An agent as it is seen from outside.
 #[derive(Clone, Debug)]
@@ -74,7 +72,7 @@ impl Http {
 
     fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a time");
+        stream.set_read_timeout(Some(LONGEST)).expect("a time");
         // One that is refused may be closed before all of it is written.
         let _ = stream.write_all(request.as_bytes());
         let mut all = Vec::new();
@@ -84,8 +82,8 @@ impl Http {
 
     /// The first event behind a number that `is` this one, and its number; none is left out on the way.
     pub fn event(&self, after: u64, what: &str, is: impl Fn(&Value) -> bool) -> (u64, Value) {
-        let (end, mut last, mut seen) = (Instant::now() + 3 * PATIENCE, after, Vec::new());
-        while Instant::now() < end {
+        let (mut patience, mut last, mut seen) = (Patience::begin(), after, Vec::new());
+        loop {
             let (_, found) = self.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
             for event in found["events"].as_array().expect("events") {
                 let number = event["number"].as_u64().expect("a number");
@@ -96,14 +94,14 @@ impl Http {
                 }
                 seen.push(event["event"].clone());
             }
+            patience.pause(format_args!("{what} behind {after}: {seen:?}"));
         }
-        panic!("no {what} behind {after}: {seen:?}");
     }
 
     /// What a WebSocket sends, one text after the other, until `enough` of them.
     pub fn stream(&self, path: &str, mut enough: impl FnMut(Value) -> bool) {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a time");
+        stream.set_read_timeout(Some(LONGEST)).expect("a time");
         let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
                        Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
         write!(stream, "GET {path} HTTP/1.1\r\nHost: {}\r\n{upgrade}\r\n", self.address).expect("it reads");
@@ -331,7 +329,7 @@ pub fn idle_connections_are_closed(http: &Http) {
         .collect();
     assert_eq!(http.get("POST /api/stop").0, 200);
     let mut first = idle.swap_remove(0);
-    first.set_read_timeout(Some(Duration::from_secs(60))).expect("a time");
+    first.set_read_timeout(Some(LONGEST)).expect("a time");
     let mut rest = Vec::new();
     first.read_to_end(&mut rest).expect("it is closed");
     assert!(!String::from_utf8_lossy(&rest).contains("200"));
@@ -351,7 +349,7 @@ pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
             let _ = answered.send((status, found["events"].as_array().map_or(0, Vec::len)));
         });
     }
-    let next = || answers.recv_timeout(3 * PATIENCE).expect("an answer");
+    let next = || Patience::begin().receive(&answers).expect("an answer");
     for _ in 0..MORE {
         assert_eq!(next(), (200, 0), "one that finds no place is answered at once, and there is nothing yet");
     }

@@ -1,5 +1,6 @@
 //! What the tests and benchmarks of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain,
-//! documents that show what commands print, pages whose commands are run, the data of an existing arm, a clock, and requests to agents.
+//! documents that show what commands print, pages whose commands are run, the data of an existing arm, a clock, the patience of
+//! tests, and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
@@ -7,6 +8,7 @@ pub mod existing;
 pub mod flood;
 pub mod http;
 pub mod page;
+pub mod patience;
 #[cfg(unix)]
 pub mod transcript;
 pub mod written;

@@ -3,8 +3,9 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{Served, WAIT, frame};
+use common::{Served, frame};
 use serde_json::{Value, json};
+use test_kit::patience::{Patience, until};
 use test_kit::written::text_with;
 use ucom::Profile;
 use ucom_agent::Config;
@@ -103,7 +104,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     };
     let (status, sent) = set(json!(1500));
     assert_eq!((status, sent["value"].as_f64()), (200, Some(1500.0)), "{sent}");
-    let begun = Instant::now();
+    let mut patience = Patience::begin();
     loop {
         let (status, values) = served.api("GET /api/boards/1/values", None, None);
         assert_eq!(status, 200, "{values}");
@@ -112,8 +113,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
             assert_eq!(values["stale"], false, "{values}");
             break;
         }
-        assert!(begun.elapsed() < WAIT, "{values}");
-        std::thread::sleep(Duration::from_millis(50));
+        patience.pause(format_args!("the position 1500: {values}"));
     }
     // Words and text are values, too; what is none is named with what there is, and changes nothing.
     assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
@@ -382,11 +382,7 @@ fn d01_numbers_that_no_board_can_have_are_refused() {
 fn a_bus_that_is_gone_is_named() {
     let (mut served, key) = Served::numbered(1);
     served.chain.end();
-    let begun = Instant::now();
-    while served.api("GET /api/status", None, None).1["lost"].is_null() {
-        assert!(begun.elapsed() < WAIT);
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    until("the loss of the bus", || !served.api("GET /api/status", None, None).1["lost"].is_null());
     let (status, error) = served.api("POST /api/stop", None, None);
     assert_eq!((status, error["code"].as_str()), (503, Some("no-link")), "{error}");
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 503);
@@ -397,13 +393,9 @@ fn a_bus_that_is_gone_is_named() {
 #[test]
 fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none() {
     let (served, key) = Served::numbered(1);
-    let is_master = |wanted: bool| {
-        let begun = Instant::now();
-        while served.api("GET /api/status", None, None).1["is_master"] != wanted {
-            assert!(begun.elapsed() < Duration::from_secs(5), "never {wanted}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    };
+    let status = || served.api("GET /api/status", None, None).1;
+    let is_master =
+        |wanted: bool| until(format_args!("is_master {wanted}"), || status()["is_master"] == wanted);
     is_master(true);
     // What runs needs them also when nobody commands.
     served.run(&key, &[1]);
@@ -426,6 +418,8 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
         }
         stop();
         is_master(false);
+        // Not because the lease has lapsed meanwhile.
+        assert_eq!(status()["lease"].is_null(), !lease, "{}", status());
         let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
         let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);
         while begun.elapsed() < Duration::from_millis(1500) {
@@ -445,11 +439,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     let (served, key) = Served::numbered_as(2, config);
     served.run(&key, &[1]);
     let kept = || std::fs::read_dir(dir.path()).expect("a directory").flatten().next();
-    let begun = Instant::now();
-    while kept().is_none() {
-        assert!(begun.elapsed() < WAIT, "its names are never kept");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    until("the names of board 1 on the disk", || kept().is_some());
     // Whoever opens the file of the other board waits for ever.
     let name = kept().expect("a file").file_name().into_string().expect("a name");
     let date = name.split('-').nth(2).expect("a date");

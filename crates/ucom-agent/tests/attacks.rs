@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use common::Served;
 use serde_json::json;
 use test_kit::http;
+use test_kit::patience::LONGEST;
 
 #[test]
 fn requests_of_other_sites_are_refused_whatever_they_ask() {
@@ -130,7 +131,7 @@ fn images_are_read_of_who_commands_alone_and_two_at_once() {
     let tokens = served.tokens.clone();
     let begin = |lines: &[String]| {
         let mut stream = TcpStream::connect(served.address).expect("it listens");
-        stream.set_read_timeout(Some(Duration::from_secs(5))).expect("a time");
+        stream.set_read_timeout(Some(LONGEST)).expect("a time");
         let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
         let (host, json) = (served.address, "Content-Type: application/json\r\nContent-Length: 6000000");
         let head = format!("POST /api/updates HTTP/1.1\r\nHost: {host}\r\n{json}\r\n{head}\r\n");

@@ -3,22 +3,22 @@ mod common;
 
 use std::io::Write as _;
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use common::{Served, WAIT};
+use common::Served;
 use serde_json::{Value, json};
+use test_kit::patience::Patience;
 
 /// The first line that `is` so.
 fn line(served: &Served, what: &str, is: impl Fn(&Value) -> bool) -> Value {
-    let begun = Instant::now();
+    let mut patience = Patience::begin();
     loop {
         let log = std::fs::read_to_string(&served.log).expect("the log");
         let lines = log.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         if let Some(line) = lines.into_iter().find(|line| is(line)) {
             return line;
         }
-        assert!(begun.elapsed() < WAIT, "no {what} in {log}");
-        std::thread::sleep(Duration::from_millis(20));
+        patience.pause(format_args!("{what} in {log}"));
     }
 }
 

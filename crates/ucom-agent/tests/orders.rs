@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use common::{Served, frame};
+use common::{Served, frame, frame_when};
 use serde_json::{Value, json};
 use test_kit::http::Http;
+use test_kit::patience::until;
 
 fn is(kind: &'static str) -> impl Fn(&Value) -> bool {
     move |event| event["kind"] == kind
@@ -310,13 +311,9 @@ fn the_lease_is_not_let_go_while_a_run_begins() {
     assert_eq!(served.board(1)["active"], true);
 }
 
-/// The agent is the master no more as soon as nobody commands and nothing runs.
-fn is_no_master_soon(served: &Served) {
-    let begun = Instant::now();
-    while served.api("GET /api/status", None, None).1["is_master"] == true {
-        assert!(begun.elapsed() < Duration::from_secs(3), "it still sends heartbeats");
-        std::thread::sleep(Duration::from_millis(30));
-    }
+/// Waits until the agent is not the master any more: no client holds the lease, and nothing runs.
+fn heartbeats_end(served: &Served) {
+    until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
 /// Those who only look do not keep the heartbeats going, however much they ask: boards of nobody become safe (D-50).
@@ -336,7 +333,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
     let viewers: Vec<JoinHandle<()>> = (0..8).map(|_| look()).collect();
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
-    is_no_master_soon(&served);
+    heartbeats_end(&served);
     asked_enough.store(true, Ordering::Relaxed);
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
@@ -350,7 +347,7 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     assert_eq!(served.api(&format!("DELETE /api/jobs/{job}"), Some(&key), None).0, 204);
     assert_eq!(served.over(job)["stage"], "cancelled");
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
-    is_no_master_soon(&served);
+    heartbeats_end(&served);
 }
 
 /// A board whose loop another PC has started does not count as this agent's when that loop is stopped from here.
@@ -361,13 +358,14 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     for (id, awaited) in [(0x301, 0x501), (0x541, 0x601)] {
         let id = can_link::Id::standard(id).expect("11 bits");
         peer.send(&can_link::CanFrame::classic(id, &[]).expect("no data")).expect("the bus is there");
-        frame_from(&mut *peer, awaited);
+        // Whatever its data.
+        frame_when(&mut *peer, &format!("{awaited:03X}"), |frame| frame.id().value() == awaited);
     }
     let (status, error) = served.api("POST /api/boards/1/stop?level=loop", Some(&key), None);
     assert_eq!(status, 200, "{error}");
     served.board_when(1, "started", |board| board["state"] == "started");
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
-    is_no_master_soon(&served);
+    heartbeats_end(&served);
     // One that was started from here counts on, when the other PC has been silent for a while (D-08).
     std::thread::sleep(Duration::from_millis(1_500));
     let key = served.lease("anna", 60.0, "continue");
@@ -376,16 +374,4 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(served.api("GET /api/status", None, None).1["is_master"], true);
-}
-
-/// Waits for a frame with this identifier, whatever its data.
-fn frame_from(peer: &mut dyn can_link::CanBus, id: u32) {
-    let begun = Instant::now();
-    while begun.elapsed() < common::WAIT {
-        let received = peer.receive(Duration::from_millis(100)).expect("the bus is there");
-        if received.is_some_and(|frame| frame.id().value() == id) {
-            return;
-        }
-    }
-    panic!("{id:03X} never came");
 }

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use cli_kit::trial::{ended, signal};
 use common::{Sim, ended_by};
 use serde_json::json;
+use test_kit::patience::until;
 
 /// D-50: nobody reads stdout, whose pipe is full from the start: heartbeats go out, boards keep running and are stopped at
 /// the end, and what was not printed is reported.
@@ -61,11 +62,7 @@ fn outputs_that_nobody_reads() {
             false => signal(&child, "-INT"),
             true => drop(reader),
         }
-        let since = Instant::now();
-        while child.try_wait().unwrap().is_none() {
-            assert!(since.elapsed() < Duration::from_secs(8), "it does not end, reads {reads}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        until(format_args!("its end, reads {reads}"), || child.try_wait().unwrap().is_some());
         ended(child).ends(0);
     }
     ended_by(run, "-INT").ends(0);
@@ -270,11 +267,7 @@ fn a_blocked_stderr_does_not_keep_the_process() {
             signal(&child, "-INT");
             std::thread::sleep(Duration::from_millis(300));
         }
-        let since = Instant::now();
-        while child.try_wait().unwrap().is_none() {
-            assert!(since.elapsed() < Duration::from_secs(5), "{words:?} does not end");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        until(format_args!("the end of {words:?}"), || child.try_wait().unwrap().is_some());
         sim.signal("-CONT");
         ended(child).ends(if signals > 0 { 5 } else { 3 });
     }

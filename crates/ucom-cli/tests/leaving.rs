@@ -11,6 +11,7 @@ use std::time::Duration;
 use cli_kit::trial::signal;
 use common::Sim;
 use serde_json::Value;
+use test_kit::patience::Patience;
 
 /// A `ucom --json run` under way and its events.
 struct Running {
@@ -35,8 +36,9 @@ impl Running {
 
     /// The next event of this kind.
     fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        let mut patience = Patience::begin();
         loop {
-            let event = self.events.recv_timeout(Duration::from_secs(20)).expect("an event within 20 s");
+            let event = patience.receive(&self.events).expect("an event");
             if wanted(&event) {
                 return event;
             }

@@ -3,15 +3,14 @@
 
 mod common;
 
-use std::time::{Duration, Instant};
-
 use common::Sim;
+use test_kit::patience::Patience;
 
 /// A chain of three, and the second board has lost its number.
 fn rebooted() -> Sim {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     sim.fault("power-loss board=2 for_s=0.2");
-    let end = Instant::now() + Duration::from_secs(20);
+    let mut patience = Patience::begin();
     loop {
         let there = sim.json(&["scan"], 0);
         let (boards, reports) =
@@ -19,7 +18,7 @@ fn rebooted() -> Sim {
         if (boards, reports) == (2, 3) {
             return sim;
         }
-        assert!(Instant::now() < end, "{there}");
+        patience.pause(format_args!("two boards that have numbers of three that report: {there}"));
     }
 }
 

@@ -7,14 +7,12 @@ mod socketcand_gateway;
 mod timed_bus;
 mod timed_confinement;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use can_link::{
     BusError, BusEvent, CanBus, CanFrame, Id, MemberId, SocketcandServer, TimedBus, TimedEvent, VirtualHub,
 };
-
-/// Only something broken waits so long.
-const TIMEOUT: Duration = Duration::from_secs(60);
+use test_kit::patience::Patience;
 
 const MS: u64 = 1_000_000;
 
@@ -28,15 +26,20 @@ fn numbered(number: u32) -> CanFrame {
 
 /// The next frame of a bus in real time.
 fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
+    let mut patience = Patience::begin();
+    loop {
+        if let Some(frame) = patience.wait("a frame", |time| bus.receive(time)).unwrap() {
+            return frame;
+        }
+    }
 }
 
-/// Waits for something that other threads do.
+/// Waits until other threads have done something, with shorter pauses than `patience::until`: some tests wait thousands of times.
+#[track_caller]
 fn until(mut done: impl FnMut() -> bool) {
-    let end = Instant::now() + TIMEOUT;
+    let mut patience = Patience::begin();
     while !done() {
-        assert!(Instant::now() < end, "it does not happen");
-        std::thread::sleep(Duration::from_millis(1));
+        patience.wait("other threads", |_| std::thread::sleep(Duration::from_millis(1)));
     }
 }
 

@@ -11,8 +11,9 @@ use can_link::{
     AnswerError, CanBus, CanError, CanFrame, ControllerState, ErrorState, Id, OpenError, SlcanAdapter,
     SlcanBus, SlcanOptions, VirtualBus, VirtualHub, open,
 };
+use test_kit::patience::LONGEST;
 
-use crate::{TIMEOUT, frame, take};
+use crate::{frame, take, until};
 
 /// An adapter between a port and a bus, in a thread of its own.
 struct Running {
@@ -255,10 +256,7 @@ fn states_come_by_themselves_from_newer_adapters() {
     });
     let mut bus = SlcanBus::open(&options(&device, None, None)).unwrap();
     let state = ControllerState { errors: ErrorState::Passive, tec: Some(7), rec: Some(130) };
-    let end = Instant::now() + TIMEOUT;
-    while bus.state() != state {
-        assert!(Instant::now() < end);
-    }
+    until(|| bus.state() == state);
 }
 
 #[test]
@@ -315,7 +313,7 @@ fn a_port_without_an_adapter_and_one_that_goes_are_distinguished() {
     let mut bus = SlcanBus::open(&options(&device, None, None)).unwrap();
     bus.send(&frame(1, &[])).unwrap();
     let error = loop {
-        match bus.receive(TIMEOUT) {
+        match bus.receive(LONGEST) {
             Ok(_) => {}
             Err(error) => break error,
         }

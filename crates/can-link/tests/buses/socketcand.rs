@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use can_link::{CanBus, CanFrame, Id, SocketcandServer, VirtualHub, open};
+use test_kit::patience::LONGEST;
 
-use crate::{TIMEOUT, frame, numbered, socketcand_bench, take, until};
+use crate::{frame, numbered, socketcand_bench, take, until};
 
 /// A client as simple as python-can's.
 struct Raw(TcpStream);
@@ -15,7 +16,7 @@ struct Raw(TcpStream);
 impl Raw {
     fn connect(server: &SocketcandServer) -> Self {
         let stream = TcpStream::connect(server.local_addr()).unwrap();
-        stream.set_read_timeout(Some(TIMEOUT)).unwrap();
+        stream.set_read_timeout(Some(LONGEST)).unwrap();
         Self(stream)
     }
 
@@ -208,7 +209,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
         }
         done.send(node).unwrap();
     });
-    let mut node = waited.recv_timeout(10 * TIMEOUT).expect("the sleeper holds up the bus");
+    let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
     // It is still a client: it finds the oldest that waited, and with room again receives what is new.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));

@@ -5,8 +5,9 @@ use std::net::{Shutdown, TcpListener};
 use std::time::Duration;
 
 use can_link::{AnswerError, CanBus, CanError, CanFrame, ErrorState, Id, OpenError, SocketcandBus, open};
+use test_kit::patience::LONGEST;
 
-use crate::{TIMEOUT, frame, numbered, socketcand_bench, take};
+use crate::{frame, numbered, socketcand_bench, take};
 
 #[test]
 fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {
@@ -17,7 +18,7 @@ fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {
     node.send(&numbered(1)).unwrap();
     assert_eq!(take(&mut client), numbered(1));
     drop(server);
-    let error = client.receive(TIMEOUT).expect_err("the server is gone");
+    let error = client.receive(LONGEST).expect_err("the server is gone");
     assert!(matches!(error, CanError::Closed { .. }) && error.to_string().contains(&url), "{error}");
     assert!(matches!(client.receive(Duration::ZERO), Err(CanError::Closed { .. })), "for good");
     assert!(matches!(client.send(&numbered(1)), Err(CanError::Closed { .. })));
@@ -57,7 +58,7 @@ fn servers_that_are_none_end_in_words() {
         let result = bus.map(|mut bus| {
             let mut frames = Vec::new();
             let end = loop {
-                match bus.receive(TIMEOUT) {
+                match bus.receive(LONGEST) {
                     Ok(Some(frame)) => frames.push(frame),
                     Ok(None) => panic!("it must end"),
                     Err(error) => break error,

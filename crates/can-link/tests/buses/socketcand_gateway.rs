@@ -5,15 +5,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use can_link::{BusEvent, CanBus, CanFrame, ClientEvent, ErrorState, Id, SocketcandGateway, TimedBus, open};
+use test_kit::patience::LONGEST;
 
-use crate::{TIMEOUT, numbered, take, until};
+use crate::{numbered, take, until};
 
 #[test]
 fn a_host_can_run_the_bus_itself() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0", "can1"]).unwrap();
     let joined = |gateway: &mut SocketcandGateway, name| {
         let bus = open(&gateway.url(name)).unwrap();
-        let event = gateway.next(TIMEOUT).unwrap();
+        let event = gateway.next(LONGEST).unwrap();
         assert_eq!(event.event, ClientEvent::Joined);
         (bus, event.client, event.channel)
     };
@@ -24,7 +25,7 @@ fn a_host_can_run_the_bus_itself() {
     assert_eq!(channel, 1);
     assert_ne!(id_a, id_b);
     a.send(&numbered(1)).unwrap();
-    let event = gateway.next(TIMEOUT).unwrap();
+    let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
     // No client has received it yet: the host decides.
     gateway.deliver(0, &numbered(2), None);
@@ -38,7 +39,7 @@ fn a_host_can_run_the_bus_itself() {
     assert_eq!([take(&mut b), take(&mut b)], [numbered(5), numbered(6)]);
     assert_eq!(take(&mut a), numbered(6));
     drop(a);
-    let event = gateway.next(TIMEOUT).unwrap();
+    let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
     assert_eq!(gateway.next(Duration::ZERO), None);
     // Full queues towards a host that takes nothing do not keep the gateway from ending.
@@ -105,9 +106,9 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
 fn a_client_receives_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();
     let mut own = open(&gateway.url("can0")).unwrap();
-    let client = gateway.next(TIMEOUT).unwrap().client;
+    let client = gateway.next(LONGEST).unwrap().client;
     let mut other = open(&gateway.url("can0")).unwrap();
-    gateway.next(TIMEOUT).unwrap();
+    gateway.next(LONGEST).unwrap();
     let states = [ErrorState::BusOff, ErrorState::Active];
     for (number, state) in (0..).zip(states) {
         gateway.report_state(client, state);

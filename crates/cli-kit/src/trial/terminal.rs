@@ -8,18 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags};
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, Winsize, tcgetattr, tcsetwinsize};
+use test_kit::patience::Patience;
 
 use super::Picture;
-
-/// Nothing that a test waits for takes longer.
-const LONG: Duration = Duration::from_secs(60);
 
 /// Reads what the command sends until the terminal is closed.
 fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
@@ -110,11 +108,11 @@ impl Terminal {
 
     /// Takes in what the command sent, until the picture is as it is waited for; panics with the picture if that never comes.
     pub fn until(&mut self, what: &str, reached: impl Fn(&Picture) -> bool) {
-        let begin = Instant::now();
+        let mut patience = Patience::begin();
         while !reached(&self.picture) {
-            match self.sent.recv_timeout(LONG.saturating_sub(begin.elapsed())) {
-                Ok(bytes) => self.take(&bytes),
-                Err(_) => panic!("{what} does not come:\n{}", self.picture.text()),
+            match patience.receive(&self.sent) {
+                Some(bytes) => self.take(&bytes),
+                None => panic!("{what} does not come:\n{}", self.picture.text()),
             }
         }
     }
@@ -139,15 +137,14 @@ impl Terminal {
 
     /// Waits for the end of the command: its exit code. What it printed last is in the picture.
     pub fn ends(&mut self, child: &mut Child) -> i32 {
-        let begin = Instant::now();
+        let mut patience = Patience::begin();
         let code = loop {
             if let Some(status) = child.try_wait().expect("its end") {
                 break status.code().unwrap_or(-1);
             }
-            assert!(begin.elapsed() < LONG, "it does not end:\n{}", self.picture.text());
-            if let Ok(bytes) = self.sent.recv_timeout(Duration::from_millis(20)) {
-                self.take(&bytes);
-            }
+            patience.pause(format_args!("its end:\n{}", self.picture.text()));
+            let bytes: Vec<u8> = self.sent.try_iter().take(1_000).flatten().collect();
+            self.take(&bytes);
         };
         while let Ok(bytes) = self.sent.recv_timeout(Duration::from_millis(100)) {
             self.take(&bytes);

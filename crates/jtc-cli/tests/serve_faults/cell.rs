@@ -6,11 +6,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use test_kit::http::Http;
+use test_kit::patience::Patience;
 
 use crate::common::agent::{self, command_in};
 use crate::common::{Sim, slow_motion};
-
-pub const WAIT: Duration = Duration::from_secs(40);
 
 /// Both of them.
 pub struct Cell {
@@ -74,13 +73,13 @@ impl Cell {
     }
 
     pub fn until_at(&self, port: &str, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
-        let end = Instant::now() + WAIT;
+        let mut patience = Patience::begin();
         loop {
             let status = self.status_at(port);
             if is_status(&status) && reached(&status) {
                 return status;
             }
-            assert!(Instant::now() < end, "{what} is not reached: {status}");
+            patience.pause(format_args!("{what}: {status}"));
         }
     }
 
@@ -138,14 +137,14 @@ impl Cell {
 
     /// Nothing moves, and nothing begins to.
     pub fn rests(&self, time: Duration) -> Value {
-        let seen = Instant::now();
+        let (seen, mut patience) = (Instant::now(), Patience::begin());
         loop {
             let status = self.status();
             assert!(!moves(&status), "{status}");
-            assert!(seen.elapsed() < WAIT, "{status}");
             if seen.elapsed() >= time && is_status(&status) {
                 return status;
             }
+            patience.pause(format_args!("an arm at rest: {status}"));
         }
     }
 }

@@ -9,8 +9,9 @@ mod restarted;
 
 use std::time::{Duration, Instant};
 
-use cell::{Cell, WAIT, moves, trajectory};
+use cell::{Cell, moves, trajectory};
 use serde_json::Value;
+use test_kit::patience::Patience;
 
 #[test]
 fn a_program_that_is_killed_leaves_its_motion_to_its_policy() {
@@ -63,14 +64,15 @@ fn an_agent_that_is_killed_leaves_the_motion_to_the_controller_and_says_so_to_it
         command.args(["--port", &port, "--baud", "921600"]);
         command.output().expect("it ran")
     };
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     loop {
         let shown = baud(&["--json", "status"]);
         let status: Value = serde_json::from_slice(&shown.stdout).unwrap_or_default();
         if trajectory(&status) == "Finish" {
             break;
         }
-        assert!(Instant::now() < end && trajectory(&status) == "Execute", "{status}");
+        assert_eq!(trajectory(&status), "Execute", "{status}");
+        patience.pause(format_args!("the end of the motion: {status}"));
     }
     cell.next_agent();
     cell.until("HoldPos", |status| status["state"] == "HoldPos");

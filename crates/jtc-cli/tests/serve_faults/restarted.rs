@@ -1,30 +1,27 @@
 //! What another agent does first where the one before was killed: the policy of who commanded acts on what still moves.
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::{Value, json};
+use test_kit::patience::{Patience, until};
 
-use crate::cell::{Cell, WAIT, moves, trajectory};
+use crate::cell::{Cell, moves, trajectory};
 use crate::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
 /// The file is there before anybody kills the agent, and says what moves: it is written by a thread of its own.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
-    let end = Instant::now() + WAIT;
+    let mut patience = Patience::begin();
     loop {
         let text = cell.left().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
         let left: Value = serde_json::from_str(&text).unwrap_or_default();
         if left["policy"] == policy && left["what"] == what {
             return;
         }
-        assert!(Instant::now() < end, "{policy} of {what}: {text}");
+        patience.pause(format_args!("{policy} of {what}: {text}"));
     }
 }
 
 fn is_gone(cell: &Cell) {
-    let end = Instant::now() + WAIT;
-    while cell.left().is_some() {
-        assert!(Instant::now() < end, "nothing moves, and the file stays");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    until("the end of the file: nothing moves", || cell.left().is_none());
 }
 
 /// Another agent, and what it has found and done.
@@ -38,11 +35,7 @@ fn follow(cell: &mut Cell) -> Value {
     let before = cell.found().len();
     cell.next_agent();
     // The log is written by a thread of its own.
-    let end = Instant::now() + WAIT;
-    while cell.found().len() == before {
-        assert!(Instant::now() < end, "nothing was found");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    until("what the next agent finds", || cell.found().len() > before);
     let found = cell.found();
     assert_eq!(found.len(), before + 1, "{found:?}");
     found.last().expect("it is there").clone()

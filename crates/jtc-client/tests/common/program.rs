@@ -1,13 +1,9 @@
 //! A program that commands by HTTP.
-use std::time::{Duration, Instant};
-
 use serde_json::{Value, json};
+use test_kit::patience::Patience;
 use test_kit::written::text_with;
 
 use super::Served;
-
-/// Longest that is waited for anything.
-pub const WAIT: Duration = Duration::from_secs(60);
 
 /// A program that has the lease.
 pub struct Program<'a> {
@@ -48,23 +44,22 @@ impl<'a> Program<'a> {
 
 /// The job when it is over.
 pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
-    let end = Instant::now() + WAIT;
-    while Instant::now() < end {
+    let mut patience = Patience::begin();
+    loop {
         let (status, job) = served.api(&format!("GET /api/jobs/{job}"), None, None);
         assert_eq!(status, 200);
         if job["stage"] != "running" {
             return job;
         }
         meanwhile();
-        std::thread::sleep(Duration::from_millis(50));
+        patience.pause(format_args!("the end of the job: {job}"));
     }
-    panic!("job {job} is not over");
 }
 
 /// Waits until an event of this kind came behind a number, and returns it with its number.
 pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
-    let (end, mut last) = (Instant::now() + WAIT, after);
-    while Instant::now() < end {
+    let (mut patience, mut last) = (Patience::begin(), after);
+    loop {
         let (_, found) = served.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
         for event in found["events"].as_array().expect("events") {
             let number = event["number"].as_u64().expect("a number");
@@ -74,8 +69,8 @@ pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
                 return (number, event["event"].clone());
             }
         }
+        patience.pause(format_args!("{kind} behind {after}"));
     }
-    panic!("no {kind} behind {after}");
 }
 
 /// A viewer, an operator without the lease and one who waits for it are refused.

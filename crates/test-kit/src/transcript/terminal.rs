@@ -4,10 +4,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Longest wait for a line: what never comes takes that long, everything else as long as it takes.
-const PATIENCE: Duration = Duration::from_secs(120);
+use crate::patience::Patience;
 
 /// What the shell prints behind each command, before its exit code. No command prints it.
 const END: &str = "\u{1}end of the command ";
@@ -66,8 +65,8 @@ impl Terminal {
         self.type_line(&typed);
         let mut printed = Vec::new();
         loop {
-            let Some(line) = self.line(PATIENCE) else {
-                panic!("`{command}` does not end within {PATIENCE:?}; it printed\n{}", printed.join("\n"))
+            let Some(line) = Patience::begin().receive(&self.lines) else {
+                panic!("`{command}` does not end; it printed\n{}", printed.join("\n"))
             };
             // Behind a line that does not end, too.
             if let Some((before, code)) = line.split_once(END) {
@@ -95,9 +94,8 @@ impl Terminal {
 
     /// The lines up to one that is `last`, with it; all that came where it does not.
     pub fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
-        let (end, mut printed) = (Instant::now() + PATIENCE, Vec::new());
-        while let Some(left) = end.checked_duration_since(Instant::now()) {
-            let Some(line) = self.line(left) else { break };
+        let (mut patience, mut printed) = (Patience::begin(), Vec::new());
+        while let Some(line) = patience.receive(&self.lines) {
             let ends = last(&line);
             printed.push(line);
             if ends {

@@ -14,12 +14,11 @@ use agent_kit::log::{CommandLog, LIMIT};
 use can_link::{CanBus, CanFrame};
 use serde_json::{Value, json};
 use test_kit::http::Http;
+use test_kit::patience::Patience;
 use ucom::Profile;
 use ucom_agent::api::Agent;
 use ucom_agent::{Config, Owner};
 use ucom_sim::{ChainConfig, ChainServer, ChainSim};
-
-pub const WAIT: Duration = Duration::from_secs(60);
 
 /// A simulated chain, on a bus that others can join.
 pub struct Chain {
@@ -84,14 +83,16 @@ impl Drop for Chain {
 /// Waits on a bus for a frame with this identifier and these data.
 pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     let begun = Instant::now();
-    let is = |frame: &CanFrame| frame.id().value() == id && frame.data() == data;
-    while begun.elapsed() < WAIT {
-        let received = peer.receive(Duration::from_millis(100)).expect("the bus is there");
-        if received.is_some_and(|frame| is(&frame)) {
-            return begun.elapsed();
-        }
-    }
-    panic!("{id:03X}#{data:02X?} never came");
+    let what = format!("{id:03X}#{data:02X?}");
+    frame_when(peer, &what, |frame| frame.id().value() == id && frame.data() == data);
+    begun.elapsed()
+}
+
+/// Waits on a bus for a frame that `is` so.
+pub fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
+    let mut patience = Patience::begin();
+    let mut next = || patience.wait(what, |time| peer.receive(time)).expect("the bus is there");
+    while !next().is_some_and(|frame| is(&frame)) {}
 }
 
 /// An agent that ends with the test.
@@ -173,16 +174,15 @@ impl Served {
 
     /// A job when it is over.
     pub fn over(&self, number: u64) -> Value {
-        let begun = Instant::now();
-        while begun.elapsed() < WAIT {
+        let mut patience = Patience::begin();
+        loop {
             let (status, job) = self.api(&format!("GET /api/jobs/{number}"), None, None);
             assert_eq!(status, 200, "{job}");
             if job["stage"] != "running" {
                 return job;
             }
-            std::thread::sleep(Duration::from_millis(30));
+            patience.pause(format_args!("the end of job {number}: {job}"));
         }
-        panic!("job {number} is not over");
     }
 
     /// Begins a job and waits for its end.
@@ -203,14 +203,13 @@ impl Served {
 
     /// The board when it `is` so.
     pub fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
-        let begun = Instant::now();
+        let mut patience = Patience::begin();
         loop {
             let board = self.board(number);
             if is(&board) {
                 return board;
             }
-            assert!(begun.elapsed() < WAIT, "not {what}: {board}");
-            std::thread::sleep(Duration::from_millis(30));
+            patience.pause(format_args!("board {number}, {what}: {board}"));
         }
     }
 

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use can_link::{CanBus, CanFrame, Id};
 use cli_kit::trial::{CommandOutput, ended, program, run, signal};
 use serde_json::Value;
+use test_kit::patience::Patience;
 
 fn command() -> Command {
     program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
@@ -172,7 +173,11 @@ impl Peer {
 
     /// The next frame within a time.
     pub fn receive(&mut self, within_ms: u64) -> Option<String> {
-        let frame = self.bus.receive(Duration::from_millis(within_ms)).expect("the bus works")?;
+        self.receive_for(Duration::from_millis(within_ms))
+    }
+
+    fn receive_for(&mut self, time: Duration) -> Option<String> {
+        let frame = self.bus.receive(time).expect("the bus works")?;
         let data: String = frame.data().iter().map(|b| format!("{b:02X}")).collect();
         Some(format!("{}#{data}", frame.id()))
     }
@@ -187,16 +192,15 @@ impl Peer {
         received
     }
 
-    /// Waits for a frame that begins so; what comes before it is passed over. Only what never comes takes as long as the limit,
-    /// however slow the machine is.
+    /// Waits for a frame that begins so; what comes before it is passed over.
     pub fn wait(&mut self, start: &str) -> String {
-        let end = Instant::now() + Duration::from_secs(120);
-        while Instant::now() < end {
-            if let Some(frame) = self.receive(100).filter(|f| f.starts_with(start)) {
+        let mut patience = Patience::begin();
+        let mut next = || patience.wait(format_args!("a frame {start}"), |time| self.receive_for(time));
+        loop {
+            if let Some(frame) = next().filter(|frame| frame.starts_with(start)) {
                 return frame;
             }
         }
-        panic!("no frame {start} within 120 s");
     }
 
     /// Waits for so many frames that begin so.

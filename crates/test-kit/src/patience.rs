@@ -1,0 +1,91 @@
+//! How long tests wait for what they observe: one time, which grows while the computer is late.
+use std::fmt::Display;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+/// Time that a test waits on a computer that is never late.
+const TIME: Duration = Duration::from_secs(60);
+/// Longest time that a test waits, however late the computer is. Reads that block have it as their timeout.
+pub const LONGEST: Duration = Duration::from_secs(300);
+/// Time between two observations.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Seconds that the limit grows for each second that the waiting thread is late.
+const GROWTH: u32 = 4;
+
+/// One wait of a test. A computer that is late with the waiting thread is late with the programs that the test waits for.
+#[derive(Debug)]
+pub struct Patience {
+    begun: Instant,
+    late: Duration,
+}
+
+impl Patience {
+    /// Begins to wait.
+    pub fn begin() -> Self {
+        Self { begun: Instant::now(), late: Duration::ZERO }
+    }
+
+    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time is over; `format_args!` is formatted
+    /// only then.
+    #[track_caller]
+    pub fn pause(&mut self, missing: impl Display) {
+        self.wait(missing, std::thread::sleep);
+    }
+
+    /// Like `pause`, but waits by `wait`: it blocks for at most the given time, and returns what it observed.
+    #[track_caller]
+    pub fn wait<T>(&mut self, missing: impl Display, wait: impl FnOnce(Duration) -> T) -> T {
+        let (waited, late) = (self.begun.elapsed(), self.late);
+        assert!(waited < self.limit(), "waited {waited:.1?} (pauses {late:.1?} late) for {missing}");
+        self.slice(wait)
+    }
+
+    /// Receives the next value of a channel. Returns `None` when the time is over or no sender is left.
+    pub fn receive<T>(&mut self, from: &Receiver<T>) -> Option<T> {
+        while self.begun.elapsed() < self.limit() {
+            match self.slice(|time| from.recv_timeout(time)) {
+                Err(RecvTimeoutError::Timeout) => {}
+                received => return received.ok(),
+            }
+        }
+        None
+    }
+
+    fn slice<T>(&mut self, wait: impl FnOnce(Duration) -> T) -> T {
+        let begun = Instant::now();
+        let observed = wait(PAUSE);
+        self.late += begun.elapsed().saturating_sub(PAUSE);
+        observed
+    }
+
+    fn limit(&self) -> Duration {
+        LONGEST.min(TIME + GROWTH * self.late)
+    }
+}
+
+/// Waits until `reached`. Panics with `what` when the time is over.
+#[track_caller]
+pub fn until(what: impl Display, mut reached: impl FnMut() -> bool) {
+    let mut patience = Patience::begin();
+    while !reached() {
+        patience.pause(&what);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_grows_while_the_computer_is_late() {
+        let limit = |late| Patience { late: Duration::from_secs(late), ..Patience::begin() }.limit();
+        assert_eq!([0, 2, 1000].map(limit), [TIME, TIME + Duration::from_secs(8), LONGEST]);
+    }
+
+    #[test]
+    #[should_panic = "(pauses 0.0ns late) for frame 1 of 2"]
+    fn the_message_has_what_is_missing() {
+        let begun = Instant::now().checked_sub(TIME).expect("the computer has run for a minute");
+        Patience { begun, late: Duration::ZERO }.pause(format_args!("frame {} of 2", 1));
+    }
+}

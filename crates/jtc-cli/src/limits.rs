@@ -10,8 +10,8 @@ use serde_json::json;
 pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let differences = arm.device_differences(device);
     let hint = format!(
-        "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries {NOT_CARRIED}. Where \
-         the controller's values are safe for this arm, add --accept-device-limits"
+        "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries {NOT_CARRIED}: \
+         they belong into the firmware"
     );
     let message = |count| {
         format!(
@@ -25,8 +25,8 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
 
 /// The same for all numbers of an arm that a controller `has` (J-55).
 pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
-    let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has; where it is safe \
-                to use that, leave --arm out or add --accept-device-limits";
+    let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has, which counts \
+                where --arm is left out";
     let message = |count| {
         format!("{}: the controller has another arm, {}: {}", arm.name, has.name, values_differ(count))
     };

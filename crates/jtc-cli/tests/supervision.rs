@@ -4,11 +4,13 @@
 mod common;
 
 use common::{Sim, agent::Agent, moving_while};
+use test_kit::patience::Patience;
 
 /// An arm that is held by a controller that supervises its host.
-fn supervised() -> Sim {
+fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
-    let text = include_str!("../../../arms/avena.toml").to_owned() + "\n[settings]\nhost_timeout_ms = 1000\n";
+    let arm = include_str!("../../../arms/avena.toml");
+    let text = format!("{arm}\n[settings]\nhost_timeout_ms = {host_timeout_ms}\n");
     let arm = sim.file("supervised.toml", &text);
     sim.jtc(&["arm", "push", &arm]).ends(0);
     sim.held()
@@ -19,7 +21,7 @@ const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n4,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    let sim = supervised();
+    let sim = supervised(1000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");
     sim.jtc(&["move", "--to", "0,0,0,0,0,0", "--speed", "5"]).ends(0);
@@ -29,7 +31,7 @@ fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
 
 #[test]
 fn j59_a_motion_whose_program_was_killed_is_paused() {
-    let sim = supervised();
+    let sim = supervised(1000);
     let file = sim.file("motion.csv", MOTION);
     let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
     child.kill().unwrap();
@@ -43,5 +45,27 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
             break;
         }
         assert_eq!(trajectory, Some("Execute"), "{status}");
+    }
+}
+
+/// The agent before has read the timeout, and this one has not: it reads it before it passes on questions.
+#[test]
+fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
+    let sim = supervised(3000);
+    let file = sim.file("motion.csv", "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n60,0.6,0,0,0,0,0\n");
+    let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
+    let mut patience = Patience::begin();
+    loop {
+        // Each of them is a frame, where it is passed on.
+        agent.jtc(&["info"]);
+        let status = agent.jtc(&["--json", "status"]).ends(0).json();
+        if status["trajectory"] == "Pause" {
+            break;
+        }
+        assert_eq!(status["trajectory"], "Execute", "{status}");
+        patience.pause(format_args!("a paused motion: {status}"));
     }
 }

@@ -67,11 +67,14 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
 fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
     let image = sim.file("image.bin", &common::golden());
+    let inputs = b"boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    ci:\n      set_position: 1500\n";
+    let parameters = sim.file("inputs.yaml", inputs);
     let mut peer = sim.peer();
     for (variable, value, words) in [
         ("UCOM_FOR", "2", &["run", "1", "--active"][..]),
         ("UCOM_CI", "1.set_position=0", &["run", "1"]),
         ("UCOM_PAR", "1.kp=3", &["run", "1"]),
+        ("UCOM_PARAMS", &parameters, &["run", "1", "--active"]),
         ("UCOM_ON_LOST", "stop-all", &["run", "1"]),
         ("UCOM_COUNT", "3", &["monitor"]),
         ("UCOM_COUNT", "3", &["so", "1"]),

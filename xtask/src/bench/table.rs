@@ -264,30 +264,35 @@ pub fn targets() -> usize {
 
 /// Prints every row, with the cause where its measurement failed; returns how many targets were missed. What was measured on a machine that is not `quiet` is not judged.
 pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
+    println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
-    let header = ["figure", "ours", "anchor", "ratio", "target", "met"];
-    println!(
-        "\n| {} | {} | {} | {} | {} | {} |",
-        header[0], header[1], header[2], header[3], header[4], header[5]
-    );
-    println!("|---|---|---|---|---|---|");
     for row in ROWS {
-        let ours = figures.get(row.ours).copied();
-        let anchor = row
+        let (text, misses) = row.judge(figures, failed, quiet);
+        println!("{text}");
+        missed += usize::from(misses);
+    }
+    missed
+}
+
+impl Row {
+    /// The row of the table, and whether its target was missed.
+    fn judge(&self, figures: &Figures, failed: &Failed, quiet: bool) -> (String, bool) {
+        let ours = figures.get(self.ours).copied();
+        let anchor = self
             .anchors
             .iter()
             .filter_map(|name| Some((*name, *figures.get(*name)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let ratio = ours.zip(anchor).map(|(ours, (_, anchor))| ours / anchor);
-        let (wanted, met) = match row.target {
+        let (wanted, met) = match self.target {
             Target::Share(share) => (format!("≤ {share} × anchor"), ratio.map(|ratio| ratio <= share)),
             Target::AtMost(value) => (format!("≤ {}", short(value)), ours.map(|ours| ours <= value)),
             Target::AtLeast(value) => (format!("≥ {}", short(value)), ours.map(|ours| ours >= value)),
             Target::None => ("–".to_owned(), None),
         };
-        let verdict = match (row.target, met) {
-            _ if ours.is_none() && failed.why(row.ours).is_some() => {
-                format!("FAILED: {}", failed.why(row.ours).unwrap_or_default())
+        let verdict = match (self.target, met) {
+            _ if ours.is_none() && failed.why(self.ours).is_some() => {
+                format!("FAILED: {}", failed.why(self.ours).unwrap_or_default())
             }
             (Target::None, _) => "–".to_owned(),
             (_, Some(_)) if !quiet => "not judged".to_owned(),
@@ -295,21 +300,20 @@ pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
             (_, Some(false)) => "NO".to_owned(),
             (_, None) => "not measured".to_owned(),
         };
-        missed += usize::from(!matches!(row.target, Target::None) && met != Some(true));
         let without: Vec<&str> =
-            row.anchors.iter().copied().filter(|name| !figures.contains_key(*name)).collect();
+            self.anchors.iter().copied().filter(|name| !figures.contains_key(*name)).collect();
         let without =
             if without.is_empty() { String::new() } else { format!(" without {}", without.join(", ")) };
-        println!(
+        let text = format!(
             "| {} | {} {} | {}{without} | {} | {wanted} | {verdict} |",
-            row.title,
+            self.title,
             ours.map_or("?".into(), short),
-            row.unit,
+            self.unit,
             anchor.map_or("–".into(), |(name, value)| format!("{} ({name})", short(value))),
             ratio.map_or("–".into(), |ratio| format!("{ratio:.2}")),
         );
+        (text, !matches!(self.target, Target::None) && met != Some(true))
     }
-    missed
 }
 
 /// A number with about four significant digits.
@@ -319,5 +323,36 @@ fn short(value: f64) -> String {
         v if v >= 100.0 => format!("{value:.1}"),
         v if v >= 10.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every figure of the table is there but those of one measurement, which failed.
+    #[test]
+    fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
+        let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));
+        let mut figures: Figures = names.map(|name| (name.to_owned(), 1.0)).collect();
+        figures.retain(|name, _| !name.starts_with("stop.upload_"));
+        let mut failed = Failed::default();
+        failed.note(&["stop.upload_", "bare.upload_"], "bytes of an upload: none within 60 s".into());
+        let (mut gone, mut there) = (0, 0);
+        for row in ROWS {
+            let (text, misses) = row.judge(&figures, &failed, true);
+            if row.ours.starts_with("stop.upload_") {
+                assert!(text.ends_with("| FAILED: bytes of an upload: none within 60 s |"), "{text}");
+                assert_eq!(misses, !matches!(row.target, Target::None), "{text}");
+                gone += 1;
+            } else {
+                assert!(text.contains("| 1.000 ") && !text.contains("FAILED"), "{text}");
+                there += 1;
+            }
+        }
+        assert!(gone > 0 && there > 20, "{gone} {there}");
+        // What was neither measured nor failed is not called failed.
+        let (text, _) = ROWS[0].judge(&Figures::new(), &Failed::default(), true);
+        assert!(text.ends_with("| not measured |"), "{text}");
     }
 }

@@ -1,12 +1,13 @@
 //! What an agent does first with what the one before was killed in.
 use std::time::{Duration, Instant};
 
+use jtc_host::Session;
 use jtc_wire::ExecCommand;
 use serde_json::json;
 
 use super::file::{Found, Stored};
 use super::keeper::Keeper;
-use crate::line::{Applied, Policy, SharedLine};
+use crate::line::{Applied, Introduction, Policy, Role, SharedLine};
 use crate::owner::Line;
 use crate::record::Notice;
 
@@ -37,6 +38,14 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     };
     keeper.settle(line.with(|line, _| line.will().cloned()), since);
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
+}
+
+/// Reads the controller's `host_timeout_ms` for the line. The arm may be moving for a program that is gone, and the timeout decides whose
+/// questions may stand for that program (J-59). Ends without it where the controller has none, or does not answer.
+pub fn read_host_timeout(line: &Line) {
+    let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
+    // Whatever is returned, the line has seen it.
+    let _ = Session::new(line.connect(introduction)).settings();
 }
 
 /// Waits for something on the line; whether it came.

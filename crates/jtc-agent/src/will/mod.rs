@@ -6,6 +6,6 @@ mod apply;
 mod file;
 mod keeper;
 
-pub use apply::apply;
+pub use apply::{apply, read_host_timeout};
 pub use file::{Found, Stored};
 pub use keeper::{Keeper, Witness};

@@ -9,7 +9,7 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 /// Help of `jtc run` and `jtc traj run`.
 pub(super) const RUN_EXAMPLES: &str = "The motion runs at 100 % of the file's own speed. An approach runs at --speed, and at half of the limits at most;\n\
                             without --speed at 10 % of the limits, and at 25 % in a simulator.\n\
-                            On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
+                            On a terminal space pauses and resumes, s stops; + and - change the speed, where the controller has extensions.\n\
                             Ctrl-C stops on the path, then ends; a second one ends at once.\n\
                             Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
                             program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\

@@ -205,6 +205,8 @@ fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog
     if let Some(notice) = will::apply(line, &keeper, found) {
         notices(log, out, "note")(notice);
     }
+    let line = line.clone();
+    std::thread::spawn(move || will::read_host_timeout(&line));
     keeper
 }
 

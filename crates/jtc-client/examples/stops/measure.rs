@@ -83,12 +83,12 @@ fn measure(
         state ^= state << 17;
         std::thread::sleep(BETWEEN + Duration::from_micros(state % AT_ANY_TIME_US));
         let asked = Instant::now();
-        assert_eq!(bare.get("POST /").0, 200);
+        answered("the bare server", bare.get("POST /").0)?;
         samples.bare.push(ms(asked.elapsed()));
         wait("bytes of an upload", || watch.look().since_stop >= uploaded)?;
         let before = watch.look().stops.len();
         let asked = Instant::now();
-        assert_eq!(served.get("POST /api/stop").0, 200);
+        answered("a Stop", served.get("POST /api/stop").0)?;
         wait("a Stop on the line", || watch.look().stops.len() > before)?;
         let stop = watch.look().stops[before];
         samples.first.push(ms(stop.first_byte.saturating_duration_since(asked)));
@@ -98,6 +98,10 @@ fn measure(
     eprintln!("{what}: {n} Stops");
     samples.queued_most = watch.look().queued_most;
     Ok(samples)
+}
+
+fn answered(what: &str, status: u16) -> Result<(), String> {
+    if status == 200 { Ok(()) } else { Err(format!("{what}: HTTP status {status}")) }
 }
 
 fn wait(what: &str, reached: impl Fn() -> bool) -> Result<(), String> {

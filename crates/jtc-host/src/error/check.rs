@@ -42,8 +42,8 @@ impl Diagnose for CheckError {
                 ErrorKind::Refused,
                 "device-limits",
                 format!(
-                    "no frame carries {NOT_CARRIED}. Build the firmware for this arm, or, where the controller's values are safe for \
-                     it, accept them (`--accept-device-limits`)"
+                    "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries \
+                     {NOT_CARRIED}: they belong into the firmware"
                 ),
             ),
             Self::Arm(e) => e.diagnosis(),

@@ -8,6 +8,7 @@ use jtc_wire::{
     fixed, floats, set_settings,
 };
 
+use super::limit::Limit;
 use super::{Session, frame_type, type_byte};
 use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError};
@@ -103,7 +104,7 @@ impl<P: Port> Session<P> {
             self.answers.clear();
             self.extension(frame)?;
             // It follows the record.
-            let end = self.port.now() + self.confirmation_time(jtc_wire::ANSWER_MAX);
+            let mut limit = Limit::new(self.confirmation_time(jtc_wire::ANSWER_MAX));
             loop {
                 while let Some(bytes) = self.answers.pop_front() {
                     let answer = FrameRef::new_checked(&bytes).and_then(Answer::parse);
@@ -111,11 +112,9 @@ impl<P: Port> Session<P> {
                         return Ok(found);
                     }
                 }
-                let now = self.port.now();
-                if now >= end {
+                if !self.wait_within(&mut limit)? {
                     break;
                 }
-                self.read(end - now)?;
             }
         }
         let request = frame_type(type_byte(frame));

@@ -334,11 +334,19 @@ impl<P: Port> Session<P> {
                     return Ok(Some(record));
                 }
             }
-            let Some(wait) = limit.next_wait() else { return Ok(None) };
-            let begun = self.port.now();
-            self.read(wait)?;
-            limit.waited(wait, self.port.now() - begun);
+            if !self.wait_within(&mut limit)? {
+                return Ok(None);
+            }
         }
+    }
+
+    /// Reads what comes in the next wait of a limit; false when no time is left.
+    fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
+        let Some(wait) = limit.next_wait() else { return Ok(false) };
+        let begun = self.port.now();
+        self.read(wait)?;
+        limit.waited(wait, self.port.now() - begun);
+        Ok(true)
     }
 
     /// Sends a command; an error when it is refused.

@@ -222,7 +222,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub par: Vec<Assignment>,
     /// Parameters and first inputs from a file, YAML; `ucom help params` shows the form
-    #[arg(long, env = "UCOM_PARAMS", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// Names of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]

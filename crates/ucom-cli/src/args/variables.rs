@@ -47,6 +47,7 @@ pub const VARIABLES: Variables = Variables {
         Retired::other("UCOM_ONLY", "conformance", "only"),
         Retired::other("UCOM_ON_LOST", "run", "on-lost"),
         Retired::other("UCOM_PAR", "run", "par"),
+        Retired::other("UCOM_PARAMS", "run", "params"),
         Retired::other("UCOM_SECOND", "update", "second"),
         Retired::other("UCOM_SPEED", "replay", "speed"),
     ],
@@ -77,7 +78,6 @@ mod tests {
             ("UCOM_CSV", Format),
             ("UCOM_FOR", Limit),
             ("UCOM_IMAGE", File),
-            ("UCOM_PARAMS", File),
             ("UCOM_SAVE", Output),
             ("UCOM_TEMPLATE", Output),
             ("UCOM_PROBE_OUT", Output),
@@ -98,9 +98,15 @@ mod tests {
             ("UCOM_TLS_CERT", File),
             ("UCOM_TLS_KEY", File),
         ];
-        // Files that are programmed, or that make a question a command.
-        let without =
-            ["update --exloader", "update --data", "update --second", "par --apply", "conformance --program"];
+        // Files that are programmed, that make a question a command, or that have the inputs of a board.
+        let without = [
+            "update --exloader",
+            "update --data",
+            "update --second",
+            "par --apply",
+            "run --params",
+            "conformance --program",
+        ];
         assert_eq!(faults::<Cli>("UCOM_", &VARIABLES, &allowed, &without), [""; 0]);
     }
 }

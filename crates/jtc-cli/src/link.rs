@@ -1,5 +1,5 @@
 //! The way to the controller: the port named, or the only one found; itself, or the agent that owns it.
-use cli_kit::Failure;
+use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
 use jtc_client::{AgentPort, Options};
@@ -33,7 +33,11 @@ impl LinkArgs {
     /// Opens it for a Stop or a Pause, for which an agent on this computer needs no token: one that it does not know keeps neither away. The
     /// inner error is that of a serial port which no agent of this user owns.
     pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
-        self.open_as(None, true).or_else(|error| self.open_as(None, false).map_err(|_| error))
+        self.open_as(None, true).or_else(|error| match error.kind {
+            // Nobody answers there.
+            ErrorKind::NoLink => Err(error),
+            _ => self.open_as(None, false).map_err(|_| error),
+        })
     }
 
     fn open_as(

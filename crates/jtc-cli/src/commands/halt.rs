@@ -47,18 +47,19 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         ends.map(|end| end.map_err(|error| error.told(Halt::Stop))).collect()
     });
     let mut failed: Vec<&Failure> = ends.iter().filter_map(|end| end.as_ref().err()).collect();
-    if let [_] = ends[..]
-        && !failed.is_empty()
-    {
-        return ends.into_iter().next().map_or(Ok(()), |end| end.map(drop));
-    }
+    let is_only_one = ends.len() == 1 && !failed.is_empty();
     let words: Vec<String> = ends.iter().flatten().map(Stopped::words).collect();
-    failed.iter().for_each(|failure| out.warn(&failure.message, &failure.hint));
+    if !is_only_one {
+        failed.iter().for_each(|failure| out.warn(&failure.message, &failure.hint));
+    }
     if !not_asked.is_empty() {
         out.note(format_args!(
             "jtc: not asked, no program of this user has it: {}; `jtc stop --port PATH` stops an arm there",
             not_asked.join(", ")
         ));
+    }
+    if is_only_one {
+        return ends.into_iter().next().map_or(Ok(()), |end| end.map(drop));
     }
     let arms: Vec<Value> =
         ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
@@ -373,9 +374,8 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             }
             Reached::Holder(answer, end) => (answer, end),
         };
-        let port = Some(answer.port.clone());
-        let baud = if matches!(arm, Arm::Of { .. }) { arm.link().baud } else { answer.baud };
-        let link = LinkArgs { port, baud, ..arm.link().clone() };
+        // Its rate is that at which the controller answered.
+        let link = LinkArgs { port: Some(answer.port.clone()), baud: answer.baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
         so_far.moved |= answer.moved;
@@ -442,7 +442,7 @@ fn directly(
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
-        session.teach(false).map_err(confirmed)?;
+        end_teaching(&mut session)?;
     }
     let (start, mut standstill) = (session.now(), Standstill::after(Halt::Stop));
     let mut written_at = start;
@@ -450,7 +450,7 @@ fn directly(
         let status = session.next_status().map_err(|error| confirmed(error.into()))?;
         if session.now().saturating_sub(written_at) >= AGAIN {
             if is_taught(&status) {
-                session.teach(false).map_err(confirmed)?;
+                end_teaching(&mut session)?;
             } else if is_paused(&status) {
                 match session.stop() {
                     // The next statuses show what the controller does.
@@ -474,6 +474,14 @@ fn directly(
             let end = End::of(&status, &standstill);
             return Err(NotHalted::after(Sent::Confirmed, still_moving(&end)));
         }
+    }
+}
+
+/// An agent that denies it has ended the teaching of another client itself.
+fn end_teaching(session: &mut Session<LinkPort>) -> Result<(), NotHalted> {
+    match session.teach(false) {
+        Ok(()) | Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
+        Err(error) => Err(NotHalted::after(Sent::Confirmed, error)),
     }
 }
 

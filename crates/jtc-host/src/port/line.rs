@@ -507,9 +507,9 @@ impl Line {
 }
 
 impl Output {
-    /// The last halt was a Stop.
+    /// The arm may still be coming to rest after a Stop.
     fn is_stopped(&self) -> bool {
-        self.halted.as_ref().is_some_and(|halted| halted.halt == Halt::Stop)
+        self.halted.as_ref().is_some_and(|halted| halted.halt == Halt::Stop && halted.at.elapsed() < REST)
     }
 
     fn refusal(&self) -> PortError {

@@ -99,6 +99,13 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
+            // A motion that is being stopped is stopped, whatever key comes then and whoever pauses it.
+            let again = stopping && status.trajectory == TrajectoryState::Pause;
+            let flow = match flow {
+                _ if again => Flow::Stop,
+                Flow::Pause | Flow::Resume if stopping => Flow::Continue,
+                flow => flow,
+            };
             let did = match flow {
                 Flow::Continue => continue,
                 Flow::Cancel => return Err(Error::Cancelled),
@@ -106,7 +113,7 @@ impl<P: Port> Session<P> {
                 Flow::Resume => self.resume(),
                 Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
-                Flow::Stop if !stopping => {
+                Flow::Stop if !stopping || again => {
                     stopping = true;
                     unless_ended(self.stop())
                 }

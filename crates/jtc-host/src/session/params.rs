@@ -65,11 +65,13 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
+        // Parameters lead to torque: a Stop of another program ends them.
+        let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {
             let start = self.port.now();
             for _ in 0..times {
-                if ended() {
+                if ended() || self.port.halts().stops != stops {
                     return Err(Error::Cancelled);
                 }
                 self.command(&frame).map_err(|e| explained(e, set))?;

@@ -113,6 +113,8 @@ struct Recovery<'a, P, Ended, Report> {
     asked: Option<Duration>,
     /// Acts that are left before it is given up.
     acts_left: u8,
+    /// Stops of other programs before it began: one that comes later ends it.
+    stops: u64,
 }
 
 impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a, P, Ended, Report> {
@@ -123,6 +125,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         report: Report,
     ) -> Self {
         let (given, reset_slow) = (false, false);
+        let stops = session.port.halts().stops;
         Self {
             session,
             parameters,
@@ -134,6 +137,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
             reset_slow,
             asked: None,
             acts_left: ACTS_MAX,
+            stops,
         }
     }
 
@@ -141,7 +145,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     fn from(&mut self, mut status: Status) -> Result<Status, Error> {
         while self.acts_left > 0 {
             self.acts_left -= 1;
-            if (self.ended)() && status.state != ControllerState::Operate {
+            let stopped = self.session.port.halts().stops != self.stops;
+            if ((self.ended)() || stopped) && status.state != ControllerState::Operate {
                 return Err(Error::Cancelled);
             }
             self.parameters.enough_for(&status)?;

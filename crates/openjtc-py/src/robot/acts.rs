@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use jtc_core::JOINTS;
 use jtc_host::error::Facts;
+use jtc_host::port::Standstill;
+use jtc_host::port::halt::{End, Halt};
 use jtc_host::{Error, LinkError, Port as _, PortError, words};
 use jtc_wire::{ControllerState, TrajectoryState, fixed};
 
@@ -27,8 +29,8 @@ pub fn stopped(what: &str) -> Failure {
 }
 
 impl Machine {
-    /// Stops whatever moves and waits until it stands; that nothing does is no error. Who stops an arm wants it held: teaching that was switched on
-    /// here ends.
+    /// Stops whatever moves and waits until it stands; that nothing does is no error. Who stops an arm wants it held: teaching ends, whoever has
+    /// switched it on.
     pub fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
         // Before anything is asked: a line that returns nothing may still carry it.
@@ -39,7 +41,22 @@ impl Machine {
         };
         let held = self.hold();
         stopped?;
-        self.session.wait_for("standstill", STANDSTILL, |status| !status.is_executing())?;
+        let (end, mut standstill) = (self.session.now() + STANDSTILL, Standstill::after(Halt::Stop));
+        while !standstill.is_reached() {
+            let status = self.session.next_status()?;
+            standstill.see(self.session.now(), &status);
+            if self.session.now() >= end {
+                let what = End::of(&status, &standstill).moving.unwrap_or_default();
+                return Err(Failure::fault("still-moving", what, "press the emergency stop"));
+            }
+            if status.state == ControllerState::Teaching {
+                match self.session.teach(false) {
+                    // An agent has ended that of another client itself.
+                    Ok(()) | Err(Error::Link(LinkError::Denied { .. })) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+        }
         self.shared.set_moves(false);
         held
     }

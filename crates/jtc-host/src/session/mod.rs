@@ -301,6 +301,7 @@ impl<P: Port> Session<P> {
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
+        let halts = frame == fixed::STOP || frame == fixed::PAUSE;
         let (mut bad, mut due) = (None, true);
         self.forget_the_past()?;
         for attempt in 0..self.timeouts.tries {
@@ -308,6 +309,7 @@ impl<P: Port> Session<P> {
                 self.statistics.retries += u64::from(attempt > 0);
                 self.write(frame)?;
             }
+            let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
                 // Once may be a damaged frame; twice it is a type that the device does not know.
@@ -315,6 +317,11 @@ impl<P: Port> Session<P> {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
+                // No status came either: a device that is late has lost nothing. A Stop is sent again all the same.
+                None if !halts && self.last_received < begun => {
+                    due = false;
+                    self.next_status()?;
+                }
                 None => due = !once,
             }
         }

@@ -229,7 +229,7 @@ pub enum Command {
     /// Move single joints: with keys, or one for as long as the command lives
     #[command(
         after_help = "On a terminal: 1 to 6 select a joint, hold the left or right arrow to move it, up and down change the rate, q ends.\n\
-                            The arm comes to rest 0.2 s after the last key, or the last sign of life of this command. Joints stop before the\n\
+                            The arm begins to stop 0.2 s after the last key, or the last sign of life of this command, and stands within 0.5 s. Joints stop before the\n\
                             ends of their ranges. Only in HoldPos, not beside a paused path.\n\nExamples:\n  jtc jog\n  \
                             jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  jtc jog 3 -5 --deg --duration 2"
     )]

@@ -5,6 +5,7 @@ use jtc_dynamics::sqrt;
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
+use crate::motion;
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
@@ -52,7 +53,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.go_on();
             Phase::Running { leave: None }
         } else {
-            Phase::Approaching { from: self.motion.set.point.position, elapsed_ms: 0.0, leave: None }
+            Phase::approach(self.motion.set.point.position)
         };
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
@@ -79,14 +80,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Phase::Running { leave } => {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
-                    self.braking_ms = Some(0);
-                    self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+                    self.begin_braking();
                 }
             }
-            // It comes to rest at point 0 by itself.
-            Phase::Approaching { leave, .. } => *leave = Some(to),
-            Phase::Waiting { .. } | Phase::AtStart => self.set_trajectory(to),
+            // It comes to rest beside the point that it is on the way to.
+            Phase::Approaching { clock, leave, .. } if clock.time > 0.0 => {
+                if leave.replace(to).is_none() {
+                    clock.halt();
+                    self.begin_braking();
+                }
+            }
+            Phase::Waiting { .. } | Phase::Approaching { .. } | Phase::AtStart => self.set_trajectory(to),
         }
+    }
+
+    /// From now on all the torque there is may brake.
+    pub(crate) fn begin_braking(&mut self) {
+        self.braking_ms = Some(0);
+        self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
     /// Set values of Operate.
@@ -107,27 +118,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         self.set_trajectory(TrajectoryState::Stop);
                     }
                 } else if self.near(&self.path_point()) {
-                    self.phase = Phase::Approaching {
-                        from: self.motion.set.point.position,
-                        elapsed_ms: 0.0,
-                        leave: None,
-                    };
+                    self.phase = Phase::approach(self.motion.set.point.position);
                 } else {
                     self.set_trajectory(TrajectoryState::Stop);
                 }
             }
-            Phase::Approaching { from, elapsed_ms, leave } => {
-                if elapsed_ms == 0.0 {
+            Phase::Approaching { from, mut clock, leave } => {
+                if clock.time == 0.0 {
                     // The arm was held until now, without friction compensation.
                     self.motion.law.change_mode();
                 }
                 let length = self.approach_ms(&from);
-                let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.set.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
-                if elapsed_ms < length {
-                    self.phase = Phase::Approaching { from, elapsed_ms, leave };
-                } else if let Some(trajectory) = leave {
+                clock.advance(length);
+                let at = motion::approach(&from, &self.path_point(), clock.time / length, length);
+                self.motion.follow(&at, &mut clock, &self.config);
+                let arrived = clock.time >= length;
+                if let Some(trajectory) = leave.filter(|_| arrived || clock.standing()) {
                     self.set_trajectory(trajectory);
+                } else if !arrived {
+                    self.phase = Phase::Approaching { from, clock, leave };
                 } else if self.clock.time == 0.0 {
                     self.phase = Phase::AtStart;
                 } else {
@@ -178,24 +187,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return;
         }
         let Some(at) = self.store.at(self.clock.time) else { return };
-        if self.clock.ramping() {
-            let bounds = self.motion.ramp.slope_bounds(
-                &at,
-                &self.motion.law.torque,
-                self.clock.rate,
-                self.clock.slope,
-                &self.config,
-            );
-            let ramp_ms = f64::from(self.config.ramp_ms);
-            if self.clock.halting() {
-                self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
-            } else {
-                self.clock.change_pace(ramp_ms, bounds.easy);
-            }
-        } else {
-            self.clock.slope = 0.0;
-        }
-        self.motion.set.follow(&at, self.clock.rate, self.clock.slope);
+        self.motion.follow(&at, &mut self.clock, &self.config);
     }
 
     /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
@@ -222,8 +214,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let Some(ms) = self.braking_ms else { return false };
         let moving = self.motion.set.moving(&self.nodes);
         let stands = moving == [false; JOINTS];
-        if let (TrajectoryState::Execute, Phase::Running { leave: Some(trajectory) }) =
-            (self.trajectory, self.phase)
+        if self.trajectory == TrajectoryState::Execute
+            && let Some(trajectory) = self.phase.leave()
             && stands
             && ms >= self.config.stop_ms
         {

@@ -22,6 +22,8 @@ pub use log::firmware_hash;
 /// Most values of a SetSettings frame in motion.
 const LIVE_MAX: usize = 4;
 
+/// Time without a Jog after which one is taken again when a jog was stopped, ms.
+const JOGS_REFUSED_MS: u16 = 500;
 /// Most values of a SetSettings frame under an arm that is held or taught: a payload has ten.
 const STANDING_MAX: usize = 16;
 
@@ -55,6 +57,8 @@ pub(crate) struct Extensions {
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
+    /// Ticks in which no Jog with a velocity may come before one is taken again.
+    pub jogs_refused_ms: u16,
     /// How far the hash of the arm has been computed.
     hashed: (usize, Hash),
     pub identity: Identity,
@@ -69,6 +73,11 @@ pub(crate) struct Extensions {
 }
 
 impl Extensions {
+    /// A jog was stopped: a key that is still held down moves nothing (J-58).
+    pub fn refuse_jogs(&mut self) {
+        self.jogs_refused_ms = JOGS_REFUSED_MS;
+    }
+
     pub fn new() -> Self {
         Self {
             answers: Answers::new(),
@@ -77,6 +86,7 @@ impl Extensions {
             unusable: false,
             hash: None,
             hosts_silent_ms: 0,
+            jogs_refused_ms: 0,
             hashed: (0, Hash::new()),
             identity: Identity::default(),
             firmware_hash: firmware_hash("", ""),
@@ -169,6 +179,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 // J-53: there is no such joint.
                 return Err(DataStatus::NotAllowed);
             }
+        }
+        if wanted != [0.0; JOINTS] {
+            if self.extensions.jogs_refused_ms > 0 {
+                self.extensions.refuse_jogs();
+                return Err(DataStatus::NotAllowed);
+            }
+            self.braking_ms = None;
         }
         if !set.jogging() {
             if self.motion.law.yielding() {
@@ -336,6 +353,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));
+        self.extensions.jogs_refused_ms = self.extensions.jogs_refused_ms.saturating_sub(1);
         let silent = &mut self.extensions.hosts_silent_ms;
         *silent = if received { 0 } else { silent.saturating_add(1) };
         let limit = u32::from(self.config.host_timeout_ms);

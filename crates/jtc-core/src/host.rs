@@ -283,10 +283,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         // J-30: also while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
+        // Who stops or pauses wants the arm held: Teaching ends, also one that is waited for.
+        let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         match (self.trajectory, command) {
             (_, ExecCommand::Stop | ExecCommand::Pause) if self.motion.set.jogging() => {
                 self.motion.set.end_jog();
+                self.extensions.refuse_jogs();
                 Ok(())
+            }
+            // J-33: what was stopped is not to be gone on with.
+            (TrajectoryState::Execute, ExecCommand::Pause)
+                if self.phase.leave() == Some(TrajectoryState::Stop) =>
+            {
+                Err(DataStatus::NotAllowed)
             }
             // Teaching was accepted, and begins as soon as the arm is held; or joints are absent (J-53).
             (_, ExecCommand::Execute)
@@ -320,7 +329,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.set_trajectory(TrajectoryState::Stop);
                 Ok(())
             }
-            _ if dropped => Ok(()),
+            _ if dropped || taught => Ok(()),
             _ => Err(DataStatus::NotAllowed),
         }
     }

@@ -1,9 +1,12 @@
 //! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of
-//! bounded acceleration and jerk, and slows down before the end of its range by itself. Without a new command all come to rest.
+//! bounded acceleration and jerk, and slows down before the end of its range by itself. When the jog ends, its time comes to rest as that
+//! of a path does, which stops all joints as hard as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::config::Config;
+use crate::interpolation::SetPoint;
 use crate::limits::JointConfig;
+use crate::path::PathClock;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
@@ -25,22 +28,32 @@ struct JointJog {
 }
 
 /// All joints, from the first command until they rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
     /// Ticks since the last command.
     silent_ms: u16,
+    /// The time in which they move.
+    clock: PathClock,
 }
 
 remembered!(JointJog { wanted, velocity, acceleration });
-remembered!(Jog { joints, silent_ms });
+remembered!(Jog { joints, silent_ms, clock });
 
 impl Jog {
+    /// At rest.
+    pub fn begin() -> Self {
+        Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
+    }
+
     /// New velocities, rad/s.
     pub fn command(&mut self, wanted: &[f64; JOINTS]) {
         self.silent_ms = 0;
         for (joint, wanted) in self.joints.iter_mut().zip(wanted) {
             joint.wanted = *wanted;
+        }
+        if *wanted != [0.0; JOINTS] {
+            self.clock.go(1.0);
         }
     }
 
@@ -49,67 +62,95 @@ impl Jog {
         self.command(&[0.0; JOINTS]);
     }
 
-    /// Every joint rests, and is to.
-    pub fn rests(&self) -> bool {
-        let rests =
-            |joint: &JointJog| joint.wanted == 0.0 && joint.velocity == 0.0 && joint.acceleration == 0.0;
-        self.joints.iter().all(rests)
-    }
-
-    /// A tick: moves `position` (rad) on; returns velocities (rad/s) and accelerations (rad/s²).
-    pub fn step(&mut self, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
+    /// A tick begins. Returns whether all joints begin to come to rest with it.
+    pub fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
             self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
         }
-        let joints = self.joints.iter_mut().zip(position.iter_mut()).zip(&config.joints);
-        for (j, ((joint, position), limits)) in joints.enumerate() {
-            joint.step(position, config.position_range(j), limits);
+        let ends = self.joints.iter().all(|joint| joint.wanted == 0.0) && self.clock.is_going();
+        if ends {
+            self.clock.halt();
         }
-        (self.joints.map(|joint| joint.velocity), self.joints.map(|joint| joint.acceleration))
+        ends
+    }
+
+    /// Every joint rests, and is to.
+    pub fn rests(&self) -> bool {
+        let rests =
+            |joint: &JointJog| joint.wanted == 0.0 && joint.velocity == 0.0 && joint.acceleration == 0.0;
+        self.clock.standing() || self.joints.iter().all(rests)
+    }
+
+    /// A tick: moves `point` on; `ramp` takes the clock on, on its way to another rate.
+    pub fn step(
+        &mut self,
+        point: &mut SetPoint,
+        config: &Config,
+        ramp: impl FnOnce(&SetPoint, &mut PathClock),
+    ) {
+        let values = |joints: &[JointJog; JOINTS]| {
+            (joints.map(|joint| joint.velocity), joints.map(|joint| joint.acceleration))
+        };
+        let (velocity, acceleration) = values(&self.joints);
+        let before = self.clock.rate;
+        ramp(&SetPoint { position: point.position, velocity, acceleration }, &mut self.clock);
+        let (rate, slope) = (self.clock.rate, self.clock.slope);
+        let tick = 0.5 * (before + rate) * DT;
+        let joints = self.joints.iter_mut().zip(point.position.iter_mut()).zip(&config.joints);
+        for (j, ((joint, position), limits)) in joints.enumerate() {
+            joint.step(position, config.position_range(j), limits, tick);
+        }
+        let (velocity, acceleration) = values(&self.joints);
+        point.velocity = velocity.map(|velocity| velocity * rate);
+        point.acceleration = core::array::from_fn(|j| acceleration[j] * rate * rate + velocity[j] * slope);
     }
 }
 
 impl JointJog {
-    fn step(&mut self, position: &mut f64, (low, high): (f64, f64), limits: &JointConfig) {
+    /// A tick that takes this time of the jog (s).
+    fn step(&mut self, position: &mut f64, (low, high): (f64, f64), limits: &JointConfig, tick: f64) {
         let most = ACCELERATION * limits.acceleration_max;
         let wanted = self.wanted.max(-limits.velocity_max).min(limits.velocity_max);
         // As wanted, as long as the joint could still stop inside its range from there.
-        let onward = self.toward(wanted, most, limits.velocity_max);
-        let way = self.way(&onward) + onward.stopping_way(most);
+        let onward = self.toward(wanted, most, limits.velocity_max, tick);
+        let way = self.way(&onward, tick) + onward.stopping_way(most);
         let room = if way < 0.0 { low - *position } else { high - *position };
         let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
-        let next = if onward_fits { onward } else { self.toward(0.0, most, limits.velocity_max) };
+        let next = if onward_fits { onward } else { self.toward(0.0, most, limits.velocity_max, tick) };
         // Never out of the range; from outside only back into it.
-        let reached = *position + self.way(&next);
+        let reached = *position + self.way(&next, tick);
         let within = reached.max(low.min(*position)).min(high.max(*position));
         *self = if within == reached { next } else { Self { velocity: 0.0, acceleration: 0.0, ..next } };
         *position = within;
     }
 
-    /// What it moves until it is in the state `next` of the next tick, rad.
-    fn way(&self, next: &Self) -> f64 {
-        0.5 * (self.velocity + next.velocity) * DT
+    /// What it moves in this time (s) until it is in the state `next`, rad.
+    fn way(&self, next: &Self, tick: f64) -> f64 {
+        0.5 * (self.velocity + next.velocity) * tick
     }
 
-    /// A tick later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²), and never faster than
+    /// So long (s) later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²), and never faster than
     /// `fastest` (rad/s).
-    fn toward(&self, target: f64, most: f64, fastest: f64) -> Self {
-        let round = most / RISE_S * DT;
+    fn toward(&self, target: f64, most: f64, fastest: f64, tick: f64) -> Self {
+        if tick <= 0.0 {
+            return *self;
+        }
+        let round = most / RISE_S * tick;
         let left = target - self.velocity;
         // The acceleration from which the rest of the way to that velocity just suffices to take it back.
-        let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * DT)) - 0.5);
+        let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
             flat.min(most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
-        let arrives = next.abs() <= 1.5 * round && left.abs() <= (1.5 * round * DT).max(next.abs() * DT);
+        let arrives = next.abs() <= 1.5 * round && left.abs() <= (1.5 * round * tick).max(next.abs() * tick);
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
             // A joint that accelerates when its jog ends gets faster until its acceleration is back at zero. It arrives at the
             // velocity that was commanded before; whole ticks can add a few µrad/s, which the limit does not allow.
-            let reached = self.velocity + next * DT;
+            let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
-            let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / DT };
+            let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };
             Self { velocity, acceleration, ..*self }
         }
     }
@@ -137,12 +178,29 @@ impl JointJog {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
     use crate::limits::check_set;
+    use crate::motion::Ramp;
     use proptest::prelude::*;
 
     fn config() -> Config {
         Config::avena()
+    }
+
+    /// A tick that moves `position` on, of joints without inertia: their velocities and accelerations.
+    fn tick(
+        jog: &mut Jog,
+        position: &mut [f64; JOINTS],
+        config: &Config,
+    ) -> ([f64; JOINTS], [f64; JOINTS]) {
+        let mut point = SetPoint::still(*position);
+        jog.ends();
+        let no_torque = Default::default();
+        jog.step(&mut point, config, |at, clock| Ramp::default().step(at, &no_torque, clock, config));
+        *position = point.position;
+        (point.velocity, point.acceleration)
     }
 
     proptest! {
@@ -151,29 +209,36 @@ mod tests {
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
-            commands in prop::collection::vec((prop::array::uniform6(-1.0..1.0f64), 1u32..400), 1..20),
+            commands in prop::collection::vec(
+                (prop_oneof![4 => prop::array::uniform6(-1.0..1.0f64), 1 => Just([0.0; JOINTS])], 1u32..400),
+                1..20,
+            ),
         ) {
             let config = config();
-            let (mut jog, mut position) = (Jog::default(), [0.0; JOINTS]);
+            let (mut jog, mut position) = (Jog::begin(), [0.0; JOINTS]);
             for j in 0..JOINTS {
                 let (low, high) = config.position_range(j);
                 position[j] = 0.5 * (low + high) + 0.5 * start[j] * (high - low);
             }
             let mut last = ([0.0; JOINTS], [0.0; JOINTS]);
             let mut check = |jog: &mut Jog| {
-                let before = position;
-                let (v, a) = jog.step(&mut position, &config);
+                let (before, was_ramping) = (position, jog.clock.ramping());
+                let (v, a) = tick(jog, &mut position, &config);
+                let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
-                    let most = ACCELERATION * limits.acceleration_max;
+                    // On its way to rest it is stopped as on a path.
+                    let most = if ramps { limits.acceleration_max } else { ACCELERATION * limits.acceleration_max };
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
                     let at_end = position[j] == low || position[j] == high;
                     // What is left of a velocity at the very end of the range is next to nothing.
                     let step = (v[j] - last.0[j]).abs();
                     assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
-                    assert!((a[j] - last.1[j]).abs() <= 2.0 * most / RISE_S * DT + 1e-9 || v[j] == 0.0 || a[j] == 0.0);
-                    assert!((position[j] - before[j] - 0.5 * (v[j] + last.0[j]) * DT).abs() < 1e-12 || at_end);
+                    let jerk = (a[j] - last.1[j]).abs();
+                    assert!(ramps || jerk <= 2.0 * most / RISE_S * DT + 1e-9 || v[j] == 0.0 || a[j] == 0.0);
+                    let way = 0.5 * (v[j] + last.0[j]) * DT;
+                    assert!((position[j] - before[j] - way).abs() < 1e-7 || at_end, "{way}");
                 }
                 last = (v, a);
             };
@@ -190,7 +255,7 @@ mod tests {
             while !jog.rests() {
                 check(&mut jog);
                 ticks += 1;
-                assert!(ticks < 1_200, "{jog:?}");
+                assert!(ticks <= 520, "{jog:?}");
             }
         }
     }
@@ -258,16 +323,16 @@ mod tests {
                 wanted
             };
             let step = |jog: &mut Jog, position: &mut [f64; JOINTS]| {
-                let (v, a) = jog.step(position, &config);
+                let (v, a) = tick(jog, position, &config);
                 let inside = v[joint].abs() <= limits.velocity_max;
                 let found = check_set((position[joint], v[joint], a[joint]), 0.0, &limits, true);
                 if inside && found == 0 { Ok(()) } else { Err((v[joint], a[joint], found)) }
             };
-            let (mut jog, mut position) = (Jog::default(), [0.0; JOINTS]);
+            let (mut jog, mut position) = (Jog::begin(), [0.0; JOINTS]);
             position[joint] = if up { 0.9 * low + 0.1 * high } else { 0.1 * low + 0.9 * high };
             jog.command(&at(before));
-            for tick in 0..60 {
-                prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms before", 60 - tick);
+            for ms in 0..60 {
+                prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms before", 60 - ms);
             }
             for ends_ms in 1..1_300 {
                 jog.command(&at(1.0 - below));
@@ -278,8 +343,8 @@ mod tests {
                     End::Stop => ended.end(),
                     End::Rate(share) => ended.command(&at(share)),
                 }
-                for tick in 0..AFTER {
-                    prop_assert_eq!(step(&mut ended, &mut there), Ok(()), "{} ms after {} ms", tick, ends_ms);
+                for ms in 0..AFTER {
+                    prop_assert_eq!(step(&mut ended, &mut there), Ok(()), "{} ms after {} ms", ms, ends_ms);
                 }
             }
         }
@@ -287,17 +352,17 @@ mod tests {
 
     #[test]
     fn j58_a_joint_gets_to_its_velocity_and_to_the_end_of_its_range() {
-        let (config, mut jog, mut position) = (config(), Jog::default(), [0.0; JOINTS]);
+        let (config, mut jog, mut position) = (config(), Jog::begin(), [0.0; JOINTS]);
         let wanted = [0.5, -0.25, 1.5, -1.5, 0.01, 0.0];
         for _ in 0..800 {
             jog.command(&wanted);
-            jog.step(&mut position, &config);
+            tick(&mut jog, &mut position, &config);
         }
         assert_eq!(jog.joints.map(|joint| joint.velocity), wanted);
         assert_eq!(position[5], 0.0);
         for _ in 0..30_000 {
             jog.command(&[1.0, -1.0, 1.5, -0.1, 0.5, 1.5]);
-            jog.step(&mut position, &config);
+            tick(&mut jog, &mut position, &config);
         }
         for (j, up) in [true, false, true, false, true, true].into_iter().enumerate() {
             let (low, high) = config.position_range(j);
@@ -311,13 +376,71 @@ mod tests {
         let config = config();
         let (_, high) = config.position_range(0);
         for (wanted, moves) in [(0.5, false), (-0.5, true)] {
-            let (mut jog, mut position) = (Jog::default(), [high + 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            let (mut jog, mut position) = (Jog::begin(), [high + 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
             for _ in 0..100 {
                 jog.command(&[wanted, 0.0, 0.0, 0.0, 0.0, 0.0]);
-                jog.step(&mut position, &config);
+                tick(&mut jog, &mut position, &config);
             }
             assert_eq!(position[0] < high + 0.1, moves);
             assert!(position[0] <= high + 0.1);
+        }
+    }
+
+    /// Ticks from the end of a jog until it rests, and the way of joint 1 meanwhile (rad).
+    fn stop(mut jog: Jog, mut position: [f64; JOINTS], config: &Config, end: End) -> (u16, f64) {
+        let begin = position[0];
+        match end {
+            End::Silence => {}
+            End::Stop => jog.end(),
+            End::Rate(share) => jog.command(&[share * config.joints[0].velocity_max; JOINTS]),
+        }
+        let mut ticks = 0;
+        while !jog.rests() && ticks < 2_000 {
+            tick(&mut jog, &mut position, config);
+            ticks += 1;
+        }
+        (ticks, (position[0] - begin).abs())
+    }
+
+    #[test]
+    fn j33_j58_a_jog_stops_as_a_path_does_whatever_ends_it() {
+        for config in arms() {
+            let fastest = config.joints[0].velocity_max;
+            for share in [0.02, 0.3, 0.7, 1.0] {
+                let (mut jog, mut position) = (Jog::begin(), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                for _ in 0..1_500 {
+                    jog.command(&[share * fastest, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                    tick(&mut jog, &mut position, &config);
+                    position[0] = position[0].min(0.0);
+                }
+                // A path stops from this speed in the time of the ramp, on half of the way; a fast joint by its acceleration limit.
+                let hard = config.joints[0].acceleration_max;
+                let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);
+                for (end, wait) in [(End::Stop, 0), (End::Rate(0.0), 0), (End::Silence, LASTS_MS)] {
+                    let (ticks, way) = stop(jog, position, &config, end);
+                    assert!(ticks <= wait + longest && ticks <= wait + 520, "{end:?} {share}: {ticks} ms");
+                    let most = share * fastest * 1e-3 * (f64::from(wait) + 0.55 * f64::from(longest));
+                    assert!(way <= most, "{end:?} {share}: {way} rad of {most}");
+                }
+            }
+        }
+    }
+
+    /// A key that is pressed again before the arm stands.
+    #[test]
+    fn j58_a_jog_that_is_commanded_again_on_its_way_to_rest_goes_on() {
+        let config = config();
+        for ends_ms in [1, 40, 100, 150, 199] {
+            let (mut jog, mut position) = (Jog::begin(), [0.0; JOINTS]);
+            let mut velocities = std::vec::Vec::new();
+            for ms in 0..1_500 {
+                let released = (600..600 + ends_ms).contains(&ms);
+                jog.command(&[if released { 0.0 } else { 1.0 }, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                velocities.push(tick(&mut jog, &mut position, &config).0[0]);
+            }
+            assert!((velocities[1_499] - 1.0).abs() < 1e-9, "{ends_ms} ms: {}", velocities[1_499]);
+            let jump = velocities.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+            assert!(jump <= config.joints[0].acceleration_max * DT, "{ends_ms} ms: {jump} rad/s in a tick");
         }
     }
 }

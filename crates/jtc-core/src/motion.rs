@@ -12,9 +12,11 @@ mod transfer;
 
 use crate::JOINTS;
 use crate::config::Config;
+use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
+use crate::path::PathClock;
 use crate::remembered::remembered;
 pub(crate) use commanded::Commanded;
 use law::ControlLaw;
@@ -22,8 +24,11 @@ pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
 use limiter::Limiter;
 use ramp::PathRamp;
 use set_values::SetValues;
+pub(crate) use set_values::approach;
 #[cfg(test)]
 pub(crate) use torque::JointTorque;
+#[cfg(test)]
+pub(crate) type Ramp = PathRamp;
 
 /// The parts of the motion.
 #[derive(Clone, Debug, Default)]
@@ -85,6 +90,22 @@ impl Motion {
     pub fn latch(&mut self, nodes: &Nodes, config: &Config) {
         let latched = self.set.latch(nodes, config);
         self.law.latch(&latched);
+    }
+
+    /// A tick of HoldPos: the held position, or that of a jog.
+    pub fn hold(&mut self, config: &Config) {
+        let Self { set, law, ramp, .. } = self;
+        if set.jogging() {
+            set.jog_on(config, |at, clock| ramp.step(at, &law.torque, clock, config));
+        } else {
+            set.hold(config);
+        }
+    }
+
+    /// A tick on the path or of the approach, of which `at` are the full-speed values at the time of its clock (J-33).
+    pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
+        self.ramp.step(at, &self.law.torque, clock, config);
+        self.set.follow(at, clock.rate, clock.slope);
     }
 
     /// A tick of the control law and of its limits: torques to command, and joint errors found on the way.

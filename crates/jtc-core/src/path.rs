@@ -80,10 +80,9 @@ impl PathClock {
         Self { rate: pace, target: pace, ..Self::default() }
     }
 
-    /// Standing at the present time, about to go at this rate.
+    /// Standing, or on the way to it, and about to go at this rate.
     pub fn go(&mut self, pace: f64) {
         self.target = pace;
-        self.slope = 0.0;
     }
 
     /// Another rate is wanted from now on; standstill that is wanted remains so. Returns whether path time begins to change its rate.
@@ -115,6 +114,11 @@ impl PathClock {
     /// On the way to standstill.
     pub fn halting(&self) -> bool {
         self.target == 0.0 && self.rate != 0.0
+    }
+
+    /// Going, or about to.
+    pub fn is_going(&self) -> bool {
+        self.target != 0.0
     }
 
     /// Not at the rate that is wanted.

@@ -98,7 +98,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.parameters.blend_payload();
         self.motion.latch(&self.nodes, &self.config);
         let jogged = self.motion.set.jogging();
-        self.motion.set.hold(&self.config);
+        if self.motion.set.jog_ends() {
+            self.begin_braking();
+        }
+        self.motion.hold(&self.config);
         if self.motion.set.jogging() {
             return self.control(ControlMode::Approach);
         }

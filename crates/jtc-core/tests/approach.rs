@@ -39,6 +39,44 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
+/// Who stops or pauses an arm wants it held, also one that would be taught as soon as it stands.
+#[test]
+fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
+    for command in [ExecCommand::Stop, ExecCommand::Pause] {
+        for taught_ms in [0, 5, 1_000] {
+            let mut rig = Rig::holding();
+            if taught_ms < 1_000 {
+                // It still moves: Teaching waits.
+                rig.apart[1] = true;
+                rig.nodes[1].report.velocity = 0.05;
+            }
+            assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
+            rig.run(taught_ms);
+            assert_eq!(rig.exec(command), DataStatus::NoError, "{command:?} after {taught_ms} ms");
+            rig.nodes[1].report.velocity = 0.0;
+            rig.run(12_000);
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{command:?} {taught_ms}");
+            // Nothing is left to stop.
+            assert_eq!(rig.exec(command), DataStatus::NotAllowed);
+        }
+    }
+}
+
+/// The hand that stops an arm may hit another key, too.
+#[test]
+fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
+    for ms in [1, 20, 100, 180] {
+        let mut rig = Rig::holding();
+        rig.move_along(&points(), 500);
+        rig.urgent(0, UrgentCommand::Stop);
+        rig.run(ms);
+        assert_eq!(rig.trajectory(), TrajectoryState::Execute);
+        assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NotAllowed, "{ms} ms");
+        rig.until(520, |r| r.trajectory() != TrajectoryState::Execute);
+        assert_eq!(rig.trajectory(), TrajectoryState::Stop, "{ms} ms");
+    }
+}
+
 /// An arm that is touched after a pause is held; only path time that cannot be stopped is an error.
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
@@ -72,6 +110,49 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     rig.execute(&points());
     rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
+}
+
+/// A Stop or a Pause on the way to the first point, however far away that is: the arm slows down at once and stands beside it. The next
+/// Execute begins there.
+#[test]
+fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
+    for (command, trajectory) in
+        [(UrgentCommand::Stop, TrajectoryState::Stop), (UrgentCommand::Pause, TrajectoryState::Pause)]
+    {
+        for (start, after_ms) in [(0.019, 60), (0.4, 60), (0.4, 200), (0.49, 400)] {
+            let mut rig = Rig::new(Config { start_tolerance_rad: 0.5, ..Config::avena() });
+            rig.follow = false;
+            rig.nodes[1].report.position = start;
+            rig.defaults();
+            rig.run(300);
+            rig.follow = true;
+            rig.execute(&points());
+            let set = |rig: &Rig| {
+                let joint = rig.controller.telemetry().joints[1];
+                (joint.set_position, joint.set_velocity)
+            };
+            rig.until(1_000, |r| set(r).1 != 0.0);
+            rig.run(after_ms);
+            let (at, speed) = set(&rig);
+            rig.urgent(0, command);
+            let mut fastest = 0.0f64;
+            let ticks = rig.until(520, |r| {
+                fastest = fastest.max(set(r).1.abs());
+                r.trajectory() == trajectory
+            });
+            let rest = set(&rig).0;
+            assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
+            assert!(fastest < speed.abs() + 0.15, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
+            assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
+            assert!(at - rest < 0.12 * (speed.abs() + 0.15), "{start} after {after_ms} ms: {at} {rest} rad");
+            rig.run(100);
+            assert_eq!((rig.state(), rig.errors(), set(&rig)), (ControllerState::HoldPos, 0, (rest, 0.0)));
+            assert_eq!(rig.status().point, 0);
+            rig.exec(ExecCommand::Execute);
+            rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
+            assert_eq!(rig.errors(), 0);
+        }
+    }
 }
 
 /// An arm that is found a little beyond a position limit goes to a path inside.

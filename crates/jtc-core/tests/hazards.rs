@@ -133,7 +133,9 @@ fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
         last = v;
     }
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Pause, 0));
-    assert_eq!(rig.controller.telemetry().joints[0].set_position, rad(200));
+    // Beside point 0.
+    let set = rig.controller.telemetry().joints[0].set_position;
+    assert!(0.0 < set && set < rad(200), "{set}");
     rig.exec(ExecCommand::Execute);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
 }

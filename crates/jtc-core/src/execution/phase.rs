@@ -1,5 +1,6 @@
 //! The phases of an execution.
 use crate::motion::ControlMode;
+use crate::path::PathClock;
 use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::{JOINTS, TrajectoryState};
 
@@ -8,8 +9,9 @@ use crate::{JOINTS, TrajectoryState};
 pub(crate) enum Phase {
     /// Waits until every joint is enabled, and for how long it has, ms.
     Waiting { elapsed_ms: u32 },
-    /// The approach: from where the arm is held to the first point, or to the one where the path was paused.
-    Approaching { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<TrajectoryState> },
+    /// The approach: from where the arm is held to the first point, or to the one where the path was paused. Its time runs on a clock of
+    /// its own; `leave`: the state that follows at standstill.
+    Approaching { from: [f64; JOINTS], clock: PathClock, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
     AtStart,
     /// On the path; `leave`: the state that follows at standstill.
@@ -27,9 +29,9 @@ impl Remembered for Phase {
         to.put(kind, 2);
         match self {
             Self::Waiting { elapsed_ms } => elapsed_ms.write(to),
-            Self::Approaching { from, elapsed_ms, leave } => {
+            Self::Approaching { from, clock, leave } => {
                 from.write(to);
-                elapsed_ms.write(to);
+                clock.write(to);
                 leave.write(to);
             }
             Self::AtStart => {}
@@ -42,8 +44,8 @@ impl Remembered for Phase {
             0 => Self::Waiting { elapsed_ms: Remembered::read(from) },
             1 => {
                 let start = Remembered::read(from);
-                let elapsed_ms = Remembered::read(from);
-                Self::Approaching { from: start, elapsed_ms, leave: Remembered::read(from) }
+                let clock = Remembered::read(from);
+                Self::Approaching { from: start, clock, leave: Remembered::read(from) }
             }
             2 => Self::AtStart,
             _ => Self::Running { leave: Remembered::read(from) },
@@ -54,6 +56,11 @@ impl Remembered for Phase {
 impl Phase {
     /// Nothing was waited for yet.
     pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
+
+    /// Sets out from where the arm is held.
+    pub fn approach(from: [f64; JOINTS]) -> Self {
+        Self::Approaching { from, clock: PathClock::start(1.0), leave: None }
+    }
 
     /// The control mode.
     pub fn mode(&self) -> ControlMode {

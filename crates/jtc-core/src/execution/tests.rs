@@ -127,7 +127,7 @@ fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
 fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     let leave = Some(TrajectoryState::Stop);
     assert_eq!(Phase::Running { leave }.leave(), leave);
-    assert_eq!(Phase::Approaching { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
+    assert_eq!(Phase::Approaching { from: [0.0; JOINTS], clock: PathClock::start(1.0), leave }.leave(), leave);
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
@@ -173,10 +173,58 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     let length = f64::from(Config::avena().ramp_ms);
     for (before, arrives) in [(0.0, false), (length - 2.0, false), (length - 1.0, true)] {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-        controller.phase = Phase::Approaching { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
+        let clock = PathClock { time: before, ..PathClock::start(1.0) };
+        controller.phase = Phase::Approaching { from: [0.0; JOINTS], clock, leave: None };
         controller.walk();
         assert_eq!(controller.phase == Phase::AtStart, arrives, "{before} ms");
     }
+}
+
+/// On the approach to point 0 from this far, a Stop or Pause after so many ticks.
+#[test]
+fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point() {
+    for (way, after_ms) in [(0.02, 1), (0.02, 60), (0.02, 150), (-0.3, 60), (0.49, 60), (0.49, 250)] {
+        for (command, trajectory) in
+            [(ExecCommand::Stop, TrajectoryState::Stop), (ExecCommand::Pause, TrajectoryState::Pause)]
+        {
+            let mut controller = halting_at(0.0);
+            (controller.clock, controller.braking_ms) = (PathClock::default(), None);
+            controller.phase = Phase::approach([way, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            for _ in 0..after_ms {
+                controller.walk();
+            }
+            let set = |controller: &Controller<[RawPoint; 4]>| {
+                let point = &controller.motion.set.point;
+                (point.position[0], point.velocity[0])
+            };
+            let (at, speed) = set(&controller);
+            controller.leave_path(command);
+            let mut ticks = 0;
+            while controller.trajectory == TrajectoryState::Execute && ticks < 2_000 {
+                controller.walk();
+                ticks += 1;
+            }
+            let (rest, velocity) = set(&controller);
+            assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
+            assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
+            let moved = (at - rest) * way.signum();
+            // At most what is left; and where a path would stop that still gets faster for half of the ramp.
+            let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
+            assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
+            assert_eq!(controller.clock.time, 0.0, "the index stays");
+            // Nothing has moved that is not on its way.
+            assert_eq!(controller.motion.set.point.position[1..], [0.0; JOINTS - 1]);
+        }
+    }
+}
+
+#[test]
+fn j33_a_stop_before_the_approach_moves_nothing() {
+    let mut controller = halting_at(0.0);
+    controller.phase = Phase::approach([0.01; JOINTS]);
+    let before = controller.motion.set.point.position;
+    controller.leave_path(ExecCommand::Stop);
+    assert_eq!((controller.trajectory, controller.motion.set.point.position), (TrajectoryState::Stop, before));
 }
 
 #[test]

@@ -34,7 +34,7 @@ impl Limiter {
     }
 
     /// One tick: the computed `torque` within its limits, and the errors of torque and set values. What braking with all the
-    /// torque there is does to the torque, and on the path to position error and acceleration, is none (J-33).
+    /// torque there is does to the torque, and while a motion is commanded to position error and acceleration, is none (J-33).
     pub fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -43,9 +43,8 @@ impl Limiter {
     ) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
         let mut sags = None;
-        // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
-        let on_path = braking && mode == ControlMode::Follow;
-        let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
+        // Only while it is on its way: an arm that is pushed away from where it stands is not to be fought (J-66).
+        let excused = if braking && mode.moves() { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         let (q, v) = (nodes.positions(), nodes.velocities());
         let due = *set.due(config);
         let joints: [(f64, u16); JOINTS] = core::array::from_fn(|j| {

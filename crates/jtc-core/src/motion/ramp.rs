@@ -7,7 +7,7 @@ use crate::config::Config;
 use crate::deceleration::moves;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
-use crate::path::{Bounds, SlopeBounds};
+use crate::path::{Bounds, PathClock, SlopeBounds};
 use crate::remembered::remembered;
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
@@ -33,9 +33,30 @@ impl PathRamp {
         }
     }
 
+    /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `torque` as for `slope_bounds`.
+    pub fn step(
+        &self,
+        at: &SetPoint,
+        torque: &[JointTorque; JOINTS],
+        clock: &mut PathClock,
+        config: &Config,
+    ) {
+        if !clock.ramping() {
+            clock.slope = 0.0;
+            return;
+        }
+        let bounds = self.slope_bounds(at, torque, clock.rate, clock.slope, config);
+        let ramp_ms = f64::from(config.ramp_ms);
+        if clock.halting() {
+            clock.slow_down(ramp_ms, f64::from(config.stop_ms), &bounds);
+        } else {
+            clock.change_pace(ramp_ms, bounds.easy);
+        }
+    }
+
     /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
     /// has left is counted from the last `torque`, with all its parts: a joint that already falls behind has less.
-    pub fn slope_bounds(
+    fn slope_bounds(
         &self,
         at: &SetPoint,
         torque: &[JointTorque; JOINTS],

@@ -7,6 +7,7 @@ use crate::interpolation::SetPoint;
 use crate::jog::Jog;
 use crate::limits::JointConfig;
 use crate::nodes::Nodes;
+use crate::path::PathClock;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
@@ -76,7 +77,21 @@ impl SetValues {
 
     /// Joint velocities to move at from now on, rad/s.
     pub fn jog(&mut self, wanted: &[f64; JOINTS]) {
-        self.jog.get_or_insert_default().command(wanted);
+        self.jog.get_or_insert_with(Jog::begin).command(wanted);
+    }
+
+    /// A tick of a jog begins. Returns whether it begins to come to rest with it.
+    pub fn jog_ends(&mut self) -> bool {
+        self.jog.as_mut().is_some_and(Jog::ends)
+    }
+
+    /// A tick of a jog; `ramp` takes its clock on from what is commanded.
+    pub fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
+        let Some(jog) = &mut self.jog else { return };
+        jog.step(&mut self.point, config, ramp);
+        if jog.rests() {
+            self.jog = None;
+        }
     }
 
     /// What is jogged comes to rest.
@@ -181,13 +196,6 @@ impl SetValues {
     /// A tick of HoldPos: the held position.
     pub fn hold(&mut self, config: &Config) {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
-        if let Some(jog) = &mut self.jog {
-            (self.point.velocity, self.point.acceleration) = jog.step(&mut self.point.position, config);
-            if jog.rests() {
-                self.jog = None;
-            }
-            return;
-        }
         for j in 0..JOINTS {
             let Some(deceleration) = &mut self.deceleration[j] else { continue };
             let (position, velocity, rests) = deceleration.step(&config.joints[j]);
@@ -198,19 +206,7 @@ impl SetValues {
         }
     }
 
-    /// A tick of the approach from a held position to the first point, at `u` (0..1) of `length_ms`: a minimum-jerk
-    /// (fifth-order) polynomial.
-    pub fn approach(&mut self, from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) {
-        let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
-        let speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / (length_ms * DT);
-        for j in 0..JOINTS {
-            self.point.position[j] = from[j] + (to[j] - from[j]) * rise;
-            self.point.velocity[j] = (to[j] - from[j]) * speed;
-            self.point.acceleration[j] = 0.0;
-        }
-    }
-
-    /// A tick on the path: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
+    /// A tick on the path or of the approach: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
     pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {
@@ -229,6 +225,20 @@ impl SetValues {
             deceleration.shift(step);
         }
         step
+    }
+}
+
+/// The approach from a held position to a point, at `u` (0..1) of `length_ms`: a minimum-jerk (fifth-order) polynomial.
+pub(crate) fn approach(from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) -> SetPoint {
+    let (rest, length) = (1.0 - u, length_ms * DT);
+    let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+    let speed = 30.0 * u * u * rest * rest / length;
+    let curve = 60.0 * u * rest * (1.0 - 2.0 * u) / (length * length);
+    let way: [f64; JOINTS] = core::array::from_fn(|j| to[j] - from[j]);
+    SetPoint {
+        position: core::array::from_fn(|j| from[j] + way[j] * rise),
+        velocity: way.map(|way| way * speed),
+        acceleration: way.map(|way| way * curve),
     }
 }
 

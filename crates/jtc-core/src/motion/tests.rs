@@ -13,18 +13,16 @@ fn holding(joints: [bool; JOINTS], yielding: bool) -> Motion {
 }
 
 #[test]
-fn j34_on_the_approach_the_velocity_is_the_derivative_of_the_position() {
+fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_position() {
     let (from, to) = ([0.1, -0.2, 0.3, 0.0, 1.0, -1.0], [0.13, -0.2, 0.28, 0.05, 1.0, -0.96]);
-    let at = |ms: f64| {
-        let mut motion = Motion::default();
-        motion.set.approach(&from, &to, ms / 200.0, 200.0);
-        motion.set.point
-    };
+    let at = |ms: f64| approach(&from, &to, ms / 200.0, 200.0);
     for ms in 1..200 {
         let (before, now, after) = (at(f64::from(ms - 1)), at(f64::from(ms)), at(f64::from(ms + 1)));
         for j in 0..JOINTS {
             let rate = (after.position[j] - before.position[j]) / (2.0 * DT);
             assert!((now.velocity[j] - rate).abs() < 1e-4, "{ms} ms: {} {rate}", now.velocity[j]);
+            let change = (after.velocity[j] - before.velocity[j]) / (2.0 * DT);
+            assert!((now.acceleration[j] - change).abs() < 5e-2, "{ms} ms: {} {change}", now.acceleration[j]);
         }
     }
     assert_eq!((at(0.0).position, at(200.0).velocity), (from, [0.0; JOINTS]));

@@ -89,6 +89,7 @@ pub(crate) struct Dynamic {
     late_ticks: LateTicks,
     observed: Observed,
     hosts_silent_ms: u32,
+    jogs_refused_ms: u16,
 }
 
 remembered!(Dynamic {
@@ -111,6 +112,7 @@ remembered!(Dynamic {
     late_ticks,
     observed,
     hosts_silent_ms,
+    jogs_refused_ms,
 });
 
 /// The controller after a tick, as a log has it.
@@ -208,6 +210,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         late_ticks.write(to);
         observed.write(to);
         extensions.hosts_silent_ms.write(to);
+        extensions.jogs_refused_ms.write(to);
     }
 
     /// Goes on from a snapshot: this controller has the arm and, where it executes one, the trajectory of that time.
@@ -232,6 +235,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             late_ticks,
             observed,
             hosts_silent_ms,
+            jogs_refused_ms,
         } = snapshot.dynamic.clone();
         (self.state, self.errors, self.nodes) = (state, errors, nodes);
         live.put_into(&mut self.config);
@@ -244,6 +248,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (self.overtaking, self.uploads) = (overtaking, uploads);
         (self.late_ticks, self.observed) = (late_ticks, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;
+        self.extensions.jogs_refused_ms = jogs_refused_ms;
     }
 
     /// Hash of the points of a trajectory in memory.

@@ -131,7 +131,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let length = self.approach_ms(&from);
                 clock.advance(length);
                 let at = motion::approach(&from, &self.path_point(), clock.time / length, length);
-                self.motion.follow(&at, &mut clock, &self.config);
+                self.motion.approach(&at, &mut clock, &self.config);
                 let arrived = clock.time >= length;
                 if let Some(trajectory) = leave.filter(|_| arrived || clock.standing()) {
                     self.set_trajectory(trajectory);

@@ -190,11 +190,7 @@ mod tests {
     }
 
     /// A tick that moves `position` on, of joints without inertia: their velocities and accelerations.
-    fn tick(
-        jog: &mut Jog,
-        position: &mut [f64; JOINTS],
-        config: &Config,
-    ) -> ([f64; JOINTS], [f64; JOINTS]) {
+    fn tick(jog: &mut Jog, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
         let mut point = SetPoint::still(*position);
         jog.ends();
         let no_torque = Default::default();

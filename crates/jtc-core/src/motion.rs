@@ -102,7 +102,14 @@ impl Motion {
         }
     }
 
-    /// A tick on the path or of the approach, of which `at` are the full-speed values at the time of its clock (J-33).
+    /// A tick of the approach, of which `at` are the full-speed values at the time of its clock. The law is given the acceleration of the
+    /// clock's ramp, and leaves that of the approach itself to the feedback.
+    pub fn approach(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
+        self.ramp.step(at, &self.law.torque, clock, config);
+        self.set.follow(&SetPoint { acceleration: [0.0; JOINTS], ..*at }, clock.rate, clock.slope);
+    }
+
+    /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         self.ramp.step(at, &self.law.torque, clock, config);
         self.set.follow(at, clock.rate, clock.slope);

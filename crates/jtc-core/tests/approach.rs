@@ -47,7 +47,6 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
             let mut rig = Rig::holding();
             if taught_ms < 1_000 {
                 // It still moves: Teaching waits.
-                rig.apart[1] = true;
                 rig.nodes[1].report.velocity = 0.05;
             }
             assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
@@ -142,9 +141,10 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             });
             let rest = set(&rig).0;
             assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
-            assert!(fastest < speed.abs() + 0.15, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
+            // As on a path that still gets faster, the ramp takes over first.
+            assert!(fastest < speed.abs() + 0.4, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
             assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
-            assert!(at - rest < 0.12 * (speed.abs() + 0.15), "{start} after {after_ms} ms: {at} {rest} rad");
+            assert!(at - rest < 0.13 * fastest + 1e-3, "{start} after {after_ms} ms: {at} {rest} rad");
             rig.run(100);
             assert_eq!((rig.state(), rig.errors(), set(&rig)), (ControllerState::HoldPos, 0, (rest, 0.0)));
             assert_eq!(rig.status().point, 0);

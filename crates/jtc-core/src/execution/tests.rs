@@ -127,7 +127,10 @@ fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
 fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     let leave = Some(TrajectoryState::Stop);
     assert_eq!(Phase::Running { leave }.leave(), leave);
-    assert_eq!(Phase::Approaching { from: [0.0; JOINTS], clock: PathClock::start(1.0), leave }.leave(), leave);
+    assert_eq!(
+        Phase::Approaching { from: [0.0; JOINTS], clock: PathClock::start(1.0), leave }.leave(),
+        leave
+    );
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
@@ -173,7 +176,8 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     let length = f64::from(Config::avena().ramp_ms);
     for (before, arrives) in [(0.0, false), (length - 2.0, false), (length - 1.0, true)] {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-        let clock = PathClock { time: before, ..PathClock::start(1.0) };
+        let mut clock = PathClock::start(1.0);
+        clock.time = before;
         controller.phase = Phase::Approaching { from: [0.0; JOINTS], clock, leave: None };
         controller.walk();
         assert_eq!(controller.phase == Phase::AtStart, arrives, "{before} ms");
@@ -224,7 +228,10 @@ fn j33_a_stop_before_the_approach_moves_nothing() {
     controller.phase = Phase::approach([0.01; JOINTS]);
     let before = controller.motion.set.point.position;
     controller.leave_path(ExecCommand::Stop);
-    assert_eq!((controller.trajectory, controller.motion.set.point.position), (TrajectoryState::Stop, before));
+    assert_eq!(
+        (controller.trajectory, controller.motion.set.point.position),
+        (TrajectoryState::Stop, before)
+    );
 }
 
 #[test]

@@ -35,7 +35,7 @@ pub(crate) enum ControlMode {
 
 impl ControlMode {
     /// The commanded velocity and acceleration act.
-    fn moves(self) -> bool {
+    pub(super) fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
 }

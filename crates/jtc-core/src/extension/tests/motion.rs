@@ -97,15 +97,19 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         bench.controller.serve_host(&Inputs { host: &host(false), ..Inputs::QUIET });
         assert!(bench.controller.motion.set.jogging());
         let mut position = [0.0; JOINTS];
-        for _ in 0..50 {
-            bench.controller.motion.set.hold(&Config::avena());
-        }
+        let hold = |controller: &mut crate::controller::Controller<_>| {
+            if controller.motion.set.jog_ends() {
+                controller.begin_braking();
+            }
+            controller.motion.hold(&Config::avena());
+        };
+        (0..50).for_each(|_| hold(&mut bench.controller));
         let mut urgent = [jtc_wire::UrgentCommands::NONE; 2];
         urgent[1].push(command);
         bench.controller.serve_host(&Inputs { urgent, host: &host(true), ..Inputs::QUIET });
         let before = bench.controller.motion.set.point.velocity[2];
-        for _ in 0..2_000 {
-            bench.controller.motion.set.hold(&Config::avena());
+        for _ in 0..520 {
+            hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
             // The acceleration has to turn first.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");

@@ -174,7 +174,8 @@ fn j43_set_values_are_looked_at_where_the_law_holds_a_joint() {
         (ControlMode::Teach, false, true, 0),
         (ControlMode::Follow, false, true, joint_error::POSITION_ERROR),
         (ControlMode::Follow, true, true, 0),
-        (ControlMode::Approach, true, true, joint_error::POSITION_ERROR),
+        (ControlMode::Approach, false, true, joint_error::POSITION_ERROR),
+        (ControlMode::Approach, true, true, 0),
     ] {
         let mut arm = Arm::held(NONE);
         arm.motion.set.holding = [holding; JOINTS];

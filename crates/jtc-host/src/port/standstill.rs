@@ -10,9 +10,11 @@ use crate::words;
 /// An arm that did not move for this time stands.
 const STILL: Duration = Duration::from_millis(200);
 
-/// The arm follows a path, or a joint moves under torque.
+/// The arm follows a path or can be led by hand, or a joint moves under torque.
 pub fn is_moving(status: &Status) -> bool {
-    status.is_executing() || (has_torque(status) && words::moving_joint(status).is_some())
+    status.is_executing()
+        || status.state == ControllerState::Teaching
+        || (has_torque(status) && words::moving_joint(status).is_some())
 }
 
 /// A trajectory is paused, and can be resumed.

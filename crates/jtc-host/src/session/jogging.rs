@@ -6,8 +6,8 @@ use jtc_wire::{ControllerState, DataStatus, JOINTS, Status, TrajectoryState};
 
 use super::Session;
 use crate::error::{Error, LinkError, StateError};
-use crate::port::Port;
-use crate::words;
+use crate::port::halt::Halt;
+use crate::port::{Port, Standstill};
 
 /// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
 pub const JOG_AGAIN: Duration = Duration::from_millis(50);
@@ -81,13 +81,14 @@ impl<P: Port> Session<P> {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
             Err(error) => return Err(error),
         }
-        let end = self.now() + REST;
+        let (end, mut standstill) = (self.now() + REST, Standstill::after(Halt::Pause));
         loop {
             let status = self.next_status()?;
             if status.state == ControllerState::Error {
                 return Err(StateError::Device { status: Box::new(status) }.into());
             }
-            if words::moving_joint(&status).is_none() {
+            standstill.see(self.now(), &status);
+            if standstill.is_reached() {
                 return Ok(Some(status));
             }
             if self.now() > end {

@@ -22,8 +22,6 @@ pub use log::firmware_hash;
 /// Most values of a SetSettings frame in motion.
 const LIVE_MAX: usize = 4;
 
-/// Time without a Jog after which one is taken again when a jog was stopped, ms.
-const JOGS_REFUSED_MS: u16 = 500;
 /// Most values of a SetSettings frame under an arm that is held or taught: a payload has ten.
 const STANDING_MAX: usize = 16;
 
@@ -75,7 +73,7 @@ pub(crate) struct Extensions {
 impl Extensions {
     /// A jog was stopped: a key that is still held down moves nothing (J-58).
     pub fn refuse_jogs(&mut self) {
-        self.jogs_refused_ms = JOGS_REFUSED_MS;
+        self.jogs_refused_ms = crate::jog::LASTS_MS;
     }
 
     pub fn new() -> Self {
@@ -185,7 +183,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.extensions.refuse_jogs();
                 return Err(DataStatus::NotAllowed);
             }
-            self.braking_ms = None;
+        } else if !set.jogging() {
+            // There is nothing to end.
+            return Ok(());
         }
         if !set.jogging() {
             if self.motion.law.yielding() {

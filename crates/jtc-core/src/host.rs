@@ -162,7 +162,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             // J-53: a drive on a bench does not bear the load that the model has.
             Command::TeachingModeEnable
-                if self.state == ControllerState::HoldPos && !self.joints_absent() =>
+                if self.state == ControllerState::HoldPos && !self.joints_absent() && !received.overtaken =>
             {
                 self.teaching = true;
                 SliceOutcome::Done

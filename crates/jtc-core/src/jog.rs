@@ -11,7 +11,7 @@ use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Ticks without a new command after which the joints come to rest.
-const LASTS_MS: u16 = 200;
+pub(crate) const LASTS_MS: u16 = 200;
 /// Highest acceleration, as a share of the joint's limit.
 const ACCELERATION: f64 = 0.2;
 /// Time in which the acceleration gets there, s.
@@ -46,14 +46,11 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// New velocities, rad/s.
+    /// New velocities, rad/s. Those that come on the way to rest count when the joints stand.
     pub fn command(&mut self, wanted: &[f64; JOINTS]) {
         self.silent_ms = 0;
         for (joint, wanted) in self.joints.iter_mut().zip(wanted) {
             joint.wanted = *wanted;
-        }
-        if *wanted != [0.0; JOINTS] {
-            self.clock.go(1.0);
         }
     }
 
@@ -68,18 +65,21 @@ impl Jog {
         if self.silent_ms > LASTS_MS {
             self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
         }
-        let ends = self.joints.iter().all(|joint| joint.wanted == 0.0) && self.clock.is_going();
+        let ends = !self.is_wanted() && self.clock.is_going();
         if ends {
             self.clock.halt();
         }
         ends
     }
 
+    fn is_wanted(&self) -> bool {
+        self.joints.iter().any(|joint| joint.wanted != 0.0)
+    }
+
     /// Every joint rests, and is to.
     pub fn rests(&self) -> bool {
-        let rests =
-            |joint: &JointJog| joint.wanted == 0.0 && joint.velocity == 0.0 && joint.acceleration == 0.0;
-        self.clock.standing() || self.joints.iter().all(rests)
+        let rests = |joint: &JointJog| joint.velocity == 0.0 && joint.acceleration == 0.0;
+        !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
     /// A tick: moves `point` on; `ramp` takes the clock on, on its way to another rate.
@@ -92,14 +92,21 @@ impl Jog {
         let values = |joints: &[JointJog; JOINTS]| {
             (joints.map(|joint| joint.velocity), joints.map(|joint| joint.acceleration))
         };
+        if self.clock.standing() {
+            // What was commanded on the way to rest.
+            for joint in &mut self.joints {
+                (joint.velocity, joint.acceleration) = (0.0, 0.0);
+            }
+            self.clock = PathClock::start(1.0);
+        }
         let (velocity, acceleration) = values(&self.joints);
         let before = self.clock.rate;
         ramp(&SetPoint { position: point.position, velocity, acceleration }, &mut self.clock);
         let (rate, slope) = (self.clock.rate, self.clock.slope);
-        let tick = 0.5 * (before + rate) * DT;
+        let (tick, goes) = (0.5 * (before + rate) * DT, self.clock.is_going());
         let joints = self.joints.iter_mut().zip(point.position.iter_mut()).zip(&config.joints);
         for (j, ((joint, position), limits)) in joints.enumerate() {
-            joint.step(position, config.position_range(j), limits, tick);
+            joint.step(position, config.position_range(j), limits, tick, goes);
         }
         let (velocity, acceleration) = values(&self.joints);
         point.velocity = velocity.map(|velocity| velocity * rate);
@@ -108,10 +115,18 @@ impl Jog {
 }
 
 impl JointJog {
-    /// A tick that takes this time of the jog (s).
-    fn step(&mut self, position: &mut f64, (low, high): (f64, f64), limits: &JointConfig, tick: f64) {
+    /// A tick that takes this time of the jog (s), towards what is wanted if the jog `goes` on.
+    fn step(
+        &mut self,
+        position: &mut f64,
+        (low, high): (f64, f64),
+        limits: &JointConfig,
+        tick: f64,
+        goes: bool,
+    ) {
         let most = ACCELERATION * limits.acceleration_max;
-        let wanted = self.wanted.max(-limits.velocity_max).min(limits.velocity_max);
+        let wanted = if goes { self.wanted } else { 0.0 };
+        let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
         // As wanted, as long as the joint could still stop inside its range from there.
         let onward = self.toward(wanted, most, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(most);
@@ -422,21 +437,48 @@ mod tests {
         }
     }
 
-    /// A key that is pressed again before the arm stands.
+    /// A key that is pressed before the arm stands, the same, the opposite one or another: first the arm comes to rest, and no joint gets
+    /// faster on the way. What moves then keeps to the acceleration of a jog.
     #[test]
-    fn j58_a_jog_that_is_commanded_again_on_its_way_to_rest_goes_on() {
-        let config = config();
-        for ends_ms in [1, 40, 100, 150, 199] {
-            let (mut jog, mut position) = (Jog::begin(), [0.0; JOINTS]);
-            let mut velocities = std::vec::Vec::new();
-            for ms in 0..1_500 {
-                let released = (600..600 + ends_ms).contains(&ms);
-                jog.command(&[if released { 0.0 } else { 1.0 }, 0.0, 0.0, 0.0, 0.0, 0.0]);
-                velocities.push(tick(&mut jog, &mut position, &config).0[0]);
+    fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
+        let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];
+        for (acceleration_max, then, ends_ms) in [12.57, 2.0, 3.0]
+            .into_iter()
+            .flat_map(|most| then.map(|then| (most, then)))
+            .flat_map(|(most, then)| [1, 40, 100, 150, 199, 250].map(|ends_ms| (most, then, ends_ms)))
+        {
+            let mut config = config();
+            for joint in &mut config.joints {
+                (joint.acceleration_max, joint.position_min, joint.position_max) =
+                    (acceleration_max, -2.9, 2.9);
             }
-            assert!((velocities[1_499] - 1.0).abs() < 1e-9, "{ends_ms} ms: {}", velocities[1_499]);
-            let jump = velocities.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-            assert!(jump <= config.joints[0].acceleration_max * DT, "{ends_ms} ms: {jump} rad/s in a tick");
+            let what = std::format!("{acceleration_max} rad/s², {then:?} after {ends_ms} ms");
+            let (mut jog, mut position) = (Jog::begin(), [-2.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            let six = |[a, b]: [f64; 2]| [a, b, 0.0, 0.0, 0.0, 0.0];
+            let slow = acceleration_max < 10.0;
+            for _ in 0..if slow { 3_500 } else { 1_000 } {
+                jog.command(&six([1.0, 0.0]));
+                tick(&mut jog, &mut position, &config);
+            }
+            let (mut last, mut stands) = (f64::INFINITY, false);
+            for ms in 0..2_500 {
+                jog.command(&six(if ms < ends_ms { [0.0; 2] } else { then }));
+                let (v, a) = tick(&mut jog, &mut position, &config);
+                stands |= v == [0.0; JOINTS];
+                if !stands {
+                    assert!(v[0] <= last && v[1] == 0.0, "{what}: {last} {v:?} at {ms} ms");
+                    last = v[0];
+                } else {
+                    let most = ACCELERATION * acceleration_max + 1e-9;
+                    assert!(a.iter().all(|a| a.abs() <= most), "{what}: {a:?} at {ms} ms");
+                }
+                assert!(stands || ms <= 520, "{what}");
+                if jog.rests() {
+                    jog = Jog::begin();
+                }
+            }
+            let speeds = tick(&mut jog, &mut position, &config).0;
+            assert!((0..2).all(|j| slow || (speeds[j] - then[j]).abs() < 1e-9), "{what}: {speeds:?}");
         }
     }
 }

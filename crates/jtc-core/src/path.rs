@@ -80,9 +80,10 @@ impl PathClock {
         Self { rate: pace, target: pace, ..Self::default() }
     }
 
-    /// Standing, or on the way to it, and about to go at this rate.
+    /// Standing at the present time, about to go at this rate.
     pub fn go(&mut self, pace: f64) {
         self.target = pace;
+        self.slope = 0.0;
     }
 
     /// Another rate is wanted from now on; standstill that is wanted remains so. Returns whether path time begins to change its rate.

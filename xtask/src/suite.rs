@@ -56,8 +56,9 @@ fn build() -> Result<Vec<Program>> {
     Ok(programs)
 }
 
-/// Tests of one program that run at once, for each processor: most of them wait, too.
-const TESTS_FOR_A_PROCESSOR: usize = 2;
+/// Tests of one program of boards that run at once, for each processor: they wait for nearly all of their time. Of others one runs, which
+/// is usual: a simulated controller needs a good part of a processor, and is late when it does not get that.
+const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
 /// What `env` of the GNU tools is given to begin a program that heeds these signals.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
@@ -82,7 +83,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
     // A run behind `nohup` or in the background of a script ignores signals that tests send to what they start, and it inherits that.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let threads = (TESTS_FOR_A_PROCESSOR * processors).to_string();
+    let threads = (BOARD_TESTS_FOR_A_PROCESSOR * processors).to_string();
     // In the directory of its package, as cargo does.
     let run = |program: &Program, log: &Path| {
         let mut command = if heeds_signals {
@@ -93,7 +94,9 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
             shell::command(&program.executable)
         };
         command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
-        command.env("RUST_TEST_THREADS", &threads);
+        if program.package.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ucom")) {
+            command.env("RUST_TEST_THREADS", &threads);
+        }
         beside::run(&mut command, log)
     };
     beside::beside(programs, run, ended)?;

@@ -34,7 +34,7 @@ impl LinkArgs {
     /// inner error is that of a serial port which no agent of this user owns.
     pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
-            // Nobody answers there.
+            // The agent does not answer: a second attempt would only take time.
             ErrorKind::NoLink => Err(error),
             _ => self.open_as(None, false).map_err(|_| error),
         })

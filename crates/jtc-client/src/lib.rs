@@ -76,7 +76,7 @@ pub struct AgentPort {
     denied: Option<String>,
     /// The last Stop or Pause that this end knows of, by number, where there was one.
     halted: Option<u64>,
-    /// Those of others.
+    /// Stops and Pauses of other clients.
     halts: Halts,
 }
 
@@ -270,7 +270,7 @@ impl Port for AgentPort {
     }
 
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
-        // The agent refuses what follows for as long as nobody asks anew.
+        // Otherwise nothing is sent, and the agent goes on refusing motions.
         if halts == self.halts.all { self.ask_to_move() } else { Ok(()) }
     }
 

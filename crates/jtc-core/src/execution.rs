@@ -83,7 +83,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.begin_braking();
                 }
             }
-            // It comes to rest beside the point that it is on the way to.
+            // The arm comes to rest before it reaches the point.
             Phase::Approaching { clock, leave, .. } if clock.time > 0.0 => {
                 if leave.replace(to).is_none() {
                     clock.halt();

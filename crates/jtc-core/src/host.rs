@@ -283,7 +283,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         // J-30: also while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
-        // Who stops or pauses wants the arm held: Teaching ends, also one that is waited for.
+        // A Stop or a Pause holds the arm: it also ends Teaching, and calls off Teaching that has not begun.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         match (self.trajectory, command) {
             (_, ExecCommand::Stop | ExecCommand::Pause) if self.motion.set.jogging() => {

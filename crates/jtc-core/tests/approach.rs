@@ -46,7 +46,7 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
         for taught_ms in [0, 5, 1_000] {
             let mut rig = Rig::holding();
             if taught_ms < 1_000 {
-                // It still moves: Teaching waits.
+                // Teaching waits while a joint moves.
                 rig.nodes[1].report.velocity = 0.05;
             }
             assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
@@ -111,8 +111,8 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// A Stop or a Pause on the way to the first point, however far away that is: the arm slows down at once and stands beside it. The next
-/// Execute begins there.
+/// A Stop or a Pause on the approach: the arm slows down at once, and stands before it reaches the first point. The next Execute begins
+/// from there.
 #[test]
 fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     for (command, trajectory) in

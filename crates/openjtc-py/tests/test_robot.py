@@ -516,6 +516,6 @@ def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
             robot.wait_ready()
             run = robot.move([0.1, 0.2, -0.4, 0, 0.2, 0])
             assert run.outcome == "finished" and len(run) > 5
-        # Who has a token that is none is not let in.
+        # The agent refuses an unknown token.
         with pytest.raises(openjtc.RefusedError, match="does not let this program in"):
             openjtc.connect(url, token="x" * 30)

@@ -351,7 +351,7 @@ mod tests {
             }
         }
         assert!(gone > 0 && there > 20, "{gone} {there}");
-        // What was neither measured nor failed is not called failed.
+        // A figure that nobody tried to measure did not fail.
         let (text, _) = ROWS[0].judge(&Figures::new(), &Failed::default(), true);
         assert!(text.ends_with("| not measured |"), "{text}");
     }

@@ -442,7 +442,7 @@ fn directly(
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
-        end_teaching(&mut session)?;
+        session.end_teaching().map_err(confirmed)?;
     }
     let (start, mut standstill) = (session.now(), Standstill::after(Halt::Stop));
     let mut written_at = start;
@@ -450,7 +450,7 @@ fn directly(
         let status = session.next_status().map_err(|error| confirmed(error.into()))?;
         if session.now().saturating_sub(written_at) >= AGAIN {
             if is_taught(&status) {
-                end_teaching(&mut session)?;
+                session.end_teaching().map_err(confirmed)?;
             } else if is_paused(&status) {
                 match session.stop() {
                     // The next statuses show what the controller does.
@@ -474,14 +474,6 @@ fn directly(
             let end = End::of(&status, &standstill);
             return Err(NotHalted::after(Sent::Confirmed, still_moving(&end)));
         }
-    }
-}
-
-/// An agent that denies it has ended the teaching of another client itself.
-fn end_teaching(session: &mut Session<LinkPort>) -> Result<(), NotHalted> {
-    match session.teach(false) {
-        Ok(()) | Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
-        Err(error) => Err(NotHalted::after(Sent::Confirmed, error)),
     }
 }
 

@@ -43,7 +43,7 @@ impl Limiter {
     ) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
         let mut sags = None;
-        // Only while it is on its way: an arm that is pushed away from where it stands is not to be fought (J-66).
+        // Only while set values move: an arm that stands gives way to a push (J-66).
         let excused =
             if braking && mode.moves() { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         let (q, v) = (nodes.positions(), nodes.velocities());

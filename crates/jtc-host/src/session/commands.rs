@@ -127,6 +127,18 @@ impl<P: Port> Session<P> {
         Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
     }
 
+    /// Ends teaching, whoever has switched it on.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::teach`], except a denial: an agent that denies this has ended the teaching of its other client itself.
+    pub fn end_teaching(&mut self) -> Result<(), Error> {
+        match self.teach(false) {
+            Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
+            ended => ended,
+        }
+    }
+
     /// Teaching on, and no more waiting for it once `ended` returns true. Teaching that does not begin is switched off again: the controller
     /// would begin it as soon as the arm rests, when nobody reckons with an arm that gives way.
     ///

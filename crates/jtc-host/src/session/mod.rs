@@ -296,8 +296,9 @@ impl<P: Port> Session<P> {
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record; frames that arrive damaged, or without a record, are sent again. One that sets the arm in
-    /// motion, or lets go of it, is not sent again without a record: it may have arrived, and another line may have stopped the arm since. Not public: a frame can start a motion.
+    /// Sends a frame and waits for its record. A frame that arrived damaged, or whose record does not come, is sent again. Execute and
+    /// TeachingModeEnable are sent again only if they arrived damaged: without a record they may have been executed, and the arm may have
+    /// been stopped on another line since. Not public: a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;

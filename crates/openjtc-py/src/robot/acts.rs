@@ -50,11 +50,7 @@ impl Machine {
                 return Err(Failure::fault("still-moving", what, "press the emergency stop"));
             }
             if status.state == ControllerState::Teaching {
-                match self.session.teach(false) {
-                    // An agent has ended that of another client itself.
-                    Ok(()) | Err(Error::Link(LinkError::Denied { .. })) => {}
-                    Err(error) => return Err(error.into()),
-                }
+                self.session.end_teaching()?;
             }
         }
         self.shared.set_moves(false);

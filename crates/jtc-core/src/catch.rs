@@ -24,6 +24,8 @@ pub(crate) struct Catch {
     left_ms: u16,
     /// Time left until the joint counts as caught, ms.
     busy_ms: u16,
+    /// The joint has been calm for that long since it was enabled.
+    settled: bool,
     /// How far the set position has sagged, rad: in one direction only.
     sag: f64,
     /// Highest speed of this half of a swing, with its sign, and of the half before, rad/s.
@@ -31,7 +33,7 @@ pub(crate) struct Catch {
     peak_before: f64,
 }
 
-remembered!(Catch { left_ms, busy_ms, sag, peak, peak_before });
+remembered!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before });
 
 impl Catch {
     /// The joint was just enabled.
@@ -44,13 +46,18 @@ impl Catch {
         self.left_ms > 0 && self.busy_ms > 0
     }
 
+    /// The joint has been at rest, within its torque limit, since it was enabled.
+    pub fn settled(&self) -> bool {
+        self.settled
+    }
+
     /// One tick, with the measured velocity (rad/s): whether a load may still be caught. A swing that grows is no load that comes to
     /// rest but a loop that is unstable, and the catch is over.
     pub fn step(&mut self, velocity: f64) -> bool {
-        if self.left_ms == 0 {
+        if self.settled && self.left_ms == 0 {
             return false;
         }
-        self.left_ms -= 1;
+        self.left_ms = self.left_ms.saturating_sub(1);
         let speed = velocity.abs();
         if moves(velocity) {
             self.busy_ms = CALM_MS;
@@ -62,11 +69,22 @@ impl Catch {
         } else {
             // Noise around standstill is no half of a swing: the fall that follows it has not grown out of it.
             self.busy_ms = self.busy_ms.saturating_sub(1);
+            self.settled |= self.busy_ms == 0;
         }
-        if self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING) {
-            *self = Self::default();
+        if self.swing_grows() {
+            self.left_ms = 0;
         }
         self.left_ms > 0
+    }
+
+    /// The swing has grown from one half to the next: the loop is unstable.
+    pub fn swing_grows(&self) -> bool {
+        self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
+    }
+
+    /// It is over, and the joint has not settled.
+    fn ended() -> Self {
+        Self { busy_ms: CALM_MS, ..Self::default() }
     }
 
     /// The computed torque exceeds the limit by `excess` (N·m) at a position error of `error` (rad): returns by how much the set
@@ -79,7 +97,7 @@ impl Catch {
         let sag = self.sag + step;
         let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
         if !good {
-            *self = Self::default();
+            *self = Self::ended();
             return 0.0;
         }
         (self.sag, self.busy_ms) = (sag, CALM_MS);

@@ -68,12 +68,17 @@ pub struct Config {
     pub stop_ms: u16,
     /// How long a pause or stop may brake with all the torque there is, ms; an arm that still moves then is an error (J-33).
     pub braking_ms_max: u16,
-    /// After a position error: what the control law may add to the torque of the model, as a share of the joint's torque limit (J-66).
+    /// Torque with which a joint that yields answers a slow push, as a share of its torque limit (J-68); a feedback torque beyond it is
+    /// a push (J-66).
     pub yield_torque_share: f64,
-    /// In how many of any 100 ms a computed torque may ask for more than its limit before it is an error (J-43). Meanwhile the
-    /// limit is commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded
-    /// trajectory makes a peak of a few milliseconds, for which a loaded arm should not be dropped.
+    /// In how many of any 100 ms a computed torque may ask for more than its limit before the joint is overloaded (J-43). Meanwhile
+    /// the limit is commanded and the integral held; 0: in the tick that finds it. A single point missing in a recorded trajectory
+    /// makes a peak of a few milliseconds.
     pub torque_over_ms: u16,
+    /// An overloaded joint releases the arm, as the manual has it, rather than that the controller reacts to it (J-43, J-66).
+    pub torque_release: bool,
+    /// A held stop is over only when the host has cleared it (J-69).
+    pub protective_stop_latches: bool,
     /// How long after a joint was enabled at most its torque may stay at the limit without an error, ms (J-43): what it carries
     /// need not be known before, and has to be caught.
     pub catch_ms_max: u16,

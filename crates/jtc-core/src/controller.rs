@@ -156,7 +156,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // J-60: what HoldPos finds missing is known when the payload is in the model.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
-                && self.motion.may_be_taught(&self.config),
+                && self.motion.may_be_taught(&self.config, self.errors.held_stop()),
             execute: self.trajectory == TrajectoryState::Execute,
         }
     }
@@ -178,6 +178,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::Error | ControllerState::Init | ControllerState::Start => {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
+                self.errors.end_held_stop();
                 // A pump that does not run on is off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
@@ -185,7 +186,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.end_teaching(&self.nodes, &self.config, &self.parameters.pid);
             }
             ControllerState::Teaching => {
-                self.motion.law.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics)
+                let contact = self.errors.held_stop();
+                self.motion.law.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics, contact);
             }
             ControllerState::HoldPos | ControllerState::Operate => {}
         }

@@ -50,6 +50,8 @@ impl Config {
             overspeed_ms: 5,
             yield_torque_share: 0.3,
             torque_over_ms: 10,
+            torque_release: false,
+            protective_stop_latches: true,
             catch_ms_max: 1_000,
             blend_ms: 100,
             teach_velocity_max: 1.0,

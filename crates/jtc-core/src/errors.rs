@@ -14,6 +14,8 @@ pub(crate) struct Errors {
     /// Internal error word per joint.
     joints: [u16; JOINTS],
     joints_occurred: [u16; JOINTS],
+    /// Causes of a held stop per joint, until the host clears them (J-69).
+    held: [u16; JOINTS],
     /// CAN flags that are errors.
     can: u32,
     /// CAN flags that are shown only, as they are now.
@@ -28,6 +30,7 @@ remembered!(Errors {
     external_joints,
     joints,
     joints_occurred,
+    held,
     can,
     can_shown,
     can_occurred,
@@ -62,12 +65,24 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Errors that the controller acted upon without going to Error (J-66): they have occurred, and are not current.
-    pub fn note_joints(&mut self, bits: &[u16; JOINTS]) {
-        for (noted, bits) in self.joints_occurred.iter_mut().zip(bits) {
-            *noted |= bits;
+    /// Causes of a held stop (J-69): they have occurred. Where it `latches` they are shown until the host clears them; the safety
+    /// output stays 1.
+    pub fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
+        for j in 0..JOINTS {
+            self.joints_occurred[j] |= causes[j];
+            self.held[j] |= if latches { causes[j] } else { 0 };
         }
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
+    }
+
+    /// A held stop is latched: nothing moves until the host clears it.
+    pub fn held_stop(&self) -> bool {
+        any(&self.held)
+    }
+
+    /// Without torque there is nothing to hold.
+    pub fn end_held_stop(&mut self) {
+        self.held = [0; JOINTS];
     }
 
     pub fn raise_can(&mut self, flags: u32) {
@@ -91,6 +106,7 @@ impl Errors {
         self.device = false;
         self.external_joints = false;
         self.joints = [0; JOINTS];
+        self.held = [0; JOINTS];
         self.can = 0;
     }
 
@@ -114,7 +130,7 @@ impl Errors {
         bit(self.emergency_input, error::EMERGENCY_INPUT)
             | bit(self.internal(), error::EMERGENCY_OUTPUT | error::INTERNAL)
             | bit(self.emergency_input || self.external_joints, error::EXTERNAL)
-            | bit(any(&self.joints), error::INTERNAL_JOINTS)
+            | bit(any(&self.joints) || any(&self.held), error::INTERNAL_JOINTS)
             | bit(self.can != 0, error::INTERNAL_CAN)
             | bit(self.external_joints, error::EXTERNAL_JOINTS)
     }
@@ -125,7 +141,8 @@ impl Errors {
 
     /// Current and occurred word of a joint.
     pub fn joint(&self, joint: usize) -> (u16, u16) {
-        (self.joints.get(joint).copied().unwrap_or(0), self.joints_occurred.get(joint).copied().unwrap_or(0))
+        let of = |words: &[u16; JOINTS]| words.get(joint).copied().unwrap_or(0);
+        (of(&self.joints) | of(&self.held), of(&self.joints_occurred))
     }
 
     /// Current and occurred CAN flags.
@@ -172,11 +189,22 @@ mod tests {
         }
     }
 
+    /// The cause of a held stop has occurred, and is shown as current where it latches; it is no error, and the safety output stays 1.
     #[test]
-    fn j66_what_was_acted_upon_has_occurred_and_is_not_current() {
-        let mut errors = Errors::default();
-        errors.note_joints(&[0, 2, 0, 0, 0, 0]);
-        assert_eq!((errors.word(), errors.occurred()), (0, error::INTERNAL | error::INTERNAL_JOINTS));
-        assert_eq!((errors.joint(0), errors.joint(1)), ((0, 0), (0, 2)));
+    fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
+        for latches in [false, true] {
+            let mut errors = Errors::default();
+            errors.hold_joints(&[0, 2, 0, 0, 0, 0], latches);
+            let word = if latches { error::INTERNAL_JOINTS } else { 0 };
+            assert_eq!((errors.word(), errors.occurred()), (word, error::INTERNAL | error::INTERNAL_JOINTS));
+            assert_eq!((errors.joint(0), errors.joint(1)), ((0, 0), (if latches { 2 } else { 0 }, 2)));
+            assert_eq!((errors.held_stop(), errors.any(), errors.internal()), (latches, false, false));
+            let mut released = errors;
+            released.end_held_stop();
+            errors.clear_current();
+            for errors in [errors, released] {
+                assert_eq!((errors.held_stop(), errors.word(), errors.joint(1)), (false, 0, (0, 2)));
+            }
+        }
     }
 }

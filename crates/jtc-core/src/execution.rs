@@ -20,7 +20,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.clock = PathClock::default();
         self.phase = Phase::BEGIN;
         self.braking_ms = None;
-        self.motion.law.stand_firm();
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
@@ -37,16 +36,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !self.near(&paused) {
             return Err(DataStatus::StartPositionMismatch);
         }
-        if self.motion.law.yielding() && !self.motion.set.all_holding() {
-            // It still comes to rest.
-            return Err(DataStatus::NotAllowed);
-        }
         self.braking_ms = None;
-        if self.motion.law.yielding() {
-            // It is held somewhere beside the path; its way back begins where it is.
-            self.motion.begin_at(self.nodes.positions());
-            self.motion.law.stand_firm();
-        }
         self.phase = if self.clock.time == 0.0 || self.parameters.blend_left_ms() > 0 {
             Phase::BEGIN
         } else if self.motion.set.point.position == paused {
@@ -225,7 +215,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let still = self.trajectory != TrajectoryState::Execute && stands;
         let over = ms >= self.config.braking_ms_max;
         if over && self.trajectory == TrajectoryState::Execute {
-            self.errors.raise_joints(&moving.map(|moves| if moves { joint_error::TORQUE } else { 0 }));
+            let causes = moving.map(|moves| if moves { joint_error::TORQUE } else { 0 });
+            if self.config.torque_release {
+                self.errors.raise_joints(&causes);
+            } else {
+                // The path stands, and what still moves is let down (J-70).
+                for j in (0..JOINTS).filter(|j| moving[*j]) {
+                    self.begin_yield(j, true);
+                }
+                self.hold_stop(&causes);
+                self.clock.rest();
+                self.set_trajectory(self.phase.leave().unwrap_or(TrajectoryState::Pause));
+            }
         }
         self.braking_ms = if over || still { None } else { Some(ms + 1) };
         self.braking_ms.is_some()

@@ -163,6 +163,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && self.trajectory != TrajectoryState::Pause
             && self.trajectory != TrajectoryState::Execute
             && self.parameters.blend_left_ms() == 0
+            && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
             return Err(DataStatus::NotAllowed);
@@ -188,11 +189,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Ok(());
         }
         if !set.jogging() {
-            if self.motion.law.yielding() {
-                // It is held somewhere else than it was commanded; it begins where it is.
-                self.motion.begin_at(self.nodes.positions());
-                self.motion.law.stand_firm();
-            }
             self.motion.law.change_mode();
         }
         self.motion.set.jog(&wanted);

@@ -148,7 +148,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
                 && !jogging;
         match command {
+            // J-69: what the controller reacts to is not gone yet.
+            Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
+                if self.is_reacting() =>
+            {
+                SliceOutcome::Refused(DataStatus::NotAllowed)
+            }
             Command::ClearCurrentErrors { jtc, nodes } => {
+                if jtc {
+                    self.motion.law.end_yields();
+                }
                 let ordered = self.nodes.clear(nodes, !self.powered());
                 if ordered && jtc {
                     self.errors.clear_current();
@@ -157,7 +166,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
                 SliceOutcome::Done
             }
-            Command::ClearOccurredErrors => self.clear_errors(Errors::clear_occurred).into(),
+            Command::ClearOccurredErrors => {
+                self.motion.law.end_yields();
+                self.clear_errors(Errors::clear_occurred).into()
+            }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             // J-53: a drive on a bench does not bear the load that the model has.
@@ -230,10 +242,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
         match *command {
             Command::PidParam(floats) => {
-                parameters.take_pid(&floats, config).map(|()| motion.law.change_mode()).into()
+                parameters.take_pid(&floats, config).map(|()| motion.law.change_gains()).into()
             }
             Command::PidParamUseDefault => {
-                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_mode()).into()
+                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_gains()).into()
             }
             Command::ArmModel(floats) => parameters
                 .take_model(&floats, self.nodes.known_positions(), config)
@@ -260,7 +272,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
         match frame_type {
             FrameType::PidParamUseDefault => {
-                parameters.take_pid(&arm.pid, config).map(|()| motion.law.change_mode()).into()
+                parameters.take_pid(&arm.pid, config).map(|()| motion.law.change_gains()).into()
             }
             FrameType::ArmModelUseDefault => parameters
                 .take_model(&arm.model, self.nodes.known_positions(), config)
@@ -272,6 +284,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
             },
         }
+    }
+
+    /// J-69: a held stop is latched, or a joint yields.
+    pub(crate) fn stops_held(&self) -> bool {
+        self.errors.held_stop() || (0..JOINTS).any(|j| self.motion.law.yields(j))
     }
 
     /// J-53: joints are set absent.
@@ -299,7 +316,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             // Teaching was accepted, and begins as soon as the arm is held; or joints are absent (J-53).
             (_, ExecCommand::Execute)
-                if self.teaching || self.motion.set.jogging() || self.joints_absent() =>
+                if self.teaching
+                    || self.motion.set.jogging()
+                    || self.joints_absent()
+                    || self.stops_held() =>
             {
                 Err(DataStatus::NotAllowed)
             }

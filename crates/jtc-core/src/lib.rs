@@ -21,6 +21,7 @@ mod io;
 mod jog;
 mod late;
 mod limits;
+mod load;
 mod motion;
 mod nodes;
 mod overspeed;
@@ -41,6 +42,7 @@ mod store;
 mod teach;
 mod telemetry;
 mod tick;
+mod yielding;
 
 pub use bounds::{OutOfBounds, ParameterBounds};
 pub use check::{TrajectoryCheck, Violation};

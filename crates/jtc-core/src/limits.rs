@@ -25,46 +25,70 @@ pub struct JointConfig {
     pub torque_gain: f64,
 }
 
-/// Ticks in which torque at its limit is counted.
+/// Ticks that are looked back upon.
 const WINDOW: u16 = 100;
+
+/// How many of the last [`WINDOW`] ticks had something.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Recent {
+    /// Which of them; the last tick is bit 0.
+    history: u128,
+    count: u16,
+}
+
+remembered!(Recent { history, count });
+
+impl Recent {
+    /// Counts a tick. Returns whether it `has` that, and more than `most` of the last 100 ticks have.
+    #[inline]
+    pub fn exceeds(&mut self, has: bool, most: u16) -> bool {
+        if has | (self.count > 0) {
+            let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
+            self.history = self.history << 1 | u128::from(has);
+            self.count = self.count + u16::from(has) - oldest;
+        }
+        has & (self.count > most)
+    }
+
+    /// Nothing is remembered.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+}
 
 /// Whether a joint's torque is at its limit, and how often it has been of late.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
     /// The last torque was beyond the limit: the integral is held (J-41).
     pub saturated: bool,
-    /// Which of the last [`WINDOW`] ticks that was the case in; the last tick is bit 0.
-    history: u128,
-    /// How many of them.
-    over_ms: u16,
+    over: Recent,
 }
 
-remembered!(Saturation { saturated, history, over_ms });
+remembered!(Saturation { saturated, over });
 
 impl Saturation {
-    /// The torque to command, within its limit, and the joint error of computed torques beyond it: in more than `over_ms_max`
-    /// of the last 100 ticks, whichever sign they had. With the error, and for NaN, no torque is commanded. While the arm is
-    /// `braking` with all the torque there is (J-33), nothing is counted.
+    /// The torque to command, within its limit, and whether the joint is overloaded: computed torques were beyond the limit in more
+    /// than `over_ms_max` of the last 100 ticks, whichever sign they had. For NaN no torque is commanded. While the arm is `braking`
+    /// with all the torque there is (J-33), nothing is counted.
     pub fn limit(
         &mut self,
         torque: f64,
         limits: &JointConfig,
         over_ms_max: u16,
         braking: bool,
-    ) -> (f64, u16) {
+    ) -> (f64, bool) {
         let limit = limits.torque_max;
         // Written so that NaN is beyond.
         let within = torque.abs() <= limit;
         self.saturated = !within;
-        let counted = self.saturated & !braking;
-        if counted | (self.over_ms > 0) {
-            let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
-            self.history = self.history << 1 | u128::from(counted);
-            self.over_ms = self.over_ms + u16::from(counted) - oldest;
-        }
-        let error = torque.is_nan() | (counted & (self.over_ms > over_ms_max));
+        let overloaded = self.over.exceeds(self.saturated & !braking, over_ms_max);
         let limited = torque.max(-limit).min(limit);
-        (if error { 0.0 } else { limited }, bit(!error, joint_error::TORQUE))
+        (if torque.is_nan() { 0.0 } else { limited }, overloaded)
+    }
+
+    /// What was counted is forgotten.
+    pub fn forget(&mut self) {
+        self.over.forget();
     }
 }
 
@@ -81,6 +105,12 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(velocity.abs() <= limits.velocity_max + ROUNDING, joint_error::VELOCITY)
         | bit(acceleration.abs() <= limits.acceleration_max, joint_error::ACCELERATION)
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
+}
+
+/// As much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
+pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
+    let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
+    wanted.max(low).min(high)
 }
 
 fn bit(good: bool, bit: u16) -> u16 {
@@ -108,7 +138,7 @@ mod tests {
             | joint_error::POSITION_ERROR;
         assert_eq!(check_set((nan, nan, nan), nan, &limits(), true), all);
         assert_eq!(check_set((0.0, 0.0, 0.0), nan, &limits(), true), joint_error::POSITION_ERROR);
-        assert_eq!(Saturation::default().limit(nan, &limits(), 10, false), (0.0, joint_error::TORQUE));
+        assert_eq!(Saturation::default().limit(nan, &limits(), 10, false), (0.0, false));
     }
 
     #[test]
@@ -125,22 +155,27 @@ mod tests {
             assert_eq!(check_set(set, 0.0, &l, false), three & !joint_error::POSITION);
             let error = beyond(s * l.position_error_max);
             assert_eq!(check_set((0.0, 0.0, 0.0), error, &l, true), joint_error::POSITION_ERROR);
-            assert_eq!(Saturation::default().limit(s * l.torque_max, &l, 0, false), (s * l.torque_max, 0));
+            assert_eq!(
+                Saturation::default().limit(s * l.torque_max, &l, 0, false),
+                (s * l.torque_max, false)
+            );
         }
     }
 
     #[test]
-    fn j43_too_much_torque_is_an_error_after_its_time() {
+    fn j43_a_joint_is_overloaded_after_its_time() {
         let (l, mut saturation) = (limits(), Saturation::default());
         for _ in 0..3 {
-            assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, 0));
+            assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
             assert!(saturation.saturated);
         }
         // A tick within the limit is none, but does not start the time anew.
-        assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, 0));
+        assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, false));
         assert!(!saturation.saturated);
-        assert_eq!(saturation.limit(-INF, &l, 3, false), (0.0, joint_error::TORQUE));
-        assert_eq!(Saturation::default().limit(INF, &l, 0, false), (0.0, joint_error::TORQUE));
+        assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, true));
+        assert_eq!(Saturation::default().limit(INF, &l, 0, false), (l.torque_max, true));
+        saturation.forget();
+        assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
     }
 
     #[test]
@@ -151,7 +186,7 @@ mod tests {
             let mut good = true;
             for k in 0..1_000 {
                 let torque = if k % period == 0 { if k % 2 == 0 { INF } else { -INF } } else { 0.0 };
-                good &= saturation.limit(torque, &l, 10, false).1 == 0;
+                good &= !saturation.limit(torque, &l, 10, false).1;
             }
             assert_eq!(good, allowed, "one tick of {period}");
         }
@@ -159,23 +194,23 @@ mod tests {
         let (l, mut saturation) = (limits(), Saturation::default());
         for k in 0..1_000 {
             let torque = if k % 100 < 10 { INF } else { 0.0 };
-            assert_eq!(saturation.limit(torque, &l, 10, false).1, 0, "tick {k}");
+            assert!(!saturation.limit(torque, &l, 10, false).1, "tick {k}");
         }
     }
 
     #[test]
-    fn j33_torque_at_its_limit_is_no_error_while_braking() {
+    fn j33_torque_at_its_limit_is_no_overload_while_braking() {
         let (l, mut saturation) = (limits(), Saturation::default());
         for _ in 0..1_000 {
-            assert_eq!(saturation.limit(INF, &l, 10, true), (l.torque_max, 0));
+            assert_eq!(saturation.limit(INF, &l, 10, true), (l.torque_max, false));
             assert!(saturation.saturated);
         }
-        assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, joint_error::TORQUE));
+        assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, false));
         // What it did then is not held against it later.
         for _ in 0..10 {
-            assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, 0));
+            assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
-        assert_eq!(saturation.limit(INF, &l, 10, false), (0.0, joint_error::TORQUE));
+        assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, true));
     }
 
     proptest! {
@@ -183,10 +218,9 @@ mod tests {
         fn j43_no_torque_beyond_the_limit_is_commanded(torques in prop::collection::vec(prop::num::f64::ANY, 1..50)) {
             let (l, mut saturation) = (limits(), Saturation::default());
             for torque in torques {
-                let (commanded, error) = saturation.limit(torque, &l, 10, false);
+                let commanded = saturation.limit(torque, &l, 10, false).0;
                 prop_assert!(commanded.abs() <= l.torque_max);
                 prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
-                prop_assert!(error == 0 || commanded == 0.0);
                 // Never against what was computed: compared by sign, because 0·∞ is no number.
                 prop_assert!(torque.is_nan() || commanded == 0.0 || (commanded > 0.0) == (torque > 0.0));
             }

@@ -10,6 +10,8 @@ mod set_values;
 mod torque;
 mod transfer;
 
+use jtc_dynamics::Dynamics;
+
 use crate::JOINTS;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
@@ -21,7 +23,8 @@ use crate::remembered::remembered;
 pub(crate) use commanded::Commanded;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
-use limiter::Limiter;
+pub(crate) use limiter::Found;
+use limiter::{Limited, Limiter};
 use ramp::PathRamp;
 use set_values::SetValues;
 pub(crate) use set_values::approach;
@@ -54,29 +57,32 @@ impl Motion {
         *ramp = PathRamp::default();
     }
 
-    /// Whatever comes next begins at rest at `position`.
-    pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
-        self.set.begin_at(position);
-        self.law.begin();
-    }
-
     /// Begin to hold where the arm is, coming to rest first if it moves.
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
         self.set.hold_measured(nodes, config);
         self.law.begin();
     }
 
-    /// Hold where the arm is, and give way to what moves it from there (J-66).
-    pub fn give_way(&mut self, nodes: &Nodes, config: &Config) {
-        self.hold_measured(nodes, config);
-        self.law.give_way();
+    /// A joint yields from the next tick on (J-68), or lowers its load (J-70).
+    pub fn begin_yield(
+        &mut self,
+        joint: usize,
+        lowers: bool,
+        nodes: &Nodes,
+        config: &Config,
+        dynamics: &Dynamics,
+    ) {
+        let limits = &config.joints[joint];
+        let inertia = dynamics.mass_matrix(nodes.positions())[joint][joint] + limits.rotor_inertia;
+        self.law.begin_yield(joint, lowers, self.set.point.position[joint], inertia, limits.torque_max);
+        self.limiter.forget(joint);
     }
 
-    /// The arm is held at rest. What it carries is known, or is none of it: an arm that gives way has more likely a contact
-    /// against it.
-    pub fn may_be_taught(&self, config: &Config) -> bool {
+    /// The arm is held at rest, and what it carries is known, or may be a `contact` and is none of it.
+    pub fn may_be_taught(&self, config: &Config, contact: bool) -> bool {
         self.set.all_holding()
-            && (self.law.yielding || self.law.unwinds_ms > 0 || self.law.payload.is_known(config))
+            && !self.law.is_yielding()
+            && (contact || self.law.unwinds_ms > 0 || self.law.payload.is_known(config))
     }
 
     /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.
@@ -115,20 +121,32 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// A tick of the control law and of its limits: torques to command, and joint errors found on the way.
-    pub fn control(&mut self, inputs: &LawInputs<'_>) -> ([f64; JOINTS], [u16; JOINTS]) {
+    /// A tick of the control law and of its limits: torques to command, and what was found on the way.
+    pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
+        let positions = inputs.nodes.positions();
+        for (j, position) in positions.iter().enumerate() {
+            if let Some(set) = self.law.drag(j, *position) {
+                self.set.lead(j, set);
+            }
+        }
         self.set.commanded.put(&self.set.point);
         let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
-        let mut limited = self.limiter.step(inputs, &self.law.torque, &mut self.set);
+        let mut limited = self.limiter.step(inputs, &self.law, &mut self.set);
         if let Some(sag) = &limited.sag {
             self.law.sag(sag);
         }
-        for (j, error) in limited.errors.iter_mut().enumerate() {
+        for (j, found) in limited.found.iter_mut().enumerate() {
             if inputs.nodes.node(j).enabled() {
-                *error |= missing[j];
+                found.errors |= missing[j];
             }
         }
-        (limited.torque, limited.errors)
+        let ended = self.law.end_of_yields(inputs.parameters.pid);
+        for (j, position) in positions.iter().enumerate() {
+            if ended[j] {
+                self.set.lead(j, *position);
+            }
+        }
+        limited
     }
 }
 

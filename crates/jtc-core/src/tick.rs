@@ -4,7 +4,7 @@ use jtc_wire::{RawPoint, Response};
 
 use crate::controller::Controller;
 use crate::io::{Inputs, Outputs};
-use crate::motion::{ControlMode, LawInputs};
+use crate::motion::{ControlMode, Found, LawInputs};
 use crate::{ControllerState, JOINTS};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -136,22 +136,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
-        let (mut torque, mut errors) = self.compute(mode);
-        if errors.iter().any(|&errors| errors != 0) {
-            if self.gives_way(&errors) {
-                (torque, errors) = self.compute(ControlMode::Hold);
-            } else if self.stops_on_path(mode, &errors) {
-                errors = [0; JOINTS];
-            }
-        }
-        (torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
-    }
-
-    /// Torques of the control law, and the joint errors found on the way.
-    fn compute(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
         let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
-        self.motion.control(&LawInputs { mode, braking, nodes, config, parameters })
+        let limited = self.motion.control(&LawInputs { mode, braking, nodes, config, parameters });
+        if !limited.found.iter().any(Found::is_any) {
+            return (limited.torque, too_fast);
+        }
+        let errors = self.react(mode, &limited.found);
+        (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
     /// Raises what the limits have `found`; returns the torque to command, which is none with an error latched (J-21).

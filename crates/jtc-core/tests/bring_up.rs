@@ -161,7 +161,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
 #[test]
 fn j21_occurred_errors_are_not_reported_as_current() {
     // A joint's own error, and a CAN timeout.
-    let mut rig = Rig::holding();
+    let mut rig = Rig::holding_with(Config { torque_release: true, ..Config::avena() });
     rig.push(JOINT, 0.2);
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::Error);

@@ -125,7 +125,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
                 continue;
             }
             for factor in FRICTIONS {
-                let mut it = Let::new(Config::avena(), mass, pose, factor);
+                let config = Config { torque_release: true, ..Config::avena() };
+                let mut it = Let::new(config, mass, pose, factor);
                 it.caught(1000);
                 it.run(20);
                 let about = format!("{mass} kg at {pose:?}, friction times {factor}");
@@ -145,7 +146,7 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {
-        let config = Config { catch_ms_max, ..Config::avena() };
+        let config = Config { catch_ms_max, torque_release: true, ..Config::avena() };
         let mut it = Let::new(config, 0.0, POSES[1], 0.3);
         it.caught(after);
         it.arm.push[1] = 70.0;

@@ -16,7 +16,8 @@ const DT: f64 = 1e-3;
 const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
-    Config { delay_ticks: ticks, ..Config::avena() }
+    // What a wrong delay makes of an exact motion is no push.
+    Config { delay_ticks: ticks, yield_torque_share: 1.0, ..Config::avena() }
 }
 
 /// Ways of all joints (rad), there and back in `seconds` each.

@@ -370,7 +370,7 @@ fn j43_torque_that_swings_between_its_limits_is_an_error() {
 
 /// Ticks of a swing from limit to limit until the error, in an arm that has been held for so long.
 fn swings_until_error(held_ms: usize) -> usize {
-    let mut config = Config::avena();
+    let mut config = Config { torque_release: true, ..Config::avena() };
     config.joints[0].torque_max = 10.0;
     // Such a joint has more friction than torque.
     (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);

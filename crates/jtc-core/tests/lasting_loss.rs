@@ -156,7 +156,7 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
 #[test]
 fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     for velocity in [0.25, -0.25] {
-        let mut rig = Rig::holding();
+        let mut rig = Rig::holding_with(Config { torque_release: true, ..Config::avena() });
         let path: Vec<_> = pieces(JOINT, &[(5.0 * velocity, 20), (0.0, 200), (-5.0 * velocity, 20)]);
         rig.move_along(&path, 600);
         rig.apart[JOINT] = true;

@@ -56,7 +56,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });
     // A load that the model lacks: after each motion it has to be found anew.
-    rig.push(1, 0.004);
+    rig.push(1, 0.001);
     rig.run(1_000);
     rig.execute(&[rest(0); 20]);
     rig.until(1_000, |r| r.trajectory() == TrajectoryState::Finish);

@@ -16,31 +16,38 @@ fn weak() -> Config {
     config
 }
 
+/// In Teaching its torque is at its limit there; it goes on being taught, or is released where the setting says so.
 #[test]
-fn j43_an_arm_that_is_led_to_where_it_cannot_be_held_is_an_error_of_that_joint() {
-    let mut rig = Rig::holding_with(weak());
-    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    rig.run(20);
-    assert_eq!(rig.state(), ControllerState::Teaching);
-    rig.follow = false;
-    let mut last = ControllerState::Teaching;
-    for _ in 0..600 {
-        rig.nodes[1].report.position = (rig.nodes[1].report.position + 0.001).min(POSE[1]);
-        rig.tick();
-        let state = rig.state();
-        assert!(
-            state == last || (last, state) == (ControllerState::Teaching, ControllerState::Error),
-            "{last:?} to {state:?}"
-        );
-        last = state;
+fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() {
+    for (torque_release, end) in [(false, ControllerState::Teaching), (true, ControllerState::Error)] {
+        let mut rig = Rig::holding_with(Config { torque_release, ..weak() });
+        assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
+        rig.run(20);
+        assert_eq!(rig.state(), ControllerState::Teaching);
+        rig.follow = false;
+        let mut last = ControllerState::Teaching;
+        for _ in 0..600 {
+            rig.nodes[1].report.position = (rig.nodes[1].report.position + 0.001).min(POSE[1]);
+            rig.tick();
+            let state = rig.state();
+            assert!(
+                state == last || (last, state) == (ControllerState::Teaching, end),
+                "{last:?} to {state:?}"
+            );
+            last = state;
+        }
+        assert_eq!(last, end);
+        if !torque_release {
+            assert!((rig.torque[1].abs() - weak().joints[1].torque_max).abs() < 0.05, "{}", rig.torque[1]);
+            continue;
+        }
+        assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
+        // Its torque is off now: its model is asked for again, and does not go while the error is latched.
+        assert_eq!(rig.status().jtc_init, 0b100);
+        rig.clear(true, 0x7F);
+        rig.run(50);
+        assert_eq!((rig.state(), rig.torque), (ControllerState::Init, [0.0; 6]));
     }
-    assert_eq!(last, ControllerState::Error);
-    assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
-    // Its torque is off now: its model is asked for again, and does not go while the error is latched.
-    assert_eq!(rig.status().jtc_init, 0b100);
-    rig.clear(true, 0x7F);
-    rig.run(50);
-    assert_eq!((rig.state(), rig.torque), (ControllerState::Init, [0.0; 6]));
 }
 
 /// Whether an arm can be held matters when it is to be held, not while it is moved by hand before.

@@ -234,19 +234,6 @@ fn j33_a_stop_before_the_approach_moves_nothing() {
     );
 }
 
-#[test]
-fn j66_an_arm_that_gave_way_goes_on_when_it_has_come_to_rest() {
-    for (held, verdict) in [(false, Err(DataStatus::NotAllowed)), (true, Ok(()))] {
-        let mut controller = braking(ControllerState::HoldPos, TrajectoryState::Pause);
-        if held {
-            controller.motion.set.hold_for_test();
-        }
-        controller.motion.give_way(&controller.nodes, &controller.config);
-        assert_eq!(controller.resume_path(), verdict);
-        assert_eq!(controller.motion.law.yielding(), !held, "it stands firm when it goes on");
-    }
-}
-
 /// The approach is a ramp long, or as long as the joint that has the furthest to go for its limits needs.
 #[test]
 fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {

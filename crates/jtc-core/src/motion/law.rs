@@ -5,16 +5,15 @@ use super::set_values::{Latched, SetValues};
 use super::torque::JointTorque;
 use super::transfer::Transfer;
 use crate::config::Config;
+use crate::limits::within;
+use crate::load::Load;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::pid::Pid;
 use crate::remembered::remembered;
 use crate::teach::Payload;
+use crate::yielding::{DAMPING_RATE, Joint, Yield, Yielded};
 use crate::{JOINTS, friction, joint_error};
-
-/// Most that the brake of teaching takes from a speed, 1/s. Measured speeds are about 8 ms old, being averages of the drives: a
-/// brake above 200 1/s would drive a joint to and fro, and joints that move each other make that less.
-const BRAKE_RATE: f64 = 100.0;
 
 /// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
@@ -35,7 +34,7 @@ pub(crate) enum ControlMode {
 
 impl ControlMode {
     /// The commanded velocity and acceleration act.
-    pub(super) fn moves(self) -> bool {
+    pub(crate) fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
 }
@@ -69,24 +68,31 @@ pub(crate) struct ControlLaw {
     pub torque: [JointTorque; JOINTS],
     pub(super) payload: Payload,
     transfer: Transfer,
-    /// The arm gives way: the control law adds only so much to the torque of the model (J-66).
-    pub(super) yielding: bool,
+    /// Joints that yield (J-68, J-70).
+    yields: [Option<Yield>; JOINTS],
+    yielded: Yielded,
+    /// What each joint carries and the model lacks.
+    loads: [Load; JOINTS],
+    /// The joint whose load is observed in this tick.
+    observed: u8,
     /// Time left in which what is missing is what the controller had found for a payload that is now given, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
-remembered!(ControlLaw { pid, torque, payload, transfer, yielding, unwinds_ms });
+remembered!(ControlLaw { pid, torque, payload, transfer, yields, yielded, loads, observed, unwinds_ms });
 
 impl ControlLaw {
     /// No torque is remembered.
     pub fn release(&mut self) {
-        let Self { pid, torque, payload, transfer, yielding, unwinds_ms } = self;
-        *unwinds_ms = 0;
+        let Self { pid, torque, payload, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
+        (*unwinds_ms, *observed) = (0, 0);
         *pid = Default::default();
         *torque = Default::default();
         *payload = Payload::default();
         *transfer = Transfer::default();
-        *yielding = false;
+        *yields = [None; JOINTS];
+        *yielded = Yielded::default();
+        *loads = Default::default();
     }
 
     /// The control mode changes among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model (J-44).
@@ -98,7 +104,19 @@ impl ControlLaw {
     pub fn change_model(&mut self) {
         // What was missing was missing in the last one.
         self.payload.forget();
+        self.forget_loads();
         self.transfer.change_model();
+    }
+
+    /// The gains change: no step but that of the model.
+    pub fn change_gains(&mut self) {
+        self.forget_loads();
+        self.transfer.change_mode();
+    }
+
+    /// What the joints carry is to be found anew.
+    fn forget_loads(&mut self) {
+        self.loads.iter_mut().for_each(Load::forget);
     }
 
     /// Whatever comes next begins at rest, without a position error.
@@ -106,39 +124,86 @@ impl ControlLaw {
         for pid in &mut self.pid {
             pid.reset(0.0);
         }
+        self.forget_loads();
     }
 
     /// Joints that are not held any more, or not yet, begin anew.
     pub fn latch(&mut self, latched: &Latched) {
-        for (pid, held) in self.pid.iter_mut().zip(latched.held) {
-            if !held {
-                pid.reset(0.0);
+        for j in 0..JOINTS {
+            if !latched.held[j] {
+                self.pid[j].reset(0.0);
+                self.loads[j].forget();
+                self.yields[j] = None;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// From now on the arm gives way. The torque that the law had added is the torque that it has to let go of.
-    pub fn give_way(&mut self) {
-        self.transfer.let_go();
-        self.yielding = true;
+    /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m².
+    pub fn begin_yield(&mut self, joint: usize, lowers: bool, set: f64, inertia: f64, limit: f64) {
+        let torque = &mut self.torque[joint];
+        if let Some(yields) = &mut self.yields[joint] {
+            if lowers {
+                yields.lower();
+            }
+            return;
+        }
+        // What was commanded, not what was computed, is what the joint lets go of.
+        torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
+        self.transfer.begin_yield(joint);
+        let load = &self.loads[joint];
+        // The integral of a joint that was pushed has not found a load.
+        let load = if lowers { load.torque(torque.pid.i) } else { load.known_torque() };
+        let stays = self.yielded.count(joint);
+        self.yields[joint] = Some(Yield::begin(lowers, stays, set, inertia, load));
     }
 
-    /// The whole torque may be used again.
-    pub fn stand_firm(&mut self) {
-        self.yielding = false;
+    /// Whether the joint yields, or lowers a load.
+    pub fn yields(&self, joint: usize) -> bool {
+        self.yields[joint].is_some()
     }
 
-    /// The arm gives way.
-    pub fn yielding(&self) -> bool {
-        self.yielding
+    /// A joint yields, and is not calm yet.
+    pub fn is_yielding(&self) -> bool {
+        self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
-    /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25). What an arm that gives way has
-    /// against it is more likely a contact than a mass.
-    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
-        self.stand_firm();
-        if self.unwinds_ms > 0 {
+    /// The host ends the reaction: joints that are calm are held again.
+    pub fn end_yields(&mut self) {
+        self.yields.iter_mut().flatten().for_each(Yield::clear);
+    }
+
+    /// Drags the spring of a joint that yields along. Returns where it pulls to, rad; `None` for a joint that does not yield.
+    pub fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
+        self.yields[joint].as_mut().map(|yields| yields.drag(position))
+    }
+
+    /// Torque by which the control law corrects that of the model and of the load, N·m: what a push has against it.
+    pub fn feedback(&self, joint: usize) -> f64 {
+        let pid = &self.torque[joint].pid;
+        pid.p + pid.d + (pid.i - self.loads[joint].torque(pid.i))
+    }
+
+    /// Ends the yield of joints that are calm. Returns them: they are held where they are.
+    pub fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
+        let mut ended = [false; JOINTS];
+        for j in 0..JOINTS {
+            let Some(yields) = self.yields[j].filter(Yield::is_over) else { continue };
+            self.pid[j].take_over(&gains[j], yields.load());
+            if yields.lowers() {
+                self.loads[j].set(yields.load());
+            }
+            self.yields[j] = None;
+            self.transfer.change_mode();
+            ended[j] = true;
+        }
+        ended
+    }
+
+    /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25), unless it may be a `contact`.
+    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics, contact: bool) {
+        self.yields = [None; JOINTS];
+        if self.unwinds_ms > 0 || contact {
             self.payload.forget();
         }
         self.payload.fit(dynamics, nodes.positions(), config);
@@ -148,6 +213,7 @@ impl ControlLaw {
     /// back what it had found for it (J-60).
     pub fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
+        self.forget_loads();
     }
 
     /// The payload of the arm was given in Teaching, and so much more of it (kg) comes into the model with this tick (J-60).
@@ -160,6 +226,7 @@ impl ControlLaw {
         for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
             pid.take_over(gains, torque.payload);
         }
+        self.forget_loads();
     }
 
     /// The set positions of joints have sagged, rad: that is no motion.
@@ -178,6 +245,7 @@ impl ControlLaw {
     ) -> [u16; JOINTS] {
         let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
         self.unwinds_ms = self.unwinds_ms.saturating_sub(1);
+        self.yielded.step();
         let before = self.transfer.begin(&self.torque);
         let q = nodes.positions();
         let v = nodes.velocities();
@@ -205,7 +273,17 @@ impl ControlLaw {
                 friction: friction[j],
                 ..JointTorque::default()
             };
-            if mode != ControlMode::Teach {
+            if let Some(yields) = &mut self.yields[j] {
+                torque.pid = yields.step(&Joint {
+                    position: q[j],
+                    velocity: v[j],
+                    fresh: nodes.node(j).fresh(),
+                    model: torque.model,
+                    limits: limit,
+                    range: config.position_range(j),
+                    share: config.yield_torque_share,
+                });
+            } else if mode != ControlMode::Teach {
                 let error = due[j] - q[j];
                 let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
@@ -214,7 +292,10 @@ impl ControlLaw {
             self.torque[j] = torque;
         }
         self.transfer.blend(before, &mut self.torque, nodes, config);
-        if mode == ControlMode::Hold && !self.yielding && set.all_holding() {
+        if mode != ControlMode::Teach {
+            self.observe_load(set, config);
+        }
+        if mode == ControlMode::Hold && self.yields == [None; JOINTS] && set.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();
@@ -222,10 +303,17 @@ impl ControlLaw {
         if mode == ControlMode::Teach {
             self.brake(nodes, config, parameters);
         }
-        if self.yielding {
-            self.soften(config);
-        }
         errors
+    }
+
+    /// Observes the load of one joint: the next one in each tick.
+    fn observe_load(&mut self, set: &SetValues, config: &Config) {
+        let j = usize::from(self.observed) % JOINTS;
+        self.observed = (j as u8 + 1) % JOINTS as u8;
+        // While the integral gives back what is in the model now, it says nothing of a load.
+        if self.yields[j].is_none() && self.unwinds_ms == 0 {
+            self.loads[j].observe(self.torque[j].pid.i, set.settled(j), &config.joints[j]);
+        }
     }
 
     /// Teaching brakes joints above the speed limit (J-25).
@@ -240,19 +328,10 @@ impl ControlLaw {
             let joint = &config.joints[j];
             // A drive has a rotor also where the configuration gives none.
             let rotor = if joint.rotor_inertia > 0.0 { joint.rotor_inertia } else { UNKNOWN_ROTOR };
-            let damping = config.teach_damping.min(BRAKE_RATE * (mass[j][j] + rotor));
+            let damping = config.teach_damping.min(DAMPING_RATE * (mass[j][j] + rotor));
             if nodes.node(j).enabled() {
                 torque.brake = within(-damping * excess[j], torque.sum(), joint.torque_max);
             }
-        }
-    }
-
-    /// Bounds what the control law adds to the torque of the model (J-66).
-    fn soften(&mut self, config: &Config) {
-        for (torque, joint) in self.torque.iter_mut().zip(&config.joints) {
-            let most = config.yield_torque_share * joint.torque_max;
-            let correction = torque.correction();
-            torque.blend += correction.max(-most).min(most) - correction;
         }
     }
 }
@@ -281,12 +360,6 @@ fn compensation(inputs: &LawInputs<'_>, velocity: &[f64; JOINTS]) -> ([f64; JOIN
         });
     }
     (torque, errors)
-}
-
-/// As much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
-fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
-    let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
-    wanted.max(low).min(high)
 }
 
 #[cfg(test)]

@@ -1,28 +1,54 @@
 //! The limits of the control law, each tick, for each joint (J-43).
-use super::law::{ControlMode, LawInputs};
+use super::law::{ControlLaw, ControlMode, LawInputs};
 use super::set_values::SetValues;
-use super::torque::JointTorque;
-use crate::limits::{self, Saturation};
+use crate::limits::{self, Recent, Saturation};
 use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
 /// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
 pub(super) const DRIVEN: f64 = 0.05;
+/// Of the last 100 ticks, more than which a feedback torque beyond its share makes a pushed joint (J-66).
+const PUSHED_MS: u16 = 20;
 
-/// How often each joint's torque has been at its limit.
+/// How often each joint's torque has been at its limit, and its feedback torque beyond its share.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
+    pushed: [Recent; JOINTS],
 }
 
-remembered!(Limiter { saturation });
+remembered!(Limiter { saturation, pushed });
+
+/// What a tick has found about a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Found {
+    /// Limits of the set values that it is beyond, as joint errors; the bit of torque stands for a torque that is no number.
+    pub errors: u16,
+    /// Its computed torque was beyond the limit for too long (J-43).
+    pub overloaded: bool,
+    /// Its feedback torque was beyond its share for too long, and it had settled before.
+    pub pushed: bool,
+    /// The feedback torque is beyond its share.
+    pub strained: bool,
+    /// It has settled since it was enabled.
+    pub settled: bool,
+    /// Its swing grows: its position controller is unstable.
+    pub unstable: bool,
+}
+
+impl Found {
+    /// There is something to react to.
+    pub fn is_any(&self) -> bool {
+        (self.errors != 0) | self.overloaded | self.pushed | self.unstable
+    }
+}
 
 /// What is left of a torque within the limits, per joint.
 pub(crate) struct Limited {
     /// To command, N·m.
     pub torque: [f64; JOINTS],
-    /// Joint errors found.
-    pub errors: [u16; JOINTS],
+    /// What was found on the way.
+    pub found: [Found; JOINTS],
     /// By how much the set positions of joints have sagged whose loads are being caught, rad; `None` where none is.
     pub sag: Option<[f64; JOINTS]>,
 }
@@ -33,45 +59,55 @@ impl Limiter {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
-    /// One tick: the computed `torque` within its limits, and the errors of torque and set values. What braking with all the
-    /// torque there is does to the torque, and while a motion is commanded to position error and acceleration, is none (J-33).
-    pub fn step(
-        &mut self,
-        inputs: &LawInputs<'_>,
-        torque: &[JointTorque; JOINTS],
-        set: &mut SetValues,
-    ) -> Limited {
+    /// What was counted of a joint is forgotten.
+    pub fn forget(&mut self, joint: usize) {
+        self.saturation[joint].forget();
+        self.pushed[joint].forget();
+    }
+
+    /// One tick: the torque that the `law` has computed within its limits, and what is found of torque and set values. What braking with
+    /// all the torque there is does to the torque, and while a motion is commanded to position error and acceleration, is excused
+    /// (J-33). So is all but a torque that is no number of a joint that yields: its torque is bounded by construction.
+    pub fn step(&mut self, inputs: &LawInputs<'_>, law: &ControlLaw, set: &mut SetValues) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
         let mut sags = None;
-        // Only while set values move: an arm that stands gives way to a push (J-66).
+        // Only while set values move: an arm that stands yields to a push (J-66).
         let excused =
             if braking && mode.moves() { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         let (q, v) = (nodes.positions(), nodes.velocities());
         let due = *set.due(config);
-        let joints: [(f64, u16); JOINTS] = core::array::from_fn(|j| {
+        let joints: [(f64, Found); JOINTS] = core::array::from_fn(|j| {
             let limits = &config.joints[j];
             let error = due[j] - q[j];
-            let computed = torque[j].sum();
-            let catching = set.catch[j].step(v[j]) && mode == ControlMode::Hold;
+            let computed = law.torque[j].sum();
+            let yields = law.yields(j);
+            let caught = set.catch[j].step(v[j]);
+            let catching = caught && mode == ControlMode::Hold && !yields;
+            let unstable = !caught && !yields && set.catch[j].swing_grows();
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
-            let (within, torque_error) =
-                self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
+            let excuses = braking || stopping || yields;
+            let (within, overloaded) =
+                self.saturation[j].limit(computed, limits, config.torque_over_ms, excuses);
+            let settled = set.catch[j].settled();
+            let feedback = law.feedback(j);
+            let strained = feedback.abs() > config.yield_torque_share * limits.torque_max;
+            // What brakes a joint is no push against it; what presses one that stands is.
+            let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
+            let counts = strained & settled & !brakes & !yields & (mode != ControlMode::Teach);
+            let pushed = self.pushed[j].exceeds(counts, PUSHED_MS);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
-            let set_error = limits::check_set(point, error, limits, mode == ControlMode::Follow);
+            let set_errors = limits::check_set(point, error, limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
                 let sag = set.sag(j, computed - within, parameters.pid[j].kp, error, limits);
                 sags.get_or_insert([0.0; JOINTS])[j] = sag;
             }
-            let set_error =
-                if mode != ControlMode::Teach && set.holding[j] { set_error & !excused } else { 0 };
-            (within, torque_error | set_error)
+            let looked_at = mode != ControlMode::Teach && set.holding[j] && !yields;
+            let errors = if looked_at { set_errors & !excused } else { 0 }
+                | if computed.is_nan() { joint_error::TORQUE } else { 0 };
+            (within, Found { errors, overloaded, pushed, strained, settled, unstable })
         });
-        Limited {
-            torque: joints.map(|(torque, _)| torque),
-            errors: joints.map(|(_, error)| error),
-            sag: sags,
-        }
+        Limited { torque: joints.map(|(torque, _)| torque), found: joints.map(|(_, found)| found), sag: sags }
     }
 }

@@ -154,6 +154,19 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
+    /// A joint that yields is where it is dragged to, rad: its set values are no motion.
+    pub fn lead(&mut self, j: usize, position: f64) {
+        (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
+        self.commanded.begin(j, position, 0.0, 0);
+        self.deceleration[j] = None;
+        self.found_moving[j] = true;
+    }
+
+    /// The joint has been at rest, within its torque limit, since it was enabled.
+    pub fn settled(&self, joint: usize) -> bool {
+        self.catch[joint].settled()
+    }
+
     /// Every joint that is there is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
         self.jog.is_none()

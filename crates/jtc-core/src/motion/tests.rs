@@ -6,9 +6,9 @@ use crate::deceleration::Deceleration;
 use crate::interpolation::SetPoint;
 
 /// An arm that holds these joints.
-fn holding(joints: [bool; JOINTS], yielding: bool) -> Motion {
+fn holding(joints: [bool; JOINTS]) -> Motion {
     let mut motion = Motion::default();
-    (motion.set.holding, motion.law.yielding) = (joints, yielding);
+    motion.set.holding = joints;
     motion
 }
 
@@ -37,10 +37,6 @@ fn j25_an_arm_that_stands_is_held_at_once() {
     motion.set.hold_for_test();
     motion.hold_measured(&nodes, &config);
     assert!(motion.set.all_holding());
-    motion.give_way(&nodes, &config);
-    assert!(motion.set.all_holding() && motion.law.yielding());
-    motion.law.stand_firm();
-    assert!(!motion.law.yielding());
 }
 
 #[test]
@@ -84,10 +80,10 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching finds what the arm carries while it is held; only an arm that gives way does not have to know.
+/// Teaching finds what the arm carries while it is held; only an arm that may have a contact against it does not have to know.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
-    for (held, yielding, known, may) in [
+    for (held, contact, known, may) in [
         (true, false, false, false),
         (true, false, true, true),
         (true, true, false, true),
@@ -95,11 +91,11 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
         (false, true, false, false),
         (false, true, true, false),
     ] {
-        let mut motion = holding([held; JOINTS], yielding);
+        let mut motion = holding([held; JOINTS]);
         if known {
             motion.law.payload.observe(&[0.0; JOINTS]);
         }
-        assert_eq!(motion.may_be_taught(&Config::avena()), may, "{held} {yielding} {known}");
+        assert_eq!(motion.may_be_taught(&Config::avena(), contact), may, "{held} {contact} {known}");
     }
 }
 
@@ -150,7 +146,7 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
         // One that moves is enough for all.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
-        let mut motion = holding([true, true, true, false, true, true], false);
+        let mut motion = holding([true, true, true, false, true, true]);
         motion.hold_measured(&nodes, &Config::avena());
         assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
         let found: [bool; JOINTS] = core::array::from_fn(|j| motion.set.deceleration[j].is_some());
@@ -163,7 +159,7 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, catches) in [(0.0, false), (0.02, false), (0.3, true)] {
         let nodes = Nodes::enabled_at([0.3; JOINTS], [velocity; JOINTS]);
-        let mut motion = holding([true; JOINTS], false);
+        let mut motion = holding([true; JOINTS]);
         motion.end_teaching(&nodes, &Config::avena(), &[PidGains::default(); JOINTS]);
         assert_eq!(motion.set.catch.map(|catch| catch.busy()), [catches; JOINTS], "{velocity}");
         assert_eq!(motion.set.all_holding(), !catches);
@@ -173,7 +169,7 @@ fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
 #[test]
 fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     let nodes = Nodes::enabled_at([0.3; JOINTS], [0.1; JOINTS]);
-    let mut motion = holding([true; JOINTS], true);
+    let mut motion = holding([true; JOINTS]);
     motion.law.torque[2].friction = 7.0;
     motion.set.catch[1] = Catch::begin(&Config::avena());
     motion.set.begin_at(&[0.1; JOINTS]);
@@ -181,6 +177,6 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
     // J-62: nor has it an error.
     assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
-    assert_eq!((motion.set.holding, motion.law.yielding, motion.law.torque), Default::default());
+    assert_eq!((motion.set.holding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());
 }

@@ -6,6 +6,9 @@ use crate::interpolation::smooth;
 use crate::nodes::Nodes;
 use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 
+/// Time within which the torque of a joint falls that begins to yield, ms.
+const FALL_MS: u16 = 10;
+
 /// Which part of the last torque the next one continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
@@ -33,15 +36,19 @@ pub(super) struct Transfer {
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
+    /// Time over which it is blended out, ms.
+    length_ms: [u16; JOINTS],
     /// Time left until nothing is left of any of them, ms.
     left_ms: u16,
+    /// Joints that yield from this tick on: what their torque loses is gone soon.
+    yields: [bool; JOINTS],
     /// Joints that were latched in this tick: their torque starts from that of the model.
     just_enabled: [bool; JOINTS],
     /// The next torque has to continue the last one.
     next: Option<Continued>,
 }
 
-remembered!(Transfer { step, step_ms, left_ms, just_enabled, next });
+remembered!(Transfer { step, step_ms, length_ms, left_ms, yields, just_enabled, next });
 
 impl Remembered for Continued {
     fn write<S: BitSink>(&self, to: &mut S) {
@@ -64,9 +71,11 @@ impl Transfer {
         self.next = Some(Continued::Everything);
     }
 
-    /// Nothing of the last torque is continued.
-    pub fn let_go(&mut self) {
-        (self.next, self.step) = (None, [0.0; JOINTS]);
+    /// The joint yields from the next tick on: no step but that of the model, and torque that is too much for it falls within
+    /// [`FALL_MS`] (J-68).
+    pub fn begin_yield(&mut self, joint: usize) {
+        self.next.get_or_insert(Continued::Correction);
+        self.yields[joint] = true;
     }
 
     /// Joints that were latched in this tick.
@@ -89,19 +98,21 @@ impl Transfer {
     ) {
         if let Some((continued, before)) = before {
             for j in 0..JOINTS {
-                self.begin_step(j, before[j] - continued.of(&torque[j]), config);
+                let step = before[j] - continued.of(&torque[j]);
+                let falls = core::mem::take(&mut self.yields[j]) && step * before[j] > 0.0;
+                self.begin_step(j, step, if falls { FALL_MS } else { config.blend_ms });
             }
         }
         if self.just_enabled.contains(&true) {
             for j in 0..JOINTS {
                 if core::mem::take(&mut self.just_enabled[j]) {
-                    self.begin_step(j, -torque[j].correction(), config);
+                    self.begin_step(j, -torque[j].correction(), config.blend_ms);
                 }
             }
         }
         if self.left_ms > 0 {
             self.left_ms -= 1;
-            self.blend_steps(torque, config);
+            self.blend_steps(torque);
         }
         for (j, torque) in torque.iter_mut().enumerate() {
             if !nodes.node(j).enabled() {
@@ -112,16 +123,15 @@ impl Transfer {
     }
 
     /// A step of a joint is to be blended out from now on.
-    fn begin_step(&mut self, j: usize, step: f64, config: &Config) {
-        (self.step[j], self.step_ms[j]) = (step, 0);
-        self.left_ms = config.blend_ms.max(1);
+    fn begin_step(&mut self, j: usize, step: f64, length_ms: u16) {
+        (self.step[j], self.step_ms[j], self.length_ms[j]) = (step, 0, length_ms.max(1));
+        self.left_ms = self.left_ms.max(self.length_ms[j]);
     }
 
     /// Adds what is left of the steps in this tick.
-    fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS], config: &Config) {
-        let per_tick = 1.0 / f64::from(config.blend_ms.max(1));
+    fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS]) {
         for j in 0..JOINTS {
-            let left = 1.0 - smooth(f64::from(self.step_ms[j]) * per_tick);
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) / f64::from(self.length_ms[j].max(1)));
             self.step_ms[j] = self.step_ms[j].saturating_add(1);
             torque[j].blend = self.step[j] * left;
         }
@@ -141,23 +151,18 @@ mod tests {
         torque.map(|torque| torque.blend)
     }
 
+    /// The torque of a joint that yields falls at once, and that of the others as at any change; none of them steps.
     #[test]
-    fn j44_j66_an_arm_that_gives_way_continues_nothing_of_its_torque() {
-        for lets_go in [false, true] {
-            let mut transfer = Transfer::default();
-            transfer.change_mode();
-            if lets_go {
-                transfer.let_go();
-            }
-            assert_eq!(blended(&mut transfer, 5.0), [if lets_go { 0.0 } else { 5.0 }; JOINTS]);
-            // Nor of a step that is being blended out.
-            let mut transfer = Transfer::default();
-            transfer.change_mode();
-            assert_eq!(blended(&mut transfer, 5.0), [5.0; JOINTS]);
-            if lets_go {
-                transfer.let_go();
-            }
-            assert_eq!(blended(&mut transfer, 5.0) == [0.0; JOINTS], lets_go);
+    fn j44_j68_the_torque_of_a_joint_that_begins_to_yield_falls_within_10_ms() {
+        let mut transfer = Transfer::default();
+        transfer.begin_yield(2);
+        let mut last = blended(&mut transfer, 5.0);
+        assert_eq!(last, [5.0; JOINTS]);
+        for ms in 1..=10 {
+            let now = blended(&mut transfer, 0.0);
+            assert!((0..JOINTS).all(|j| now[j] <= last[j]) && now[2] < last[2], "{ms}: {now:?}");
+            last = now;
         }
+        assert!(last[2] == 0.0 && last[0] > 4.5, "{last:?}");
     }
 }

@@ -92,8 +92,8 @@ settings! {
     Whole 52 "overspeed_ms" ["ms"] 1.0..=1000.0 No "how long a joint may be that fast" (overspeed_ms: u16);
     Whole 53 "stop_ms" ["ms"] 20.0..=10000.0 No "longest pause or stop" (stop_ms: u16);
     Whole 54 "braking_ms_max" ["ms"] 20.0..=20000.0 No "longest braking with all the torque there is" (braking_ms_max: u16);
-    Number 55 "yield_torque_share" [""] 0.0..=1.0 No "torque added to the model's after a position error, as a share of the limit" (yield_torque_share);
-    Whole 56 "torque_over_ms" ["ms"] 0.0..=100.0 No "torque at its limit in any 100 ms that is no error" (torque_over_ms: u16);
+    Number 55 "yield_torque_share" [""] 0.0..=1.0 No "torque of a joint that yields to a slow push, as a share of the limit" (yield_torque_share);
+    Whole 56 "torque_over_ms" ["ms"] 0.0..=100.0 No "torque at its limit in any 100 ms that is no overload" (torque_over_ms: u16);
     Whole 57 "catch_ms_max" ["ms"] 0.0..=10000.0 No "time for catching the load of a joint that was just enabled" (catch_ms_max: u16);
     Whole 58 "blend_ms" ["ms"] 1.0..=5000.0 No "time over which steps of torque are blended out" (blend_ms: u16);
     Number 59 "teach_velocity_max_rad_s" ["rad/s"] 0.01..=5.0 No "speed above which teaching brakes" (teach_velocity_max);
@@ -103,6 +103,8 @@ settings! {
     Whole 63 "teach_fade_ms" ["ms"] 1.0..=10000.0 No "time over which the rest of the missing torque fades" (teach_fade_ms: u16);
     Number 64 "friction_sign_width_rad_s" ["rad/s"] 0.0001..=1.0 No "speed around zero in which the sign of friction is smoothed" (friction_sign_width);
     Whole 65 "host_timeout_ms" ["ms"] 0.0..=60000.0 No "silence of all hosts that pauses a motion and ends teaching (J-59); 0: none does" (host_timeout_ms: u16);
+    Switch 66 "torque_reaction" [""] 0.0..=1.0 No "an overloaded joint releases the arm (1), or is held (0)" (torque_release);
+    Switch 67 "protective_stop_latches" [""] 0.0..=1.0 No "a held stop is over only when the host has cleared it" (protective_stop_latches);
     Whole 72 "delay_ticks" [""] 0.0..=7.0 No "age of a measurement when what is commanded because of it acts, in ticks" (delay_ticks: u8);
     Number 96 "kp_max" ["N·m/rad"] 0.0..=1e6 No "highest Kp that is taken" (parameter_bounds.kp_max);
     Number 97 "ki_max" ["N·m/(rad·s)"] 0.0..=1e6 No "highest Ki that is taken" (parameter_bounds.ki_max);

@@ -3,8 +3,8 @@ use super::*;
 use crate::Parameters;
 use crate::catch::Catch;
 use crate::deceleration::Deceleration;
-use crate::motion::Motion;
 use crate::motion::limiter::DRIVEN;
+use crate::motion::{Found, Motion};
 use crate::parameters::Friction;
 use crate::pid::PidTorque;
 
@@ -28,7 +28,7 @@ impl Arm {
     fn held(gains: PidGains) -> Self {
         let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
-        motion.begin_at(&POSE);
+        motion.set.begin_at(&POSE);
         motion.set.hold_for_test();
         let Friction::Polynomial(polynomial) = Parameters::avena().friction else { unreachable!() };
         let dynamics = Dynamics::new(&Parameters::avena().model, config.gravity);
@@ -36,19 +36,26 @@ impl Arm {
     }
 
     /// A tick at the pose, with the measured `velocity` (rad/s): torques and errors.
-    fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [u16; JOINTS]) {
+    fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [Found; JOINTS]) {
         self.tick_of(mode, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
     }
 
     /// A tick of these nodes.
-    fn tick_of(&mut self, mode: ControlMode, braking: bool, nodes: &Nodes) -> ([f64; JOINTS], [u16; JOINTS]) {
+    fn tick_of(
+        &mut self,
+        mode: ControlMode,
+        braking: bool,
+        nodes: &Nodes,
+    ) -> ([f64; JOINTS], [Found; JOINTS]) {
         let parameters = ControlParameters {
             dynamics: &self.dynamics,
             pid: &self.pid,
             polynomial: &self.polynomial,
             table: self.table.as_ref(),
         };
-        self.motion.control(&LawInputs { mode, braking, nodes, config: &self.config, parameters })
+        let limited =
+            self.motion.control(&LawInputs { mode, braking, nodes, config: &self.config, parameters });
+        (limited.torque, limited.found)
     }
 }
 
@@ -83,7 +90,7 @@ fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
         let axis = |from: f32| core::array::from_fn(|k| from + k as f32);
         arm.table =
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
-        assert_eq!(arm.tick(mode, false, 0.0).1, [error; JOINTS], "{mode:?}");
+        assert_eq!(arm.tick(mode, false, 0.0).1.map(|found| found.errors), [error; JOINTS], "{mode:?}");
     }
 }
 
@@ -92,7 +99,7 @@ fn j25_only_teaching_carries_what_was_found_missing() {
     let mut arm = Arm::held(NONE);
     let missing = arm.dynamics.flange_torque(&POSE).map(|torque| 2.0 * torque);
     (0..1_000).for_each(|_| arm.motion.law.payload.observe(&missing));
-    arm.motion.law.begin_teaching(&Nodes::enabled_at(POSE, [0.0; JOINTS]), &arm.config, &arm.dynamics);
+    arm.motion.law.begin_teaching(&Nodes::enabled_at(POSE, [0.0; JOINTS]), &arm.config, &arm.dynamics, false);
     for mode in MODES {
         arm.tick(mode, false, 0.0);
         for (torque, missing) in arm.motion.law.torque.iter().zip(&missing) {
@@ -113,7 +120,7 @@ fn j25_what_is_missing_is_observed_while_the_arm_is_held_at_rest_and_firmly() {
     };
     assert!(observed(ControlMode::Hold, |_| ()));
     assert!(MODES.iter().all(|&mode| observed(mode, |_| ()) == (mode == ControlMode::Hold)));
-    assert!(!observed(ControlMode::Hold, |arm| arm.motion.law.yielding = true));
+    assert!(!observed(ControlMode::Hold, |arm| arm.motion.law.begin_yield(2, false, POSE[2], 1.0, 120.0)));
     assert!(!observed(ControlMode::Hold, |arm| arm.motion.set.holding[3] = false));
 }
 
@@ -160,7 +167,7 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         if decelerates {
             arm.motion.set.deceleration[1] = Some(Deceleration::led(POSE[1], 0.0, &arm.config, &limits));
         }
-        let found = (0..100).any(|_| arm.tick(mode, braking, along * speed).1[1] & joint_error::TORQUE != 0);
+        let found = (0..100).any(|_| arm.tick(mode, braking, along * speed).1[1].overloaded);
         assert_eq!(found, error, "{mode:?} {catches} {decelerates} {braking} {speed}");
     }
 }
@@ -180,7 +187,7 @@ fn j43_set_values_are_looked_at_where_the_law_holds_a_joint() {
         let mut arm = Arm::held(NONE);
         arm.motion.set.holding = [holding; JOINTS];
         arm.motion.set.point.position[4] += 2.0 * arm.config.joints[4].position_error_max;
-        let found = arm.tick(mode, braking, 0.0).1;
+        let found = arm.tick(mode, braking, 0.0).1.map(|found| found.errors);
         assert_eq!(found, [0, 0, 0, 0, errors, 0], "{mode:?} {braking} {holding}");
     }
 }
@@ -230,31 +237,13 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
         let axis = |from: f32| core::array::from_fn(|k| from + k as f32);
         arm.table =
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
-        let (torque, errors) =
+        let (torque, found) =
             arm.tick_of(mode, false, &Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off));
         for j in 0..JOINTS {
-            assert_eq!(errors[j], if j == off { 0 } else { error }, "{mode:?}, joint {}", j + 1);
+            assert_eq!(found[j].errors, if j == off { 0 } else { error }, "{mode:?}, joint {}", j + 1);
             let brakes = mode == ControlMode::Teach && j != off;
             assert_eq!(arm.motion.law.torque[j].brake < 0.0, brakes, "{mode:?}, joint {}", j + 1);
         }
         assert_eq!((torque[off], arm.motion.law.torque[off]), (0.0, JointTorque::default()), "{mode:?}");
-    }
-}
-
-#[test]
-fn j66_an_arm_that_gives_way_adds_a_little_to_the_torque_of_the_model() {
-    for (yielding, direction) in [(false, 1.0), (true, 1.0), (true, -1.0), (false, -1.0)] {
-        let mut arm = Arm::held(PidGains { kp: 1e6, ..NONE });
-        arm.motion.law.yielding = yielding;
-        arm.motion.set.point.position = POSE.map(|q| q + direction * 0.001);
-        arm.tick(ControlMode::Hold, false, 0.0);
-        for (torque, joint) in arm.motion.law.torque.iter().zip(&arm.config.joints) {
-            let most = if yielding { 0.3 * joint.torque_max } else { 1_000.0 };
-            assert!((torque.correction() - direction * most).abs() < 1e-6, "{yielding}: {torque:?}");
-        }
-        // What is within that is not touched.
-        arm.motion.set.point.position = POSE.map(|q| q + direction * 1e-6);
-        arm.tick(ControlMode::Hold, false, 0.0);
-        assert!(arm.motion.law.torque.iter().all(|torque| (torque.correction() - direction).abs() < 1e-6));
     }
 }

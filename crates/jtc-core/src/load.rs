@@ -72,3 +72,68 @@ impl Load {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    /// A joint of 180 N·m.
+    fn limits() -> JointConfig {
+        Config::avena().joints[1]
+    }
+
+    fn observe(load: &mut Load, integral: f64, seconds: f64) {
+        for _ in 0..(seconds / (PERIOD * DT)).round() as usize {
+            load.observe(integral, true, &limits());
+        }
+    }
+
+    #[test]
+    fn j66_the_load_is_found_when_the_joint_first_settles_and_is_bounded() {
+        for (integral, found) in [(20.0, 20.0), (-40.0, -40.0), (90.0, 54.0), (-90.0, -54.0)] {
+            let mut load = Load::default();
+            load.observe(integral, false, &limits());
+            assert_eq!((load.torque(7.0), load.known_torque()), (7.0, 0.0), "what the integral has");
+            load.observe(integral, true, &limits());
+            assert_eq!((load.torque(7.0), load.known_torque()), (found, found));
+            load.forget();
+            assert_eq!((load.torque(7.0), load.known_torque()), (7.0, 0.0));
+        }
+    }
+
+    #[test]
+    fn j66_the_load_follows_the_integral_within_a_second_and_no_contact() {
+        let mut load = Load::default();
+        observe(&mut load, 10.0, 0.1);
+        // Within a tenth of the limit: 63 % of the way in a second.
+        observe(&mut load, 20.0, 1.0);
+        assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
+        observe(&mut load, 16.3, 5.0);
+        let known = load.torque(0.0);
+        // Further away it is a contact, until it has been steady for ten seconds.
+        observe(&mut load, 40.0, 9.9);
+        assert_eq!(load.torque(0.0), known);
+        observe(&mut load, 40.0, 0.2);
+        assert_eq!(load.torque(0.0), 40.0);
+    }
+
+    #[test]
+    fn j66_a_load_that_changes_all_the_time_is_not_taken_anew() {
+        let mut load = Load::default();
+        observe(&mut load, 0.0, 0.1);
+        for k in 0..20 {
+            observe(&mut load, if k % 2 == 0 { 40.0 } else { 50.0 }, 5.0);
+        }
+        assert_eq!(load.torque(0.0), 0.0);
+    }
+
+    /// One that was lowered has been found to be more than the bound; it does not jump back.
+    #[test]
+    fn j70_a_load_that_was_lowered_is_kept() {
+        let mut load = Load::default();
+        load.set(80.0);
+        observe(&mut load, 80.0, 3.0);
+        assert_eq!(load.torque(0.0), 80.0);
+    }
+}

@@ -111,3 +111,57 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.law.is_yielding() || (self.errors.held_stop() && moves)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELD: Found = Found {
+        errors: 0,
+        overloaded: false,
+        pushed: false,
+        strained: false,
+        settled: true,
+        unstable: false,
+    };
+
+    #[test]
+    fn j66_the_first_row_that_applies_wins() {
+        use Reaction::*;
+        let (torque, error, path) = (joint_error::TORQUE, joint_error::POSITION_ERROR, joint_error::VELOCITY);
+        let (hold, follow) = (ControlMode::Hold, ControlMode::Follow);
+        let overloaded = Found { overloaded: true, ..HELD };
+        let rows = [
+            (HELD, hold, None),
+            (Found { errors: torque, ..HELD }, hold, Some((Release, torque))),
+            (Found { errors: torque | error, unstable: true, ..overloaded }, follow, Some((Release, torque))),
+            (Found { unstable: true, settled: false, ..overloaded }, hold, Some((Yield, torque))),
+            (Found { settled: false, strained: true, ..overloaded }, hold, Some((Lower, torque))),
+            (Found { pushed: true, strained: true, ..HELD }, follow, Some((Yield, torque))),
+            (Found { strained: true, ..overloaded }, follow, Some((Yield, torque))),
+            (Found { strained: true, ..HELD }, hold, None),
+            (Found { errors: error | path, ..HELD }, follow, Some((Yield, error))),
+            (Found { errors: error, ..overloaded }, follow, Some((Yield, error))),
+            (overloaded, follow, Some((Stop, torque))),
+            (overloaded, ControlMode::Approach, Some((Stop, torque))),
+            (overloaded, hold, Some((Lower, torque))),
+            (Found { errors: path, ..HELD }, follow, Some((Stop, path))),
+            (Found { errors: joint_error::POSITION, ..HELD }, follow, Some((Stop, joint_error::POSITION))),
+        ];
+        for (found, mode, expected) in rows {
+            assert_eq!(reaction(&found, mode, false), expected, "{found:?} {mode:?}");
+            let taught = reaction(&found, ControlMode::Teach, false);
+            assert_eq!(taught, expected.filter(|(reaction, _)| *reaction == Release), "{found:?}");
+            assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
+            // With the manual's words torque alone releases, and is no push before that.
+            let released = reaction(&found, mode, true);
+            if found.overloaded {
+                assert_eq!(released, Some((Release, torque)), "{found:?}");
+            } else if found.pushed {
+                assert_eq!(released, None, "{found:?}");
+            } else {
+                assert_eq!(released, expected, "{found:?}");
+            }
+        }
+    }
+}

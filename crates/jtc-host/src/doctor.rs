@@ -197,12 +197,13 @@ fn errors(s: &Status, all: &mut Findings) {
     for (j, joint) in s.joints.iter().enumerate() {
         let who = words::node(j);
         for word in words::joint_errors(joint.internal) {
-            all.add(
-                Problem,
-                format!("{who}: {word}"),
-                "",
-                "`jtc recover`, after the trajectory or the model was corrected",
-            );
+            let what = format!("{who}: {word}");
+            if s.is_held_stop() {
+                let why = "held stop: the arm met something, or its model lacks a load";
+                all.add(Problem, what, why, "remove the cause or give the payload, then `jtc clear`");
+            } else {
+                all.add(Problem, what, "", "`jtc recover`, after the trajectory or the model was corrected");
+            }
         }
         for word in words::node_errors(joint.errors).into_iter().chain(words::motor_faults(joint.mc_current))
         {

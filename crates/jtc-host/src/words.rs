@@ -177,8 +177,15 @@ pub fn causes(s: &Status) -> Vec<String> {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    all.extend(errors(s.errors & !error::EMERGENCY_INPUT).into_iter().map(String::from));
+    // The bit of a held stop says no more than its joints do.
+    let own = if s.is_held_stop() { 0 } else { s.errors & !error::EMERGENCY_INPUT };
+    all.extend(errors(own).into_iter().map(String::from));
     all
+}
+
+/// Causes of a held stop, in one line.
+pub fn held_stop(s: &Status) -> String {
+    causes(s).join(", ")
 }
 
 /// What nodes warn of and is no error.
@@ -196,6 +203,8 @@ pub fn errors_line(s: &Status) -> String {
     let all = causes(s);
     if all.is_empty() {
         format!("no error bit is set (state {}, trajectory {})", s.state, s.trajectory)
+    } else if s.is_held_stop() {
+        format!("held stop: {}", held_stop(s))
     } else {
         all.join(", ")
     }
@@ -227,7 +236,9 @@ pub fn waiting_for(s: &Status) -> String {
 
 /// The command that leads on from here.
 pub fn next_step(s: &Status) -> &'static str {
-    if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
+    if s.is_held_stop() {
+        "remove the cause, then `jtc clear`: the arm is held, and nothing moves until then"
+    } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
         "`jtc recover --arm FILE`, or `--defaults` for the arm that is built into the controller"
     } else if s.errors != 0 || s.state == ControllerState::Error {
         "`jtc recover`"

@@ -324,6 +324,17 @@ impl Status {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])
     }
 
+    /// A held stop (J-69): the arm is held under torque, or comes to rest, and nothing moves until the cause that its joints report is
+    /// cleared.
+    pub fn is_held_stop(&self) -> bool {
+        self.errors == crate::error::INTERNAL_JOINTS && self.state != ControllerState::Error
+    }
+
+    /// The controller is in Error, or reports an error that is more than the cause of a held stop.
+    pub fn is_faulty(&self) -> bool {
+        (self.errors != 0 || self.state == ControllerState::Error) && !self.is_held_stop()
+    }
+
     /// The arm follows its trajectory, or slows down on it.
     pub fn is_executing(&self) -> bool {
         self.trajectory == TrajectoryState::Execute

@@ -156,6 +156,7 @@ fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
     let Failure { kind, code, message, next, facts } = failure;
     let kind = match kind {
         ErrorKind::Fault if code == "stopped" => "StoppedError",
+        ErrorKind::Fault if code == "held-stop" => "HeldStopError",
         ErrorKind::Usage => "UsageError",
         ErrorKind::NoLink => "NoLinkError",
         ErrorKind::Refused => "RefusedError",

@@ -20,7 +20,8 @@ test('each state has a word, and says what leads on', () => {
     [{ state: 'Teaching' }, 'Teaching', 'teach'],
     [{ state: 'Init' }, 'No torque', 'off'],
     [{ state: 'Error' }, 'Error', 'error'],
-    [{ errors: ['emergency input'], causes: ['emergency input'] }, 'Error', 'error'],
+    [{ state: 'Error', errors: ['emergency input'], causes: ['emergency input'] }, 'Error', 'error'],
+    [{ errors: ['joint error'], error_codes: ['internal-joint-error'], causes: ['joint 3: torque over limit'] }, 'Held stop', 'error'],
   ];
   for (const [change, word, tone] of cases) {
     const words = stateWords(controller(change), undefined, []);
@@ -28,6 +29,9 @@ test('each state has a word, and says what leads on', () => {
     assert.ok(words.detail !== '');
   }
   assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'which-arm');
+  const held = controller({ state: 'Teaching', error_codes: ['internal-joint-error'], causes: ['joint 3: torque over limit'] });
+  assert.equal(stateWords(held, undefined, []).step, 'acknowledge');
+  assert.match(noJog(held), /Held stop/);
   assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);
 });
 

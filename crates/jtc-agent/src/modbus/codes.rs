@@ -112,7 +112,7 @@ pub const ERRORS: &[(u16, &str, &str)] = &[
     (7, "device-error", "the controller is in Error"),
     (8, "absent-joints", "joints are set absent"),
     (9, "run-fault", "the controller ended the motion with an error"),
-    (10, "paused-by-controller", "the controller paused the motion because of an error"),
+    (10, "held-stop", "the controller stopped the motion because of an error, and holds the arm"),
     (11, "refused", "the controller refused it"),
     (12, "segment-refused", "the controller refused a part of the trajectory"),
     (13, "upload-failed", "the trajectory did not reach the controller whole"),

@@ -161,7 +161,7 @@ fn still_teaching(e: LinkError) -> Failure {
 }
 
 fn without_error(s: Status) -> Result<Status, Failure> {
-    if s.state != ControllerState::Error && s.errors == 0 {
+    if !s.is_faulty() {
         return Ok(s);
     }
     let failure = Failure::new(ErrorKind::Fault, "run-fault", words::errors_line(&s));

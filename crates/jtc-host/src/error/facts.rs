@@ -177,7 +177,7 @@ impl Error {
             }
             Self::Motion(
                 MotionError::RunFault { point, status }
-                | MotionError::PausedByController { point, status, .. },
+                | MotionError::HeldStop { point, status, .. },
             ) => Facts { point: Some(*point), ..Facts::of_status(status) },
             Self::Motion(MotionError::LinkLost { last: Some(last), .. }) if last.is_executing() => {
                 Facts { point: Some(last.point), ..Facts::default() }

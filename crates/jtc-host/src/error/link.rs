@@ -146,7 +146,8 @@ fn after_refused_execution(
     // Execution from there is refused for another reason, and resume is not sent.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then_some(
-        "nothing is being executed, so there is nothing to pause or stop; `jtc status` shows the state",
+        "nothing is being executed, so there is nothing to pause or stop; after a held stop `jtc clear` comes first. `jtc status` shows \
+         the state",
     )
 }
 
@@ -164,7 +165,8 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &
         (DataStatus::NotAllowed, Some(ControllerState::Error)) => "the controller is in Error: `jtc recover`",
         (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => "`jtc teach off` first",
         (DataStatus::NotAllowed, _) => {
-            "`jtc status` shows the state; `jtc traj stop` ends a trajectory. No motion and no teaching where joints are set absent"
+            "`jtc status` shows the state; `jtc traj stop` ends a trajectory, `jtc clear` a held stop. No motion and no teaching where joints \
+             are set absent"
         }
         (DataStatus::StartPositionMismatch, _) => {
             "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"

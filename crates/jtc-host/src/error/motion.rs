@@ -41,9 +41,9 @@ pub enum MotionError {
         /// The status with the errors.
         status: Box<Status>,
     },
-    /// The controller paused the motion because of an error that it could still act upon (J-66).
-    #[error("the controller paused the motion at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::occurred_since(before, status))]
-    PausedByController {
+    /// The controller stopped the motion, and holds the arm (J-69).
+    #[error("the controller stopped the motion at point {point} ({:.3} s) and holds the arm: {}", f64::from(*point) * 1e-3, why_held(before, status))]
+    HeldStop {
         /// Index of the 1 ms point where it is paused.
         point: u32,
         /// Errors of each joint that had occurred before the motion.
@@ -61,6 +61,11 @@ pub enum MotionError {
         /// What happened to the link.
         source: Box<LinkError>,
     },
+}
+
+/// Why the arm is held, in one line; where that is not shown any more, what has occurred since.
+fn why_held(before: &[u16; 6], status: &Status) -> String {
+    if status.is_held_stop() { words::held_stop(status) } else { words::occurred_since(before, status) }
 }
 
 /// What is known about the motion when the link is gone.
@@ -121,11 +126,11 @@ impl Diagnose for MotionError {
                 "run-fault",
                 "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos",
             ),
-            Self::PausedByController { .. } => (
+            Self::HeldStop { .. } => (
                 ErrorKind::Fault,
-                "paused-by-controller",
-                "look what keeps the arm from its path: it is held where it gave way, with little torque. `jtc traj resume` goes on \
-                 once each joint is back within 0.02 rad of the path, `jtc traj stop` gives it up",
+                "held-stop",
+                "remove what the arm met, or give its payload; then `jtc clear`. `jtc traj resume` goes on once each joint is back within \
+                 0.02 rad of the path, `jtc traj stop` gives it up",
             ),
             Self::LinkLost { .. } => (
                 ErrorKind::NoLink,

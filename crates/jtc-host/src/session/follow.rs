@@ -45,8 +45,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`MotionError::RunFault`] when the controller ended the motion with an error, [`MotionError::PausedByController`] when it paused it
-    /// because of one, [`Error::Cancelled`] when `each` left it, [`MotionError::LinkLost`] when nothing is received any more: the arm
+    /// [`MotionError::RunFault`] when the controller ended the motion with an error, [`MotionError::HeldStop`] when it stopped it and holds
+    /// the arm, [`Error::Cancelled`] when `each` left it, [`MotionError::LinkLost`] when nothing is received any more: the arm
     /// may be moving.
     pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         self.follow_with(each, |_, _| {})
@@ -78,14 +78,13 @@ impl<P: Port> Session<P> {
                 point = status.point;
             }
             let flow = each(&status);
-            if status.state == ControllerState::Error || status.errors != 0 {
+            if status.is_faulty() {
                 return Err(MotionError::RunFault { point, status: Box::new(status) }.into());
             }
             let before = *occurred.get_or_insert(errors_occurred(&status));
-            if status.trajectory == TrajectoryState::Pause && errors_occurred(&status) != before {
-                return Err(
-                    MotionError::PausedByController { point, before, status: Box::new(status) }.into()
-                );
+            let held = status.is_held_stop() || errors_occurred(&status) != before;
+            if status.trajectory == TrajectoryState::Pause && held {
+                return Err(MotionError::HeldStop { point, before, status: Box::new(status) }.into());
             }
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),

@@ -74,7 +74,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller has released the arm; those of the line.
+    /// [`StateError::Device`] when the controller has released the arm, or holds it because of an error (J-69); those of the line.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
         // Refused where nothing is jogged any more, which is just as well.
         match self.jog(&[0.0; JOINTS]) {
@@ -84,12 +84,13 @@ impl<P: Port> Session<P> {
         let (end, mut standstill) = (self.now() + REST, Standstill::after(Halt::Pause));
         loop {
             let status = self.next_status()?;
+            let device = || StateError::Device { status: Box::new(status) };
             if status.state == ControllerState::Error {
-                return Err(StateError::Device { status: Box::new(status) }.into());
+                return Err(device().into());
             }
             standstill.see(self.now(), &status);
             if standstill.is_reached() {
-                return Ok(Some(status));
+                return if status.is_held_stop() { Err(device().into()) } else { Ok(Some(status)) };
             }
             if self.now() > end {
                 return Ok(None);

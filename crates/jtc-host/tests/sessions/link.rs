@@ -248,7 +248,7 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     inject(&mut s, FaultKind::Push { joint: Joint::ALL[4], torque: 38.0 }, Trigger::AtPoint(500), 400);
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
-    assert_eq!((error.code(), error.kind()), ("paused-by-controller", ErrorKind::Fault));
+    assert_eq!((error.code(), error.kind()), ("held-stop", ErrorKind::Fault));
     let text = error.to_string();
     assert!(text.contains("joint 5: position error"), "{text}");
     assert!(error.hint().contains("jtc traj resume"));

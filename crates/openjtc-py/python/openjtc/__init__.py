@@ -20,7 +20,16 @@ Joints are counted from 1, base to wrist; arrays have one column a joint. Angles
 from openjtc._native import Arm, Trajectory, __version__
 from openjtc._native import example_text as example_text
 from openjtc.connection import connect
-from openjtc.errors import DeviceError, Error, FaultError, NoLinkError, RefusedError, StoppedError, UsageError
+from openjtc.errors import (
+    DeviceError,
+    Error,
+    FaultError,
+    HeldStopError,
+    NoLinkError,
+    RefusedError,
+    StoppedError,
+    UsageError,
+)
 from openjtc.motion import Motion, Teaching
 from openjtc.payload import Payload
 from openjtc.planning import Planner
@@ -36,6 +45,7 @@ __all__ = [
     "FaultError",
     "Finding",
     "FlightLog",
+    "HeldStopError",
     "JointFigures",
     "Motion",
     "NoLinkError",

@@ -82,6 +82,13 @@ class FaultError(Error):
     """It went wrong on the way, or was cancelled there. The message says whether the arm may be moving."""
 
 
+class HeldStopError(FaultError):
+    """The controller stopped the arm and holds it: it met something, or a load that its model lacks. Its code is ``held-stop``.
+
+    ``cause`` and ``joint`` name what the controller found. Nothing moves until ``robot.recover()``, which comes after a look at the arm.
+    """
+
+
 class StoppedError(FaultError):
     """Somebody stopped the arm while this waited for it: another thread, another program, whoever looks after the arm. Its code is ``stopped``.
 

@@ -144,7 +144,7 @@ impl Machine {
         let mut last = start;
         while !asked.is_halted() && self.session.now() - start < time {
             let status = self.session.next_status()?;
-            if status.state == ControllerState::Error || status.errors != 0 {
+            if status.is_faulty() {
                 let failure =
                     Failure::fault("run-fault", words::errors_line(&status), words::next_step(&status));
                 return Err(Failure { facts: Box::new(Facts::of_status(&status)), ..failure });

@@ -3,7 +3,7 @@ import type { Controller, Happening, InfoObject } from './types.ts';
 import { count, duration } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
 
-export type Step = 'recover' | 'which-arm' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
+export type Step = 'recover' | 'acknowledge' | 'which-arm' | 'resume' | 'teach-off' | 'give-arm' | 'run' | 'token' | 'bench';
 
 export interface Cause {
   words: string;
@@ -40,6 +40,11 @@ export function hasTorque(controller: Controller | null | undefined): boolean {
 /** Drives that are not enabled yet, from 1: the controller holds its position with those that are. */
 export function enabling(controller: Controller): number[] {
   return controller.joints.filter((joint) => joint.state !== 'OperationEnable' && joint.state !== 'Start').map((joint) => joint.joint);
+}
+
+/** The controller stopped the arm because of an error, and holds it under torque (J-69). */
+export function isHeldStop(controller: Controller): boolean {
+  return hasTorque(controller) && controller.error_codes.length > 0;
 }
 
 /** Every joint that is there is held: what moves the arm can begin. */
@@ -98,6 +103,12 @@ const MOVES_RAD_S = 0.01;
 export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
   const causes = causesOf(controller);
   const base = { causes, next: '' };
+  if (isHeldStop(controller)) {
+    return {
+      ...base, tone: 'error', word: 'Held stop', detail: `${causes[0]?.words ?? 'The controller stopped the arm'}. The arm is held.`,
+      next: 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.', step: 'acknowledge',
+    };
+  }
   if (controller.state === 'Error' || causes.length > 0) {
     const first = causes[0]?.words ?? 'an error that is over';
     const torque = controller.state === 'Error' ? 'All torques are off.' : '';

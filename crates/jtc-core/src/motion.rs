@@ -10,8 +10,6 @@ mod set_values;
 mod torque;
 mod transfer;
 
-use jtc_dynamics::Dynamics;
-
 use crate::JOINTS;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
@@ -63,18 +61,10 @@ impl Motion {
         self.law.begin();
     }
 
-    /// A joint yields from the next tick on (J-68), or lowers its load (J-70).
-    pub fn begin_yield(
-        &mut self,
-        joint: usize,
-        lowers: bool,
-        nodes: &Nodes,
-        config: &Config,
-        dynamics: &Dynamics,
-    ) {
-        let limits = &config.joints[joint];
-        let inertia = dynamics.mass_matrix(nodes.positions())[joint][joint] + limits.rotor_inertia;
-        self.law.begin_yield(joint, lowers, self.set.point.position[joint], inertia, limits.torque_max);
+    /// A joint yields from the next tick on (J-68), or lowers its load (J-70). The ramp has its inertia.
+    pub fn begin_yield(&mut self, joint: usize, lowers: bool, config: &Config) {
+        let (set, limit) = (self.set.point.position[joint], config.joints[joint].torque_max);
+        self.law.begin_yield(joint, lowers, set, self.ramp.inertia(joint), limit);
         self.limiter.forget(joint);
     }
 

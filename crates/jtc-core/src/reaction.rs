@@ -64,33 +64,33 @@ fn reaction(found: &Found, mode: ControlMode, releases: bool) -> Option<(Reactio
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Reacts to what the control law has found of the joints. Returns the joint errors that release the arm.
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
-        let mut release = [0; JOINTS];
-        let mut causes = [0; JOINTS];
+        let (mut release, mut causes) = ([0; JOINTS], [0; JOINTS]);
+        let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
         for (j, found) in found.iter().enumerate() {
             let Some((reaction, cause)) = reaction(found, mode, self.config.torque_release) else {
                 continue;
             };
             match reaction {
-                Reaction::Release => {
-                    release[j] = cause;
-                    continue;
-                }
-                Reaction::Yield => self.begin_yield(j, false),
-                Reaction::Lower => self.begin_yield(j, true),
-                Reaction::Stop => {}
+                Reaction::Release => release[j] = cause,
+                _ => causes[j] = cause,
             }
-            causes[j] = cause;
+            (yields[j], lowers[j]) = (reaction == Reaction::Yield, reaction == Reaction::Lower);
         }
-        if causes != [0; JOINTS] && release == [0; JOINTS] {
-            self.hold_stop(&causes);
+        if causes == [0; JOINTS] || release != [0; JOINTS] {
+            return release;
+        }
+        let before = self.braking_ms;
+        self.hold_stop(&causes);
+        if yields != lowers {
+            // The begin of a stop has computed the inertia already: one mass matrix in a tick.
+            if self.braking_ms == before {
+                self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+            }
+            for j in (0..JOINTS).filter(|j| yields[*j] || lowers[*j]) {
+                self.motion.begin_yield(j, lowers[j], &self.config);
+            }
         }
         release
-    }
-
-    /// A joint yields or lowers its load from the next tick on.
-    pub(crate) fn begin_yield(&mut self, joint: usize, lowers: bool) {
-        let dynamics = self.parameters.control().dynamics;
-        self.motion.begin_yield(joint, lowers, &self.nodes, &self.config, dynamics);
     }
 
     /// A held stop begins (J-69): what moves comes to rest, and the arm is held.

@@ -326,7 +326,9 @@ mod tests {
         assert_eq!((over_after(0.0), over_after(-0.049), over_after(0.05)), (Some(200), Some(200), None));
         let limits = limits();
         let mut stays = Yield::begin(false, true, 0.0, INERTIA, 0.0);
-        (0..300).for_each(|_| drop(tick(&mut stays, &at(&limits, 0.0, 0.0, 0.0))));
+        for _ in 0..300 {
+            tick(&mut stays, &at(&limits, 0.0, 0.0, 0.0));
+        }
         assert!(stays.is_calm() && !stays.is_over(), "the host decides");
         stays.clear();
         assert!(stays.is_over());
@@ -366,14 +368,16 @@ mod tests {
             assert_eq!(over, held, "{load} N·m");
         }
         let mut moves = Yield::begin(true, false, 0.0, INERTIA, 0.0);
-        (0..300).for_each(|_| drop(tick(&mut moves, &at(&limits, 0.0, -0.02, 100.0))));
+        for _ in 0..300 {
+            tick(&mut moves, &at(&limits, 0.0, -0.02, 100.0));
+        }
         assert!(!moves.is_calm());
     }
 
     #[test]
     fn j68_the_third_time_within_ten_seconds_each_is_too_often() {
         let mut yielded = Yielded::default();
-        let mut wait = |yielded: &mut Yielded, ms: u16| (0..ms).for_each(|_| yielded.step());
+        let wait = |yielded: &mut Yielded, ms: u16| (0..ms).for_each(|_| yielded.step());
         assert!(!yielded.count(2));
         wait(&mut yielded, AGAIN_MS - 1);
         assert!(!yielded.count(2) && !yielded.count(3));

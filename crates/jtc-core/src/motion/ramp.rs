@@ -33,6 +33,11 @@ impl PathRamp {
         }
     }
 
+    /// Inertia that a joint moved at the begin of the ramp with the others held, kg·m².
+    pub fn inertia(&self, joint: usize) -> f64 {
+        self.inertia[joint][joint]
+    }
+
     /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `torque` as for `slope_bounds`.
     pub fn step(
         &self,

@@ -77,14 +77,9 @@ impl Catch {
         self.left_ms > 0
     }
 
-    /// The swing has grown from one half to the next: the loop is unstable.
+    /// The swing of a joint that has not settled yet has grown from one half to the next: its loop is unstable.
     pub fn swing_grows(&self) -> bool {
-        self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
-    }
-
-    /// It is over, and the joint has not settled.
-    fn ended() -> Self {
-        Self { busy_ms: CALM_MS, ..Self::default() }
+        !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
     /// The computed torque exceeds the limit by `excess` (N·m) at a position error of `error` (rad): returns by how much the set
@@ -97,7 +92,8 @@ impl Catch {
         let sag = self.sag + step;
         let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
         if !good {
-            *self = Self::ended();
+            // It is over, and the joint has not settled.
+            (self.left_ms, self.busy_ms) = (0, CALM_MS);
             return 0.0;
         }
         (self.sag, self.busy_ms) = (sag, CALM_MS);

@@ -5,6 +5,7 @@ use jtc_dynamics::sqrt;
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
+use crate::hold_back::{HoldBack, Next};
 use crate::motion;
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState, joint_error};
@@ -20,6 +21,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.clock = PathClock::default();
         self.phase = Phase::BEGIN;
         self.braking_ms = None;
+        self.motion.hold_back = HoldBack::default();
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
@@ -59,6 +61,33 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn set_speed(&mut self, speed: f64) {
         self.config.speed = speed;
         if self.clock.set_pace(speed) {
+            self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+        }
+    }
+
+    /// A joint is overloaded by the motion along the path: path time is held back (J-75). Returns false where the arm is not on its path, or
+    /// stops on it already.
+    pub(crate) fn hold_back(&mut self) -> bool {
+        if self.phase != (Phase::Running { leave: None }) {
+            return false;
+        }
+        if self.motion.hold_back.begin() {
+            self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+        }
+        true
+    }
+
+    /// A tick on a path that is held back.
+    pub(crate) fn step_hold_back(&mut self) {
+        if !self.motion.hold_back.is_active() || self.phase != (Phase::Running { leave: None }) {
+            return;
+        }
+        let (pressed, lags) = self.motion.presses(&self.nodes, &self.config);
+        let next = self.motion.hold_back.step(pressed.contains(&true));
+        if next == Next::Stop || lags {
+            let cause = |pressed: bool| if pressed { joint_error::TORQUE } else { 0 };
+            self.hold_stop(&pressed.map(cause));
+        } else if next == Next::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
         }
     }
@@ -171,7 +200,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Set values at the present path time.
     fn follow(&mut self) {
-        if self.clock.at_full_speed() {
+        if self.clock.at_full_speed() && !self.motion.hold_back.is_active() {
             self.clock.slope = 0.0;
             self.store.put(self.clock.time, &mut self.motion.set.point);
             return;

@@ -15,6 +15,7 @@ mod errors;
 mod execution;
 mod extension;
 pub mod friction;
+mod hold_back;
 mod host;
 mod interpolation;
 mod io;

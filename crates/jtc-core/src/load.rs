@@ -19,12 +19,12 @@ const STEADY_S: f64 = 10.0;
 /// The load of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
-    /// N·m.
-    torque: f64,
+    /// N·m. Single precision, because the flight recorder keeps it.
+    torque: f32,
     /// The joint has settled since it was enabled, or since its load was forgotten.
     known: bool,
     /// Integral at the begin of steady holding, N·m, and observations since.
-    steady: f64,
+    steady: f32,
     observations: u16,
 }
 
@@ -38,17 +38,17 @@ impl Load {
 
     /// N·m; what the `integral` (N·m) has found, before the load is known.
     pub fn torque(&self, integral: f64) -> f64 {
-        if self.known { self.torque } else { integral }
+        if self.known { self.torque.into() } else { integral }
     }
 
     /// N·m; none before the load is known.
     pub fn known_torque(&self) -> f64 {
-        self.torque
+        self.torque.into()
     }
 
     /// It was found in another way: a load that was lowered has become this torque, N·m.
     pub fn set(&mut self, torque: f64) {
-        *self = Self { torque, known: true, ..Self::default() };
+        *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
 
     /// Observes the torque of the `integral` (N·m) of a joint that has `settled` since it was enabled; once in [`PERIOD`] ticks.
@@ -57,18 +57,18 @@ impl Load {
             self.forget();
             return;
         }
-        let limit = limits.torque_max;
-        let highest = (HIGHEST * limit).max(self.torque.abs());
-        let bounded = |torque: f64| torque.max(-highest).min(highest);
-        if (integral - self.steady).abs() > STEADY * limit {
-            (self.steady, self.observations) = (integral, 0);
+        let (limit, torque) = (limits.torque_max, f64::from(self.torque));
+        let highest = (HIGHEST * limit).max(torque.abs());
+        let bounded = |torque: f64| torque.max(-highest).min(highest) as f32;
+        if (integral - f64::from(self.steady)).abs() > STEADY * limit {
+            (self.steady, self.observations) = (integral as f32, 0);
         }
         self.observations = self.observations.saturating_add(1);
         let steady = f64::from(self.observations) * PERIOD * DT >= STEADY_S;
         if !self.known || steady {
             (self.torque, self.known) = (bounded(integral), true);
-        } else if (integral - self.torque).abs() <= APART * limit {
-            self.torque = bounded(self.torque + (integral - self.torque) * (PERIOD * DT / TIME_S));
+        } else if (integral - torque).abs() <= APART * limit {
+            self.torque = bounded(torque + (integral - torque) * (PERIOD * DT / TIME_S));
         }
     }
 }

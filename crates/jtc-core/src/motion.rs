@@ -12,6 +12,7 @@ mod transfer;
 
 use crate::JOINTS;
 use crate::config::Config;
+use crate::hold_back::HoldBack;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
@@ -39,20 +40,22 @@ pub(crate) struct Motion {
     limiter: Limiter,
     pub over_speed: OverSpeed,
     pub ramp: PathRamp,
+    pub hold_back: HoldBack,
 }
 
-remembered!(Motion { set, law, limiter, over_speed, ramp });
+remembered!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
     /// Torque off: nothing is held, no torque is remembered. Without torque that is so in every tick: each part is made new in
     /// its place, not all of them on the stack and copied.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { set, law, limiter, over_speed, ramp } = self;
+        let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
         law.release();
         *limiter = Limiter::default();
         *over_speed = OverSpeed::default();
         *ramp = PathRamp::default();
+        *hold_back = HoldBack::default();
     }
 
     /// Begin to hold where the arm is, coming to rest first if it moves.
@@ -66,6 +69,13 @@ impl Motion {
         let (set, limit) = (self.set.point.position[joint], config.joints[joint].torque_max);
         self.law.begin_yield(joint, lowers, set, self.ramp.inertia(joint), limit);
         self.limiter.forget(joint);
+    }
+
+    /// Torque limits that the law is at, and position errors beyond half of what they may be.
+    pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], bool) {
+        let (due, q) = (self.set.due(config), nodes.positions());
+        let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
+        (self.limiter.saturated(), (0..JOINTS).any(|j| !self.law.yields(j) && lags(j)))
     }
 
     /// The arm is held at rest, and what it carries is known, or may be a `contact` and is none of it.
@@ -107,7 +117,11 @@ impl Motion {
 
     /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
-        self.ramp.step(at, &self.law.torque, clock, config);
+        if self.hold_back.is_active() && !clock.halting() {
+            self.ramp.hold_back(at, &self.law.torque, clock, config);
+        } else {
+            self.ramp.step(at, &self.law.torque, clock, config);
+        }
         self.set.follow(at, clock.rate, clock.slope);
     }
 

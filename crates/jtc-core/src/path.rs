@@ -45,6 +45,8 @@ pub struct SlopeBounds {
 /// A slope in the wrong direction (a pause during a resume) is taken out this much faster than a ramp is rounded; a stop in a
 /// hurry changes its slope as fast.
 const REVERSAL: f64 = 8.0;
+/// Part of the way to the wanted slope that a held back path goes in a tick.
+const SETTLES: f64 = 0.1;
 /// Share of the time for a stop within which it is to end: the rest is for what the path still has in store.
 const PUNCTUAL: f64 = 0.6;
 
@@ -162,6 +164,16 @@ impl PathClock {
             self.rate = (self.rate + sign * slope * DT).clamp(0.0, 1.0);
             self.slope = sign * slope;
         }
+    }
+
+    /// As fast as now, or slower where the slope would leave `bounds` otherwise. Joints that contradict each other keep the rate, and so
+    /// do those that only a faster path would relieve.
+    pub fn hold_back(&mut self, (low, high): Bounds) {
+        let wanted = if low <= high { high.min(0.0) } else { 0.0 };
+        // The torques that the bounds come from are noisy.
+        let slope = self.slope + SETTLES * (wanted - self.slope);
+        self.rate = (self.rate + slope * DT).clamp(0.0, 1.0);
+        self.slope = if self.rate > 0.0 { slope } else { 0.0 };
     }
 
     /// On the way to standstill, in at most `stop_ms` wherever the torque limits allow it: along an S of `ramp_ms` while that is

@@ -129,7 +129,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.latch(&self.nodes, &self.config);
         let mode = self.phase.mode();
         self.walk();
-        self.control(mode)
+        let torque = self.control(mode);
+        self.step_hold_back();
+        torque
     }
 
     /// The control law and its limits: the torques to command, and the errors that were not acted upon (J-66).

@@ -35,7 +35,7 @@ const LEARNS_S: f64 = 0.5;
 const HOLDABLE: f64 = 0.95;
 /// Missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Yields in a row, each within [`AGAIN_MS`] of the last one, of which the last one goes on until the host clears it.
+/// Yields of a joint, while one of the arm comes within [`AGAIN_MS`] of the one before, of which the last one goes on until the host clears it.
 const TIMES: u8 = 3;
 /// See [`TIMES`].
 const AGAIN_MS: u16 = 10_000;
@@ -178,7 +178,8 @@ fn soft_end(joint: &Joint<'_>, most: f64) -> f64 {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],
-    since_ms: [u16; JOINTS],
+    /// Ticks since one did.
+    since_ms: u16,
 }
 
 remembered!(Yielded { times, since_ms });
@@ -186,20 +187,17 @@ remembered!(Yielded { times, since_ms });
 impl Yielded {
     /// A tick.
     pub fn step(&mut self) {
-        for (times, since_ms) in self.times.iter_mut().zip(&mut self.since_ms) {
-            *since_ms = since_ms.saturating_add(1);
-            if *since_ms >= AGAIN_MS {
-                *times = 0;
-            }
+        self.since_ms = self.since_ms.saturating_add(1).min(AGAIN_MS);
+        if self.since_ms == AGAIN_MS {
+            self.times = [0; JOINTS];
         }
     }
 
-    /// The joint yields. Returns whether it does so too often: it is to go on until the host clears it.
+    /// The joint yields. Returns whether it does so too often: it goes on until the host clears it.
     pub fn count(&mut self, joint: usize) -> bool {
-        let (Some(times), Some(since_ms)) = (self.times.get_mut(joint), self.since_ms.get_mut(joint)) else {
-            return false;
-        };
-        (*times, *since_ms) = (times.saturating_add(1), 0);
+        self.since_ms = 0;
+        let Some(times) = self.times.get_mut(joint) else { return false };
+        *times = times.saturating_add(1);
         *times >= TIMES
     }
 }

@@ -123,7 +123,7 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     push_at_random(9, true);
 }
 
-/// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 100 ms after it is noticed on the drive presses the joint against it with
+/// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after it is noticed on the drive presses the joint against it with
 /// no more than its share, and it is a held stop.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
@@ -147,12 +147,12 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
                 // A joint that the wall throws back is braked.
-                if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 100) {
+                if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - gravity(&model, &arm.q)[joint]) * sign);
                 }
             }
             let (met, noticed) = (met.expect(&about), noticed.expect(&about));
-            assert!(noticed <= met + 60, "{about}: met at {met} ms, noticed at {noticed} ms");
+            assert!(noticed <= met + 200, "{about}: met at {met} ms, noticed at {noticed} ms");
             let t = rig.controller.telemetry();
             assert_eq!(
                 (t.state, t.trajectory),
@@ -257,5 +257,84 @@ fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
             assert_eq!(rig.state(), ControllerState::HoldPos, "{times:?}, {k} ms");
             assert!(fastest(&arm) < 0.5, "{times:?}, {k} ms: {} rad/s", fastest(&arm));
         }
+    }
+}
+
+/// Random motions that need 95 % of a torque limit by the model, on arms that are heavier and have more friction than it: none is released.
+#[test]
+fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
+    println!("seed 21");
+    let mut random = Random(21);
+    let config = Config::avena();
+    let dynamics = Dynamics::new(&Parameters::avena().model, config.gravity);
+    for (friction, mass, finish) in
+        [(1.0, 1.0, 16), (1.2, 1.1, 12), (1.5, 1.0, 5), (1.0, 1.2, 12), (2.0, 1.0, 0)]
+    {
+        let (mut ended, mut slower) = ([0; 3], 0.0_f64);
+        for _ in 0..16 {
+            let pose: [f64; 6] = core::array::from_fn(|j| POSES[0][j] + random.between(-0.5, 0.5));
+            let to: [f64; 6] = core::array::from_fn(|j| pose[j] + random.between(-1.2, 1.2));
+            // As fast as 95 % of a torque limit or the velocity limit allow.
+            let peak = |seconds: f64| {
+                (0..200)
+                    .map(|i| {
+                        let u = f64::from(i) / 199.0;
+                        let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+                        let speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds;
+                        let curve = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (seconds * seconds);
+                        let (q, v, a): ([f64; 6], [f64; 6], [f64; 6]) = (
+                            core::array::from_fn(|j| pose[j] + (to[j] - pose[j]) * rise),
+                            core::array::from_fn(|j| (to[j] - pose[j]) * speed),
+                            core::array::from_fn(|j| (to[j] - pose[j]) * curve),
+                        );
+                        let torque = dynamics.inverse(&q, &v, &a);
+                        (0..6)
+                            .map(|j| {
+                                let lugre = LuGre::avena(j, 1.2);
+                                let friction = (lugre.coulomb + lugre.viscous * v[j].abs()) * v[j].signum();
+                                let limits = &config.joints[j];
+                                let all = torque[j] + limits.rotor_inertia * a[j] + friction;
+                                (all / (0.95 * limits.torque_max))
+                                    .abs()
+                                    .max(v[j].abs() / (0.95 * limits.velocity_max))
+                                    .max(a[j].abs() / (0.95 * limits.acceleration_max))
+                            })
+                            .fold(0.0, f64::max)
+                    })
+                    .fold(0.0, f64::max)
+            };
+            let mut seconds = 0.4;
+            while peak(seconds) > 1.0 && seconds < 6.0 {
+                seconds *= 1.02;
+            }
+            let (mut arm, mut rig) =
+                held(&heavier(Parameters::avena().model, mass), LuGre::of_avena_times(friction), pose);
+            begin(&mut rig, &motion(&pose, &to, seconds));
+            let mut ms = 0;
+            while ms < 20_000
+                && rig.state() != ControllerState::Error
+                && !(ms > 500 && rig.trajectory() != TrajectoryState::Execute)
+            {
+                arm.tick(&mut rig);
+                ms += 1;
+            }
+            let end = if rig.state() == ControllerState::Error {
+                2
+            } else if rig.trajectory() == TrajectoryState::Finish {
+                0
+            } else {
+                1
+            };
+            ended[end] += 1;
+            if end == 0 {
+                slower = slower.max(f64::from(ms) * 1e-3 / (seconds + 0.2));
+            }
+        }
+        println!(
+            "friction times {friction}, masses times {mass}: {} finished, {} held, {} released; {slower:.2} times as long",
+            ended[0], ended[1], ended[2]
+        );
+        assert_eq!(ended[2], 0, "friction times {friction}, masses times {mass}");
+        assert!(ended[0] >= finish && slower < 1.2, "friction times {friction}, masses times {mass}");
     }
 }

@@ -53,7 +53,8 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
             let correction =
                 if joint.state == NodeState::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
             let step = (correction - *last).abs();
-            assert!(step < 12.0, "{after_ms} + {ms} ms: torque step of {step} N·m");
+            // The torque of a joint that begins to yield falls within 10 ms (J-68).
+            assert!(step < 12.0 || joint.internal != 0, "{after_ms} + {ms} ms: torque step of {step} N·m");
             *last = correction;
         }
     }

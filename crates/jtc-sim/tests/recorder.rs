@@ -124,7 +124,8 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
-    for ms in 0..3_500u32 {
+    let mut least = usize::MAX;
+    for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
         // Frames that take a few instructions each, and parameters, which call for a snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
@@ -132,11 +133,12 @@ fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
         operator.world.host_write(&fixed::GET_INFO);
         operator.world.host_write(&fixed::PID_PARAM_USE_DEFAULT);
         operator.step();
+        if ms >= 3_500 && ms % 10 == 0 {
+            least = least.min(ticks(&blocks(&operator.world)));
+        }
     }
-    let blocks = blocks(&operator.world);
-    let kept = ticks(&blocks);
-    println!("{kept} ticks in {} blocks", blocks.len());
-    assert!(kept >= 2_300 + usize::from(SNAPSHOT_MS), "{kept} ticks");
+    println!("{least} ticks");
+    assert!(least >= 2_300, "{least} ticks");
 }
 
 /// Ticks in these blocks.

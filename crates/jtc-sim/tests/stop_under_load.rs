@@ -52,17 +52,19 @@ fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     }
 }
 
-/// Where it does not suffice, everything there is brakes; what still moves after its time is an error.
+/// Where it does not suffice, everything there is brakes; what still moves after its time lowers its load, slower and slower.
 #[test]
 fn j33_the_full_limit_brakes_where_the_time_cannot_be_kept() {
     for (share, speed) in [(0.97, 0.4), (0.99, 0.2), (0.99, 0.4), (1.02, 0.2), (1.02, 0.4)] {
         let outcome = Lowering::at_share(share, speed).run().expect("it is lowered");
         println!("{share} {speed}: {outcome:?}");
-        // Set values keep to what the arm achieves, and it never gains speed.
-        assert!(outcome.error < 5e-3 && outcome.peak <= 1.03 * speed, "{outcome:?}");
+        // Set values keep to what the arm achieves; it gains speed only where its load gets heavier than what it can hold.
+        let peak = if share < 0.99 { 1.03 * speed } else { 0.6 };
+        assert!(outcome.error < 5e-3 && outcome.peak <= peak, "{outcome:?}");
         // Friction, which is not counted on, brakes as well: the speed falls, and with it the way is short.
-        assert!(outcome.way <= 0.7 * speed, "{outcome:?}");
-        // In Operate for a second at most; then it stands, or was an error, and the brakes hold it.
-        assert!(outcome.commanded_ms <= 1_002 && outcome.standing_ms <= 1_100, "{outcome:?}");
+        assert!(outcome.way <= if share < 0.99 { 0.7 * speed } else { 1.0 }, "{outcome:?}");
+        // In Operate for a second at most; it is held all the time.
+        assert!(outcome.commanded_ms <= 1_002 && outcome.state == ControllerState::HoldPos, "{outcome:?}");
+        assert!(outcome.standing_ms <= if share < 0.99 { 1_100 } else { 6_000 }, "{outcome:?}");
     }
 }

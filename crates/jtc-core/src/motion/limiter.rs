@@ -7,6 +7,9 @@ use crate::{JOINTS, joint_error};
 
 /// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
 pub(super) const DRIVEN: f64 = 0.05;
+/// Share of the velocity limit from which on the feedback torque may be twice as high: friction and inertia that the model has wrong are no
+/// push, and what stands in the way of a fast motion exceeds that some milliseconds later.
+const FAST: f64 = 0.2;
 /// Of the last 100 ticks, more than which a feedback torque beyond its share makes a pushed joint (J-66).
 const PUSHED_MS: u16 = 20;
 
@@ -81,9 +84,9 @@ impl Limiter {
             let error = due[j] - q[j];
             let computed = law.torque[j].sum();
             let yields = law.yields(j);
-            let caught = set.catch[j].step(v[j]);
-            let catching = caught && mode == ControlMode::Hold && !yields;
-            let unstable = !caught && !yields && set.catch[j].swing_grows();
+            let holds = mode == ControlMode::Hold && !yields;
+            let catching = set.catch[j].step(v[j]) && holds;
+            let unstable = holds && set.catch[j].swing_grows();
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
@@ -92,7 +95,8 @@ impl Limiter {
                 self.saturation[j].limit(computed, limits, config.torque_over_ms, excuses);
             let settled = set.catch[j].settled();
             let feedback = law.feedback(j);
-            let strained = feedback.abs() > config.yield_torque_share * limits.torque_max;
+            let speed = (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
+            let strained = feedback.abs() > (1.0 + speed) * config.yield_torque_share * limits.torque_max;
             // What brakes a joint is no push against it; what presses one that stands is.
             let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
             let counts = strained & settled & !brakes & !yields & (mode != ControlMode::Teach);

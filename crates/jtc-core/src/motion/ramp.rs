@@ -59,6 +59,17 @@ impl PathRamp {
         }
     }
 
+    /// A tick of a clock that is held back by joints at their torque limits (J-75).
+    pub fn hold_back(
+        &self,
+        at: &SetPoint,
+        torque: &[JointTorque; JOINTS],
+        clock: &mut PathClock,
+        config: &Config,
+    ) {
+        clock.hold_back(self.slope_bounds(at, torque, clock.rate, clock.slope, config).full);
+    }
+
     /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
     /// has left is counted from the last `torque`, with all its parts: a joint that already falls behind has less.
     fn slope_bounds(

@@ -36,8 +36,8 @@ pub(super) struct Transfer {
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
-    /// Time over which it is blended out, ms.
-    length_ms: [u16; JOINTS],
+    /// It is blended out within [`FALL_MS`].
+    falls: [bool; JOINTS],
     /// Time left until nothing is left of any of them, ms.
     left_ms: u16,
     /// Joints that yield from this tick on: what their torque loses is gone soon.
@@ -48,7 +48,7 @@ pub(super) struct Transfer {
     next: Option<Continued>,
 }
 
-remembered!(Transfer { step, step_ms, length_ms, left_ms, yields, just_enabled, next });
+remembered!(Transfer { step, step_ms, falls, left_ms, yields, just_enabled, next });
 
 impl Remembered for Continued {
     fn write<S: BitSink>(&self, to: &mut S) {
@@ -100,19 +100,19 @@ impl Transfer {
             for j in 0..JOINTS {
                 let step = before[j] - continued.of(&torque[j]);
                 let falls = core::mem::take(&mut self.yields[j]) && step * before[j] > 0.0;
-                self.begin_step(j, step, if falls { FALL_MS } else { config.blend_ms });
+                self.begin_step(j, step, falls, config);
             }
         }
         if self.just_enabled.contains(&true) {
             for j in 0..JOINTS {
                 if core::mem::take(&mut self.just_enabled[j]) {
-                    self.begin_step(j, -torque[j].correction(), config.blend_ms);
+                    self.begin_step(j, -torque[j].correction(), false, config);
                 }
             }
         }
         if self.left_ms > 0 {
             self.left_ms -= 1;
-            self.blend_steps(torque);
+            self.blend_steps(torque, config);
         }
         for (j, torque) in torque.iter_mut().enumerate() {
             if !nodes.node(j).enabled() {
@@ -123,15 +123,16 @@ impl Transfer {
     }
 
     /// A step of a joint is to be blended out from now on.
-    fn begin_step(&mut self, j: usize, step: f64, length_ms: u16) {
-        (self.step[j], self.step_ms[j], self.length_ms[j]) = (step, 0, length_ms.max(1));
-        self.left_ms = self.left_ms.max(self.length_ms[j]);
+    fn begin_step(&mut self, j: usize, step: f64, falls: bool, config: &Config) {
+        (self.step[j], self.step_ms[j], self.falls[j]) = (step, 0, falls);
+        self.left_ms = config.blend_ms.max(FALL_MS);
     }
 
     /// Adds what is left of the steps in this tick.
-    fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS]) {
+    fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS], config: &Config) {
         for j in 0..JOINTS {
-            let left = 1.0 - smooth(f64::from(self.step_ms[j]) / f64::from(self.length_ms[j].max(1)));
+            let length_ms = if self.falls[j] { FALL_MS } else { config.blend_ms };
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) / f64::from(length_ms.max(1)));
             self.step_ms[j] = self.step_ms[j].saturating_add(1);
             torque[j].blend = self.step[j] * left;
         }

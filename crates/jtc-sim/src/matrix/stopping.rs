@@ -26,7 +26,7 @@ pub fn stopping_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "From the last byte of the command. The loaded arm is one whose shoulder (joint {}) is lowered through a place where\n\
          holding it takes that share of its torque limit, which is lower than the default one for this. Where the torque that is left\n\
-         does not suffice, all of it brakes for a second; what moves then is an error. `jtc traj check` refuses such a path. The\n\
+         does not suffice, all of it brakes for a second; a joint that moves then lowers its load (J-70). `jtc traj check` refuses such a path. The\n\
          payloads are at the centre of the last link of the default arm, lowered at {} rad/s: in the arm model of the controller,\n\
          or unknown to it. The sag is how far a joint moves in the half second after the brakes have opened.\n\n\
          | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
@@ -64,7 +64,7 @@ struct Line {
 }
 
 impl Line {
-    /// Where the torque `suffices`, the arm must be held when it stands, and stand in time.
+    /// The arm must be held when it stands; where the torque `suffices`, it must stand in time.
     fn of(lowering: &Lowering, suffices: bool) -> Result<Self, MatrixError> {
         let mut sag = 0.0f64;
         let mut one = |support| -> Result<(String, Motion), MatrixError> {
@@ -74,7 +74,7 @@ impl Line {
             if suffices {
                 stood_in_time(&motion)?;
             }
-            if suffices != (o.state == ControllerState::HoldPos) {
+            if o.state != ControllerState::HoldPos {
                 return Err(MatrixError::NoStop { ms: None });
             }
             Ok((state_then(o.state, o.trajectory, o.errors, o.joints), motion))

@@ -1,0 +1,126 @@
+//! Path time that is held back while a joint is overloaded by its motion (J-75).
+//!
+//! A path at the torque limits asks for more than there is where the arm is heavier or has more friction than its model. Slower, it asks
+//! for less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling under
+//! torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
+use crate::remembered::remembered;
+
+/// Time for which the inertia of the arm is taken for constant, ms.
+const INERTIA_MS: u16 = 60;
+/// Time without a joint at its limit after which the path gets its pace back, ms.
+const QUIET_MS: u16 = 200;
+/// Longest time that a joint may be at its limit in one go, ms.
+const PRESSED_MS: u16 = 250;
+/// Longest time of all of it in a run, ms.
+const RUN_MS: u16 = 5_000;
+
+/// How the path is held back.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct HoldBack {
+    active: bool,
+    /// Ticks since the inertia was computed.
+    since_ms: u16,
+    /// Ticks in which a joint has been at its limit, without a break.
+    pressed_ms: u16,
+    /// Ticks since one was.
+    quiet_ms: u16,
+    /// Ticks of holding back in this run.
+    run_ms: u16,
+}
+
+remembered!(HoldBack { active, since_ms, pressed_ms, quiet_ms, run_ms });
+
+/// What follows from a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Next {
+    /// It goes on as it is.
+    Nothing,
+    /// The path gets its pace back.
+    Restore,
+    /// Holding back does not help: the arm stops.
+    Stop,
+}
+
+impl HoldBack {
+    /// The path is held back.
+    pub fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// A joint is overloaded. Returns whether the inertia of the arm has to be computed.
+    pub fn begin(&mut self) -> bool {
+        if self.active && self.since_ms < INERTIA_MS {
+            return false;
+        }
+        if !self.active {
+            (self.pressed_ms, self.quiet_ms) = (0, 0);
+        }
+        (self.active, self.since_ms) = (true, 0);
+        true
+    }
+
+    /// A tick on the path; `pressed`: a joint is at its torque limit.
+    pub fn step(&mut self, pressed: bool) -> Next {
+        self.since_ms = self.since_ms.saturating_add(1);
+        self.run_ms = self.run_ms.saturating_add(1);
+        if pressed {
+            (self.pressed_ms, self.quiet_ms) = (self.pressed_ms.saturating_add(1), 0);
+        } else {
+            (self.pressed_ms, self.quiet_ms) = (0, self.quiet_ms.saturating_add(1));
+        }
+        if self.pressed_ms > PRESSED_MS || self.run_ms > RUN_MS {
+            Next::Stop
+        } else if self.quiet_ms >= QUIET_MS {
+            self.active = false;
+            Next::Restore
+        } else {
+            Next::Nothing
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j75_the_inertia_is_computed_anew_from_time_to_time() {
+        let mut hold_back = HoldBack::default();
+        assert!(hold_back.begin());
+        for ms in 1..=2 * INERTIA_MS {
+            hold_back.step(true);
+            assert_eq!(hold_back.begin(), ms % INERTIA_MS == 0, "{ms} ms");
+        }
+    }
+
+    #[test]
+    fn j75_the_pace_comes_back_when_no_joint_is_at_its_limit_any_more() {
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        for pressed in [true, false, true] {
+            assert_eq!(hold_back.step(pressed), Next::Nothing);
+        }
+        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(false), Next::Nothing));
+        assert_eq!(hold_back.step(false), Next::Restore);
+        assert!(!hold_back.is_active());
+    }
+
+    #[test]
+    fn j75_what_lasts_too_long_in_one_go_or_in_a_run_is_a_stop() {
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        let after = (1..1_000).find(|_| hold_back.step(true) == Next::Stop);
+        assert_eq!(after, Some(PRESSED_MS + 1));
+        let mut hold_back = HoldBack::default();
+        let mut ms = 0;
+        let next = loop {
+            hold_back.begin();
+            ms += 1;
+            match hold_back.step(ms % 100 < 50) {
+                Next::Nothing => {}
+                next => break next,
+            }
+        };
+        assert_eq!((next, ms), (Next::Stop, RUN_MS + 1));
+    }
+}

@@ -176,8 +176,7 @@ impl Error {
                 Facts { joint: Some(*joint), ..Facts::default() }
             }
             Self::Motion(
-                MotionError::RunFault { point, status }
-                | MotionError::HeldStop { point, status, .. },
+                MotionError::RunFault { point, status } | MotionError::HeldStop { point, status, .. },
             ) => Facts { point: Some(*point), ..Facts::of_status(status) },
             Self::Motion(MotionError::LinkLost { last: Some(last), .. }) if last.is_executing() => {
                 Facts { point: Some(last.point), ..Facts::default() }

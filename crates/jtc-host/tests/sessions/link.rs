@@ -235,24 +235,33 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// Soft gains, so that a push is a position error before it is too much torque: the arm gives way, and the run ends with that.
+/// A push ends a run: the arm yields and is held, and goes on when that was cleared.
 #[test]
-fn j66_a_motion_that_the_controller_paused_is_no_success() {
-    let mut s = session(None);
-    let mut arm = Arm::avena();
-    let gains = &mut arm.pid.as_mut().unwrap()[4];
-    (gains.kp, gains.ki, gains.kd) = (150.0, 0.0, 15.0);
-    s.push(&arm.parameter_set(), |_| {}).unwrap();
-    s.wait_hold(Duration::from_secs(15)).unwrap();
+fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
+    let mut s = ready(None);
     let (t, _) = upload(&mut s, &trajectory(2_000)).unwrap();
     inject(&mut s, FaultKind::Push { joint: Joint::ALL[4], torque: 38.0 }, Trigger::AtPoint(500), 400);
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.code(), error.kind()), ("held-stop", ErrorKind::Fault));
     let text = error.to_string();
-    assert!(text.contains("joint 5: position error"), "{text}");
-    assert!(error.hint().contains("jtc traj resume"));
-    assert_eq!(s.fresh_status().unwrap().state, ControllerState::HoldPos, "it is held");
+    assert!(text.contains("holds the arm: joint 5: torque over limit"), "{text}");
+    assert!(error.hint().contains("jtc clear") && error.hint().contains("jtc traj resume"));
+    s.pass(Duration::from_secs(2)).unwrap();
+    let held = s.fresh_status().unwrap();
+    assert_eq!(held.state, ControllerState::HoldPos);
+    assert!(held.is_held_stop() && !held.is_faulty());
+    assert!(
+        jtc_host::words::errors_line(&held).starts_with("held stop: joint 5"),
+        "{}",
+        jtc_host::words::errors_line(&held)
+    );
+    assert!(jtc_host::words::next_step(&held).contains("jtc clear"));
+    let refused = s.resume().unwrap_err();
+    assert!(refused.to_string().contains('7'), "{refused}");
+    s.clear(true, 0).unwrap();
+    let cleared = s.fresh_status().unwrap();
+    assert!(!cleared.is_held_stop() && cleared.errors == 0);
 }
 
 /// An arm that gives way when nobody waits for it any more is nobody's wish.

@@ -61,6 +61,9 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
+    /// Smallest and largest speed of the trip that the simulator's options take, rad/s.
+    pub const OVER_SPEED: (f64, f64) = (0.01, 100.0);
+
     /// The firmware before the present one: other speed scale, short answers, one message per interrupt.
     pub fn older() -> Self {
         Self {

@@ -11,7 +11,7 @@ mod gear;
 mod wall;
 
 pub use gear::Gear;
-use gear::{Drives, OUTPUT};
+use gear::OUTPUT;
 use wall::Contact;
 pub use wall::{Side, Wall};
 
@@ -262,67 +262,6 @@ impl Arm {
         }
         let Self { contacts, dynamics, q, .. } = self;
         contacts.iter_mut().for_each(|contact| contact.follow(dynamics, q));
-    }
-
-    /// A sub-step with motors and links apart; brakes are at the motors.
-    fn elastic_substep(
-        &mut self,
-        tau: &JointVec,
-        outside: &JointVec,
-        inertia: &JointVec,
-        damped: f64,
-        dt: f64,
-    ) {
-        self.follow_rigid();
-        let (mut motor, mut link) = ([0.0; JOINTS], *inertia);
-        let steepness = self.friction.steepness(&self.motor_speed);
-        for j in 0..JOINTS {
-            let elastic = self.parts.gears[j].is_elastic();
-            if elastic {
-                let rotor = self.parts.rotor_inertia[j].max(LIGHTEST) - OUTPUT;
-                motor[j] = rotor.max(steepness[j] * dt);
-                link[j] = OUTPUT.max(self.stopping(j, dt) * dt);
-            }
-            if self.braked[j] {
-                let against =
-                    if elastic { -self.gear_torque(j) } else { self.stop_torque(j, self.q[j], self.qd[j]) };
-                let inertia = if elastic { motor[j] } else { link[j] };
-                self.motor_speed[j] = braked(self.motor_speed[j], against, inertia, dt);
-                if elastic {
-                    motor[j] = BRAKED;
-                } else {
-                    (self.qd[j], link[j]) = (self.motor_speed[j], BRAKED);
-                }
-            }
-        }
-        let drives = Drives { torque: tau, outside, motor: &motor, link: &link };
-        self.elastic_runge_kutta(&drives, damped, dt);
-    }
-
-    /// Torques of the walls' forces at `q`, `qd` (N·m) are added to `sum`.
-    fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
-        for contact in &self.contacts {
-            contact.push(&self.dynamics, q, qd, damped, sum);
-        }
-    }
-
-    /// Torques of the walls on the joints, N·m.
-    pub fn wall_torque(&self) -> JointVec {
-        let mut sum = [0.0; JOINTS];
-        self.push_of_walls(&self.q, &self.qd, 1.0, &mut sum);
-        sum
-    }
-
-    /// These walls are there and no others; those that were there already stay as they are.
-    pub fn set_walls(&mut self, walls: &[Wall]) {
-        let mut known = core::mem::take(&mut self.contacts);
-        for &wall in walls {
-            let contact = match known.iter().position(|contact| *contact.wall() == wall) {
-                Some(place) => known.swap_remove(place),
-                None => Contact::new(wall, &self.parts, &self.dynamics, &self.q),
-            };
-            self.contacts.push(contact);
-        }
     }
 
     /// The arm carries these beside its own payload, and nothing else that it has taken up.

@@ -4,7 +4,7 @@
 //! act on the link. Positions and speeds of the motor are seen through the gear, as all of a joint's numbers are.
 use jtc_dynamics::{JOINTS, JointVec};
 
-use super::{Arm, along};
+use super::{Arm, BRAKED, LIGHTEST, along, braked};
 
 /// Part of the rotor's inertia that turns with the link, as the output of a gear does, kg·m²: without it a light last link would swing
 /// too fast for any step. A rotor has at least twice as much.
@@ -66,19 +66,54 @@ impl Sides {
 }
 
 /// What stays the same during a step.
-pub(super) struct Drives<'a> {
+struct Drives<'a> {
     /// Torques of the drives, N·m.
-    pub torque: &'a JointVec,
+    torque: &'a JointVec,
     /// Torques on the links, N·m.
-    pub outside: &'a JointVec,
+    outside: &'a JointVec,
     /// Inertias that turn with the motors and with the links, kg·m². A rigid gear has all at its link.
-    pub motor: &'a JointVec,
-    pub link: &'a JointVec,
+    motor: &'a JointVec,
+    link: &'a JointVec,
 }
 
 impl Arm {
+    /// A sub-step with motors and links apart; brakes are at the motors.
+    pub(super) fn elastic_substep(
+        &mut self,
+        tau: &JointVec,
+        outside: &JointVec,
+        inertia: &JointVec,
+        damped: f64,
+        dt: f64,
+    ) {
+        self.follow_rigid();
+        let (mut motor, mut link) = ([0.0; JOINTS], *inertia);
+        let steepness = self.friction.steepness(&self.motor_speed);
+        for j in 0..JOINTS {
+            let elastic = self.parts.gears[j].is_elastic();
+            if elastic {
+                let rotor = self.parts.rotor_inertia[j].max(LIGHTEST) - OUTPUT;
+                motor[j] = rotor.max(steepness[j] * dt);
+                link[j] = OUTPUT.max(self.stopping(j, dt) * dt);
+            }
+            if self.braked[j] {
+                let against =
+                    if elastic { -self.gear_torque(j) } else { self.stop_torque(j, self.q[j], self.qd[j]) };
+                let inertia = if elastic { motor[j] } else { link[j] };
+                self.motor_speed[j] = braked(self.motor_speed[j], against, inertia, dt);
+                if elastic {
+                    motor[j] = BRAKED;
+                } else {
+                    (self.qd[j], link[j]) = (self.motor_speed[j], BRAKED);
+                }
+            }
+        }
+        let drives = Drives { torque: tau, outside, motor: &motor, link: &link };
+        self.elastic_runge_kutta(&drives, damped, dt);
+    }
+
     /// Torque of the spring on the link, N·m; 0 in a rigid gear.
-    pub(super) fn gear_torque(&self, j: usize) -> f64 {
+    fn gear_torque(&self, j: usize) -> f64 {
         let gear = &self.parts.gears[j];
         if gear.is_elastic() {
             gear.stiffness * (self.motor[j] - self.q[j]) + gear.damping * (self.motor_speed[j] - self.qd[j])
@@ -88,7 +123,7 @@ impl Arm {
     }
 
     /// Like `runge_kutta` of rigid gears, with the motors as bodies of their own.
-    pub(super) fn elastic_runge_kutta(&mut self, drives: &Drives<'_>, damped: f64, dt: f64) {
+    fn elastic_runge_kutta(&mut self, drives: &Drives<'_>, damped: f64, dt: f64) {
         let start = Sides { q: self.q, qd: self.qd, motor: self.motor, motor_speed: self.motor_speed };
         let (z0, half) = (self.bristles, 0.5 * dt);
         let friction = self.friction.at(&start.motor_speed, &z0);

@@ -2,7 +2,7 @@
 use jtc_bus::Joint;
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
-use super::SimArm;
+use super::{Arm, SimArm};
 
 /// A wall this near counts as touched when the length of the steps is chosen, m or rad.
 const NEAR: f64 = 0.01;
@@ -169,6 +169,34 @@ impl Contact {
     pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
+        }
+    }
+}
+
+impl Arm {
+    /// Torques of the walls' forces at `q`, `qd` (N·m) are added to `sum`.
+    pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
+        for contact in &self.contacts {
+            contact.push(&self.dynamics, q, qd, damped, sum);
+        }
+    }
+
+    /// Torques of the walls on the joints, N·m.
+    pub fn wall_torque(&self) -> JointVec {
+        let mut sum = [0.0; JOINTS];
+        self.push_of_walls(&self.q, &self.qd, 1.0, &mut sum);
+        sum
+    }
+
+    /// These walls are there and no others; those that were there already stay as they are.
+    pub fn set_walls(&mut self, walls: &[Wall]) {
+        let mut known = core::mem::take(&mut self.contacts);
+        for &wall in walls {
+            let contact = match known.iter().position(|contact| *contact.wall() == wall) {
+                Some(place) => known.swap_remove(place),
+                None => Contact::new(wall, &self.parts, &self.dynamics, &self.q),
+            };
+            self.contacts.push(contact);
         }
     }
 }

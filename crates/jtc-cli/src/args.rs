@@ -31,7 +31,7 @@ pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use payload::PayloadCommand;
 pub use plan::{MoveArgs, PlanArgs, PoseCommand, Target};
 pub use serve::ServeArgs;
-pub use sim::{DemoArgs, SimArgs, SimSpeed};
+pub use sim::{DemoArgs, SimArgs, SimSpeed, SimSupport};
 pub use variables::VARIABLES;
 
 /// The joint trajectory controller from your terminal.
@@ -106,7 +106,8 @@ pub enum Command {
         after_help = "Examples:\n  jtc sim --serial /tmp/jtc\n  jtc sim --serial /tmp/jtc --arm my-arm.toml --seed 7\n  \
                             jtc sim --serial /tmp/jtc --speed max --no-throttle\n  \
                             jtc sim --serial /tmp/jtc --faults faults.toml\n  \
-                            jtc sim --serial /tmp/jtc --record sim.mcap\n\n\
+                            jtc sim --serial /tmp/jtc --record sim.mcap\n  \
+                            jtc sim --serial /tmp/jtc --support stand --gear-stiffness 20000\n\n\
                             --record takes up to 40 MB a minute as .mcap, 50 MB as .csv, and is opened before anything runs. The file can be\n\
                             read while it grows, and after a killed simulator up to its last 0.2 s. If the disk is full, that is reported at\n\
                             once, the simulation goes on, and ends with exit code 5.\n\nLines on the standard input are \

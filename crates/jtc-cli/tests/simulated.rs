@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::io::{Read, Write};
+
 use common::{Sim, jtc, motion};
 
 #[test]
@@ -335,5 +337,95 @@ fn a_recording_is_looked_at_checked_and_run_again() {
         jtc(&["traj", "check", &run]).ends(0);
         sim.jtc(&["traj", "replay", &run]).ends(0);
         jtc(&["traj", "replay", &motion, "--port", "/nowhere/tty"]).ends(2);
+    }
+}
+
+/// A host whose frame comes byte by byte does not hold the arm up: statuses go on coming meanwhile.
+#[test]
+fn time_goes_on_while_a_frame_arrives() {
+    // In real time a status comes every 25 ms, so 12 at least; a tick for each piece would make 6.
+    for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
+        let sim = Sim::start(options);
+        let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();
+        let mut reader = port.try_clone().unwrap();
+        let (send, bytes) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut buffer = [0; 1024];
+            while let Ok(count @ 1..) = reader.read(&mut buffer)
+                && send.send(count).is_ok()
+            {}
+        });
+        // The begin of a trajectory segment of 1000 bytes again and again: also after a gap that ended a frame, one is under way.
+        let start = [0x9B, 0x0A, 0x03, 0xE8];
+        port.write_all(&start).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+        let before: usize = bytes.try_iter().sum();
+        for _ in 0..160 {
+            port.write_all(&start).unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        let meanwhile: usize = bytes.try_iter().sum();
+        let statuses = meanwhile / jtc_wire::STATUS_LEN;
+        assert!(statuses >= least, "{options:?}: {before} bytes, then {statuses} statuses");
+        drop(sim);
+    }
+}
+
+/// What carries the arm until its drives are enabled, and after an error; the first line says which it is.
+#[test]
+fn the_support_of_the_arm_is_chosen() {
+    for (options, note, falls_first, falls_later) in [
+        (&[][..], "note: simulated holding brakes", false, false),
+        (&["--support", "brakes"], "note: simulated holding brakes", false, false),
+        (&["--support", "stand"], "note: a stand carries the simulated arm until", false, true),
+        (&["--support", "none"], "note: nothing carries the simulated arm", true, true),
+    ] {
+        // Upright it would stand by its friction.
+        let options = [&["--speed", "max", "--payload", "3,0.2,0.2,0.2"], options].concat();
+        let error = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"hold\"\nafter_s = 8\n";
+        let mut sim = Sim::with_faults(&options, error);
+        let line = sim.error_line();
+        assert!(line.starts_with(note), "{options:?}: {line}");
+        let sim = sim.with_parameters();
+        // Of each joint the furthest that it was seen, before the drives are enabled and after the error.
+        let (mut first, mut later) = (0.0f64, 0.0f64);
+        for _ in 0..600 {
+            let status = sim.json(&["status"], 0);
+            let joints = status["joints"].as_array().unwrap();
+            let furthest =
+                joints.iter().map(|joint| joint["position_rad"].as_f64().unwrap().abs()).fold(0.0, f64::max);
+            if status["state"] == "Error" {
+                later = later.max(furthest);
+            } else {
+                first = first.max(furthest);
+            }
+            if falls_first && first > 0.2 || later > 0.2 || later > 0.0 && !falls_later {
+                break;
+            }
+        }
+        assert_eq!(first > 0.2, falls_first, "{options:?}: {first} rad before its drives are enabled");
+        if !falls_first {
+            assert!(later > 0.0, "{options:?}: the safety input is an error");
+            assert_eq!(later > 0.2, falls_later, "{options:?}: {later} rad after the error");
+        }
+    }
+}
+
+/// Gears that yield, and drives that trip at a speed of their own: at 0.05 rad/s an ordinary motion trips them.
+#[test]
+fn gears_and_drives_of_the_simulated_arm_are_chosen() {
+    let sim = Sim::start(&["--speed", "max", "--gear-stiffness", "20000"]).held();
+    let motion_file = sim.file("motion.csv", &motion(0.2));
+    sim.jtc(&["traj", "run", &motion_file]).ends(0);
+    let sim = Sim::start(&["--speed", "max", "--over-speed", "0.05"]).held();
+    let output = sim.jtc(&["traj", "run", &motion_file]).ends(5);
+    assert!(output.err.contains("speed"), "{}", output.err);
+    for (words, part) in [
+        (["--support", "rope"], "possible values: none, stand, brakes"),
+        (["--gear-stiffness", "5"], "5 N·m/rad is out of range (100–1000000 N·m/rad)"),
+        (["--over-speed", "1,2"], "2 numbers, expected 1 for all joints or 6"),
+    ] {
+        let output = jtc(&[&["sim"][..], &words].concat()).ends(2);
+        assert!(output.err.contains(part), "{}", output.err);
     }
 }

@@ -1,11 +1,19 @@
-//! The true arm: rigid bodies, rotors behind their gears, friction and end stops, integrated by Runge-Kutta
-//! at 1 ms.
+//! The true arm: rigid bodies, rotors behind their gears, friction, end stops and walls, integrated by Runge-Kutta
+//! at 1 ms, or in parts of it.
 //!
 //! It is deliberately not the arm that the controller believes in: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
-use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, Payload};
+use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, LinkInertias, Payload};
 
 use crate::friction::{FrictionModel, FrictionTorques, SimFriction};
+
+mod gear;
+mod wall;
+
+pub use gear::Gear;
+use gear::OUTPUT;
+use wall::Contact;
+pub use wall::{Side, Wall};
 
 /// Torque per penetration of an end stop, N·m/rad.
 const STOP_STIFFNESS: f64 = 20_000.0;
@@ -19,8 +27,15 @@ const BRAKED: f64 = 1e9;
 const LIGHTEST: f64 = 0.02;
 /// Largest turn of a joint in a sub-step, rad: a joint of 100 rad/s and more takes several in a millisecond.
 const LARGEST_TURN: f64 = 0.1;
-/// Most sub-steps of a step.
+/// Most sub-steps of a step for speed alone.
 const MOST_SUBSTEPS: f64 = 32.0;
+/// Largest angle of a vibration on a wall or on gears in a sub-step, rad, and largest part of its decay.
+const LARGEST_PHASE: f64 = 0.5;
+const LARGEST_DECAY: f64 = 1.0;
+/// Most sub-steps of a step for walls and gears; damping of walls that would need more is reduced to what these bear.
+const MOST_STIFF_SUBSTEPS: f64 = 64.0;
+/// Decay in a sub-step from which damping is reduced; Runge-Kutta is unstable from 2.7 on.
+const UNSTABLE_DECAY: f64 = 2.0;
 /// Seconds between two updates of the temperatures.
 const WARMING: f64 = 0.05;
 /// Heat capacity of a joint's bearing, J/K.
@@ -47,6 +62,8 @@ pub struct SimArm {
     pub friction_model: FrictionModel,
     /// End stops per joint, rad.
     pub stops: [(f64, f64); JOINTS],
+    /// How far the gears yield; rigid unless set. A gear that yields takes 0.01 kg·m² of the rotor's inertia to its link.
+    pub gears: [Gear; JOINTS],
     /// Torque that a drive really reaches, N·m: more is clamped silently.
     pub torque_ceiling: JointVec,
     /// Temperature of the air and of the bearings at the start, °C.
@@ -72,6 +89,7 @@ impl SimArm {
             polynomial_speed: config.joints.map(|j| j.velocity_max),
             friction_model: FrictionModel::default(),
             stops: config.joints.map(|j| (j.position_min - 0.04, j.position_max + 0.04)),
+            gears: [Gear::RIGID; JOINTS],
             torque_ceiling: [364.0, 364.0, 364.0, 79.0, 79.0, 79.0],
             ambient: 24.0,
         }
@@ -88,6 +106,11 @@ impl Default for SimArm {
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
+    /// Inertias without what was taken up, and what that is.
+    bare: LinkInertias,
+    carried: Vec<Payload>,
+    contacts: Vec<Contact>,
+    elastic: bool,
     parts: SimArm,
     friction_scale: JointVec,
     friction: FrictionTorques,
@@ -100,6 +123,10 @@ pub struct Arm {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
+    /// Position of the motors as seen through the gears, rad: that of the links where gears are rigid.
+    pub motor: JointVec,
+    /// Velocity of the motors as seen through the gears, rad/s.
+    pub motor_speed: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
     /// Closed brakes.
@@ -112,7 +139,18 @@ impl Arm {
     /// An arm at rest at `q`; its friction is that of `parts` times `friction_scale`.
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
+        let elastic = parts.gears.iter().any(Gear::is_elastic);
+        // Loaded springs: the links rest.
+        let load = dynamics.gravity_torque(&q);
+        let motor = core::array::from_fn(|j| {
+            let gear = &parts.gears[j];
+            if gear.is_elastic() { q[j] + load[j] / gear.stiffness } else { q[j] }
+        });
         let mut arm = Self {
+            bare: dynamics.inertias(),
+            carried: Vec::new(),
+            contacts: Vec::new(),
+            elastic,
             dynamics,
             temperature: [parts.ambient; JOINTS],
             friction: FrictionTorques::new(
@@ -128,6 +166,8 @@ impl Arm {
             friction_scale,
             q,
             qd: [0.0; JOINTS],
+            motor,
+            motor_speed: [0.0; JOINTS],
             braked: [false; JOINTS],
             friction_fault: [1.0; JOINTS],
         };
@@ -142,10 +182,23 @@ impl Arm {
 
     /// Move on by `dt` seconds under the drives' torques `tau` (N·m).
     pub fn step(&mut self, tau: &JointVec, dt: f64) {
+        self.step_pushed(tau, &[0.0; JOINTS], dt);
+    }
+
+    /// Like [`step`](Self::step), with torques `outside` (N·m) on the links.
+    pub fn step_pushed(&mut self, tau: &JointVec, outside: &JointVec, dt: f64) {
         let fastest = self.qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-        let substeps = (fastest * dt / LARGEST_TURN).ceil().clamp(1.0, MOST_SUBSTEPS);
+        let mut substeps = (fastest * dt / LARGEST_TURN).ceil().clamp(1.0, MOST_SUBSTEPS);
+        let mut damped = 1.0;
+        if self.elastic || !self.contacts.is_empty() {
+            let (stiff, share) = self.stiff_substeps(dt);
+            (substeps, damped) = (substeps.max(stiff), share);
+        }
         for _ in 0..substeps as u32 {
-            self.substep(tau, dt / substeps);
+            self.substep(tau, outside, damped, dt / substeps);
+        }
+        if !self.elastic {
+            self.follow_rigid();
         }
         self.since += dt;
         if self.since >= WARMING {
@@ -153,28 +206,85 @@ impl Arm {
         }
     }
 
-    fn substep(&mut self, tau: &JointVec, dt: f64) {
-        let mut inertia = self.inertia(dt);
-        let mut free = false;
-        for j in 0..JOINTS {
-            if self.braked[j] {
-                self.brake(j, inertia[j], dt);
-                inertia[j] = BRAKED;
+    /// Sub-steps that gears and walls within reach need in `dt` seconds, and the share of the walls' damping that these bear.
+    fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
+        let (mut square, mut decay) = (0.0, 0.0);
+        let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));
+        for (j, gear) in self.parts.gears.iter().enumerate() {
+            if gear.is_elastic() {
+                // The lightest that either side can be.
+                let mobility = 1.0 / OUTPUT + 1.0 / (link[j] - OUTPUT);
+                square = f64::max(square, gear.stiffness * mobility);
+                decay = f64::max(decay, gear.damping * mobility);
+                link[j] = OUTPUT;
             }
-            free |= !self.braked[j] || self.qd[j] != 0.0;
         }
-        if free {
-            self.runge_kutta(tau, &inertia, dt);
+        let rest = [0.0; JOINTS];
+        let mobility = |torques: &JointVec| {
+            let [pushed, free] =
+                [torques, &rest].map(|tau| self.dynamics.forward(&self.q, &rest, tau, &link));
+            core::array::from_fn(|j| pushed[j] - free[j])
+        };
+        let mut of_walls = 0.0;
+        for contact in &self.contacts {
+            let rates = contact.rates(&self.dynamics, &self.q, &self.qd, dt, mobility);
+            square += rates.0;
+            of_walls += rates.1;
         }
+        decay += of_walls;
+        let substeps = (square.sqrt() * dt / LARGEST_PHASE).max(decay * dt / LARGEST_DECAY);
+        let substeps = substeps.ceil().clamp(1.0, MOST_STIFF_SUBSTEPS);
+        let bearable = UNSTABLE_DECAY * substeps / dt;
+        let share = if decay > bearable { (bearable / decay).min(1.0) } else { 1.0 };
+        (substeps, share)
     }
 
-    /// Slow a joint with a closed brake down; at an end stop the stop helps.
-    fn brake(&mut self, j: usize, inertia: f64, dt: f64) {
-        let v = self.qd[j];
-        let stop = self.stop_torque(j, self.q[j], v);
-        let help = if stop * v < 0.0 { stop.abs() / inertia } else { 0.0 };
-        let change = (BRAKE_DECELERATION + help) * dt;
-        self.qd[j] = if v.abs() <= change { 0.0 } else { v - change.copysign(v) };
+    fn substep(&mut self, tau: &JointVec, outside: &JointVec, damped: f64, dt: f64) {
+        let mut inertia = self.inertia(dt);
+        let mut walls = [0.0; JOINTS];
+        self.push_of_walls(&self.q, &self.qd, damped, &mut walls);
+        if self.elastic {
+            self.elastic_substep(tau, outside, &inertia, damped, dt);
+        } else {
+            let mut free = false;
+            for j in 0..JOINTS {
+                if self.braked[j] {
+                    let stop = self.stop_torque(j, self.q[j], self.qd[j]) + walls[j];
+                    self.qd[j] = braked(self.qd[j], stop, inertia[j], dt);
+                    inertia[j] = BRAKED;
+                }
+                free |= !self.braked[j] || self.qd[j] != 0.0;
+            }
+            if free {
+                let total = core::array::from_fn(|j| tau[j] + outside[j]);
+                self.runge_kutta(&total, &inertia, damped, dt);
+            }
+        }
+        let Self { contacts, dynamics, q, .. } = self;
+        contacts.iter_mut().for_each(|contact| contact.follow(dynamics, q));
+    }
+
+    /// The arm carries these beside its own payload, and nothing else that it has taken up.
+    pub fn set_carried(&mut self, payloads: &[Payload]) {
+        if self.carried == payloads {
+            return;
+        }
+        self.carried = payloads.to_vec();
+        let of = |payload: &Payload| {
+            Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
+        };
+        // They are linear in the bodies.
+        let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
+        for payload in payloads {
+            let with = of(payload);
+            for (link, (with, none)) in sum.iter_mut().zip(with.iter().zip(&none)) {
+                for (number, (with, none)) in link.iter_mut().zip(with.iter().zip(none)) {
+                    *number += with - none;
+                }
+            }
+        }
+        let inertias = if payloads.is_empty() { self.bare } else { LinkInertias::from_numbers(&sum) };
+        self.dynamics.set_inertias(&inertias);
     }
 
     /// Inertia of the rotors for a step of `dt`, kg·m²: more than their own where steep friction or an end stop has a time constant
@@ -182,12 +292,17 @@ impl Arm {
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
-            let (low, high) = self.parts.stops[j];
-            let reach = 2.0 * self.qd[j].abs() * dt;
-            let stopping = self.q[j] - reach < low || self.q[j] + reach > high;
-            let stop = if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 };
+            let stop = self.stopping(j, dt);
             self.parts.rotor_inertia[j].max(LIGHTEST).max((steepness[j] + stop) * dt)
         })
+    }
+
+    /// Steepness of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
+    fn stopping(&self, j: usize, dt: f64) -> f64 {
+        let (low, high) = self.parts.stops[j];
+        let reach = 2.0 * self.qd[j].abs() * dt;
+        let stopping = self.q[j] - reach < low || self.q[j] + reach > high;
+        if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
     /// Bring temperatures and friction up to date: they change so slowly that not every millisecond has to.
@@ -203,7 +318,7 @@ impl Arm {
 
     /// Classical Runge-Kutta of fourth order; the bristles of friction, which are too stiff for it, take its stages' velocities by
     /// [`FrictionTorques::bend`].
-    fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, dt: f64) {
+    fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;
         let friction = self.friction.at(&v0, &z0);
@@ -211,13 +326,13 @@ impl Arm {
             self.heat[j] += v0[j] * friction[j] * dt;
         }
         let bend = |v: &JointVec, dt: f64| self.friction.bend(&z0, v, dt);
-        let a1 = self.accelerate(&q0, &v0, tau, &friction, rotor);
+        let a1 = self.accelerate(&q0, &v0, tau, &friction, rotor, damped);
         let v2 = along(&v0, &a1, half);
-        let a2 = self.acceleration(&along(&q0, &v0, half), &v2, &bend(&v0, half), tau, rotor);
+        let a2 = self.acceleration(&along(&q0, &v0, half), &v2, &bend(&v0, half), tau, rotor, damped);
         let v3 = along(&v0, &a2, half);
-        let a3 = self.acceleration(&along(&q0, &v2, half), &v3, &bend(&v2, half), tau, rotor);
+        let a3 = self.acceleration(&along(&q0, &v2, half), &v3, &bend(&v2, half), tau, rotor, damped);
         let v4 = along(&v0, &a3, dt);
-        let a4 = self.acceleration(&along(&q0, &v3, dt), &v4, &bend(&v3, dt), tau, rotor);
+        let a4 = self.acceleration(&along(&q0, &v3, dt), &v4, &bend(&v3, dt), tau, rotor, damped);
         let mean: JointVec = core::array::from_fn(|j| (v0[j] + 2.0 * (v2[j] + v3[j]) + v4[j]) / 6.0);
         self.bristles = bend(&mean, dt);
         self.q = along(&q0, &mean, dt);
@@ -233,8 +348,9 @@ impl Arm {
         z: &JointVec,
         tau: &JointVec,
         rotor: &JointVec,
+        damped: f64,
     ) -> JointVec {
-        self.accelerate(q, qd, tau, &self.friction.at(qd, z), rotor)
+        self.accelerate(q, qd, tau, &self.friction.at(qd, z), rotor, damped)
     }
 
     fn accelerate(
@@ -244,8 +360,10 @@ impl Arm {
         tau: &JointVec,
         friction: &JointVec,
         rotor: &JointVec,
+        damped: f64,
     ) -> JointVec {
-        let sum = core::array::from_fn(|j| tau[j] + self.stop_torque(j, q[j], qd[j]) - friction[j]);
+        let mut sum = core::array::from_fn(|j| tau[j] + self.stop_torque(j, q[j], qd[j]) - friction[j]);
+        self.push_of_walls(q, qd, damped, &mut sum);
         self.dynamics.forward(q, qd, &sum, rotor)
     }
 
@@ -272,6 +390,13 @@ impl Arm {
         self.friction.forget_tables();
         self.refresh_friction();
     }
+}
+
+/// Speed of a joint after `dt` seconds of its closed brake, rad/s; a torque of something else (N·m) helps when it is against the motion.
+fn braked(speed: f64, torque: f64, inertia: f64, dt: f64) -> f64 {
+    let help = if torque * speed < 0.0 { torque.abs() / inertia } else { 0.0 };
+    let change = (BRAKE_DECELERATION + help) * dt;
+    if speed.abs() <= change { 0.0 } else { speed - change.copysign(speed) }
 }
 
 fn along(x: &JointVec, rate: &JointVec, dt: f64) -> JointVec {

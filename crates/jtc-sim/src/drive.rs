@@ -9,7 +9,7 @@ mod config;
 mod encoders;
 mod states;
 
-pub use config::{DriveConfig, DriveFault};
+pub use config::{DriveConfig, DriveFault, EncoderPlace};
 use encoders::Encoders;
 use states::States;
 
@@ -119,9 +119,10 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// One millisecond of the drive: read sensors, check, accept a request, act. `q`: true position, rad.
-    pub fn tick(&mut self, q: f64, temperature: f64) {
-        self.read_encoders(q);
+    /// One millisecond of the drive: read sensors, check, accept a request, act. `motor` and `link`: true positions of both sides of the
+    /// gear as seen at the joint, rad.
+    pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
+        self.read_encoders(motor, link);
         if self.booting > 0 {
             self.booting -= 1;
             self.velocity = 0.0;
@@ -142,8 +143,12 @@ impl Drive {
         self.act();
     }
 
-    fn read_encoders(&mut self, q: f64) {
-        self.velocity = self.encoders.speed(q);
+    fn read_encoders(&mut self, motor: f64, link: f64) {
+        self.velocity = self.encoders.speed(motor);
+        let q = match self.config.encoder {
+            EncoderPlace::Motor => motor,
+            EncoderPlace::Link => link,
+        };
         let read = self.bits & config_bit::ABSOLUTE_ENCODER != 0;
         self.position = if read { self.encoders.position(q + self.fault.encoder_offset) } else { 0.0 };
     }

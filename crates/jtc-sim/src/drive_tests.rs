@@ -26,7 +26,7 @@ fn command(drive: &mut Drive, torque: f64) -> JointReport {
 }
 
 fn run(drive: &mut Drive, ms: u32, q: f64) {
-    (0..ms).for_each(|_| drive.tick(q, 25.0));
+    (0..ms).for_each(|_| drive.tick(q, q, 25.0));
 }
 
 fn booted_at(q: f64) -> Drive {
@@ -129,7 +129,8 @@ fn torque_is_clamped_silently() {
 fn speed_is_late_and_coarse() {
     let mut drive = enabled();
     for k in 1..=100 {
-        drive.tick(0.5 + 0.3e-3 * f64::from(k), 25.0);
+        let q = 0.5 + 0.3e-3 * f64::from(k);
+        drive.tick(q, q, 25.0);
         let v = command(&mut drive, 0.0).velocity;
         if k == 5 {
             assert!((v - 0.15).abs() < 0.001, "half of the window: {v}");
@@ -145,7 +146,7 @@ fn over_speed_trips_either_way_and_only_when_configured() {
         for speed in [-2.0e-3, 2.0e-3] {
             let mut drive = enabled();
             drive.bits = bits;
-            (0..30).for_each(|k| drive.tick(0.5 + speed * f64::from(k), 25.0));
+            (0..30).map(|k| 0.5 + speed * f64::from(k)).for_each(|q| drive.tick(q, q, 25.0));
             assert_eq!(drive.state(), state, "{speed} rad/ms");
             assert_eq!(drive.errors, if state == NodeState::FAULT { error_bit::OVER_SPEED } else { 0 });
         }

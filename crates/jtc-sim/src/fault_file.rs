@@ -3,6 +3,7 @@ use jtc_bus::{GRIPPER, Joint};
 use jtc_core::{ControllerState, JOINTS};
 use serde::Deserialize;
 
+use crate::arm::Side;
 use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
 use crate::hand::HandPath;
 use crate::typed::PUSH_MAX;
@@ -10,6 +11,8 @@ use crate::typed::PUSH_MAX;
 mod error;
 
 pub use error::FaultFileError;
+
+const SIDES: [(&str, Side); 2] = [("above", Side::Above), ("below", Side::Below)];
 
 const STATES: [(&str, ControllerState); 6] = [
     ("start", ControllerState::Start),
@@ -49,6 +52,15 @@ struct Entry {
     factor: Option<f64>,
     celsius: Option<f64>,
     probability: Option<f64>,
+    position_m: Option<Vec<f64>>,
+    normal: Option<Vec<f64>>,
+    stiffness_n_m: Option<f64>,
+    damping_ns_m: Option<f64>,
+    side: Option<String>,
+    stiffness_nm_rad: Option<f64>,
+    damping_nms_rad: Option<f64>,
+    mass_kg: Option<f64>,
+    com_m: Option<Vec<f64>>,
     at_s: Option<f64>,
     in_state: Option<String>,
     after_s: Option<f64>,
@@ -63,6 +75,16 @@ pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
+/// Furthest place in the base frame, m, and furthest centre of a load from the flange, m.
+const PLACE_MAX: f64 = 10.0;
+const COM_MAX: f64 = 2.0;
+/// Heaviest load, kg.
+const MASS_MAX: f64 = 100.0;
+/// Stiffness and damping of walls: N/m and N·s/m at the flange, N·m/rad and N·m·s/rad at a joint.
+const STIFFNESS: (f64, f64) = (1.0, 1e6);
+const DAMPING_MAX: f64 = 1e4;
+const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
+const JOINT_DAMPING_MAX: f64 = 1e3;
 
 impl FaultPlan {
     /// Read a fault file without hands; [`FAULT_FILE_HELP`] describes them.
@@ -122,6 +144,44 @@ impl Reader<'_> {
         Ok(FaultKind::Hand { path: self.hands.len() - 1 })
     }
 
+    fn wall(&mut self) -> Result<FaultKind, FaultFileError> {
+        let position = self.entry.position_m.take().ok_or_else(|| self.missing("position_m"))?;
+        let position = self.vector("position_m", position, PLACE_MAX)?;
+        let normal = self.entry.normal.take().ok_or_else(|| self.missing("normal"))?;
+        let normal = self.vector("normal", normal, 1e3)?;
+        if normal.iter().all(|x| x.abs() < 1e-6) {
+            return Err(FaultFileError::NoDirection { fault: self.number, normal });
+        }
+        let (low, high) = STIFFNESS;
+        let stiffness = self.take("stiffness_n_m", |e| &mut e.stiffness_n_m, low, high)?;
+        let damping = self.entry.damping_ns_m.take().unwrap_or(0.0);
+        let damping = self.in_range("damping_ns_m", damping, 0.0, DAMPING_MAX)?;
+        Ok(FaultKind::Wall { position, normal, stiffness, damping })
+    }
+
+    fn joint_wall(&mut self) -> Result<FaultKind, FaultFileError> {
+        let joint = self.joint()?;
+        let rad = self.take("rad", |e| &mut e.rad, -6.3, 6.3)?;
+        let name = self.entry.side.take().ok_or_else(|| self.missing("side"))?;
+        let Some(&(_, side)) = SIDES.iter().find(|(known, _)| *known == name) else {
+            return Err(FaultFileError::UnknownSide { fault: self.number, side: name });
+        };
+        let (low, high) = JOINT_STIFFNESS;
+        let stiffness = self.take("stiffness_nm_rad", |e| &mut e.stiffness_nm_rad, low, high)?;
+        let damping = self.entry.damping_nms_rad.take().unwrap_or(0.0);
+        let damping = self.in_range("damping_nms_rad", damping, 0.0, JOINT_DAMPING_MAX)?;
+        Ok(FaultKind::JointWall { joint, rad, side, stiffness, damping })
+    }
+
+    /// Three numbers, each at most `most` either way.
+    fn vector(&self, key: &'static str, numbers: Vec<f64>, most: f64) -> Result<[f64; 3], FaultFileError> {
+        for &number in &numbers {
+            self.in_range(key, number, -most, most)?;
+        }
+        let count = numbers.len();
+        numbers.try_into().map_err(|_| FaultFileError::NotThree { fault: self.number, key, count })
+    }
+
     fn kind(&mut self) -> Result<FaultKind, FaultFileError> {
         Ok(match self.entry.kind.as_str() {
             "node-silent" => FaultKind::NodeSilent { node: self.node()? },
@@ -158,6 +218,16 @@ impl Reader<'_> {
                 joint: self.joint()?,
                 torque: self.take("torque_nm", |e| &mut e.torque_nm, -PUSH_MAX, PUSH_MAX)?,
             },
+            "wall" => self.wall()?,
+            "joint-wall" => self.joint_wall()?,
+            "payload" => FaultKind::Payload {
+                mass: self.take("mass_kg", |e| &mut e.mass_kg, 0.001, MASS_MAX)?,
+                com: match self.entry.com_m.take() {
+                    Some(com) => self.vector("com_m", com, COM_MAX)?,
+                    None => [0.0; 3],
+                },
+            },
+            "brake-closed" => FaultKind::BrakeClosed { joint: self.joint()? },
             "hand" => self.hand()?,
             kind => return Err(FaultFileError::UnknownKind { fault: self.number, kind: kind.into() }),
         })
@@ -254,6 +324,15 @@ impl Reader<'_> {
             ("factor", e.factor),
             ("celsius", e.celsius),
             ("probability", e.probability),
+            ("position_m", e.position_m.as_ref().map(|_| 0.0)),
+            ("normal", e.normal.as_ref().map(|_| 0.0)),
+            ("stiffness_n_m", e.stiffness_n_m),
+            ("damping_ns_m", e.damping_ns_m),
+            ("side", e.side.as_ref().map(|_| 0.0)),
+            ("stiffness_nm_rad", e.stiffness_nm_rad),
+            ("damping_nms_rad", e.damping_nms_rad),
+            ("mass_kg", e.mass_kg),
+            ("com_m", e.com_m.as_ref().map(|_| 0.0)),
         ];
         match keys.iter().find(|(_, value)| value.is_some()) {
             Some((key, _)) => Err(self.superfluous(key)),

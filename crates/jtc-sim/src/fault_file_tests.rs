@@ -25,6 +25,16 @@ fn the_documented_example_is_read() {
             trigger: Trigger::InState(ControllerState::HoldPos, 2000),
             duration_ms: Some(500),
         },
+        Fault {
+            kind: FaultKind::Wall {
+                position: [0.0, 0.0, 0.1],
+                normal: [0.0, 0.0, 1.0],
+                stiffness: 50_000.0,
+                damping: 200.0,
+            },
+            trigger: Trigger::At(0),
+            duration_ms: None,
+        },
     ];
     assert_eq!(plan.faults, expected);
 }
@@ -32,7 +42,9 @@ fn the_documented_example_is_read() {
 #[test]
 fn every_kind_is_read_by_its_own_name() {
     for kind in FaultKind::NAMES {
-        let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n";
+        let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n\
+                    position_m = [0, 0, 1]\nnormal = [0, 0, 1]\nstiffness_n_m = 1e4\ndamping_ns_m = 10\nside = \"above\"\n\
+                    stiffness_nm_rad = 1e4\ndamping_nms_rad = 10\nmass_kg = 2\ncom_m = [0, 0, 0.1]\n";
         // Take away what is too much until it fits: the messages name the keys.
         let mut keys: Vec<&str> = keys.lines().collect();
         let fault = loop {
@@ -47,6 +59,9 @@ fn every_kind_is_read_by_its_own_name() {
         assert_eq!(fault.kind.name(), kind);
     }
 }
+
+const WALL: &str = "[[fault]]\nkind = \"wall\"\nat_s = 1\n";
+const JOINT_WALL: &str = "[[fault]]\nkind = \"joint-wall\"\nat_s = 1\njoint = 1\nrad = 0.5\n";
 
 #[test]
 fn mistakes_are_named() {
@@ -67,6 +82,37 @@ fn mistakes_are_named() {
         ("[[fault]]\nkind = \"node-silent\"\njoint = 1.5\nat_s = 1", "joint = 1.5 is not a whole number"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = nan", "at_s = NaN is outside"),
         ("[[fault]]\nkind = \"bus-off\"\nwhen = 3", "unknown field `when`"),
+        (
+            &format!("{WALL}position_m = [0, 0]"),
+            "position_m has 2 numbers, expected 3: `position_m = [x, y, z]`",
+        ),
+        (&format!("{WALL}position_m = [0, 0, 11]"), "position_m = 11 is outside -10..10"),
+        (&format!("{WALL}position_m = 3"), "invalid type"),
+        (WALL, "`wall` needs the key `position_m`"),
+        (&format!("{WALL}position_m = [0, 0, 0]"), "`wall` needs the key `normal`"),
+        (
+            &format!("{WALL}position_m = [0, 0, 0]\nnormal = [0, 0, 0]"),
+            "normal = [0, 0, 0] has no direction; write the direction out of the wall",
+        ),
+        (
+            &format!("{WALL}position_m = [0, 0, 0]\nnormal = [0, 0, 1]\nstiffness_n_m = 2e6"),
+            "stiffness_n_m = 2000000 is outside 1..1000000",
+        ),
+        (
+            &format!(
+                "{WALL}position_m = [0, 0, 0]\nnormal = [0, 0, 1]\nstiffness_n_m = 2\ndamping_ns_m = -1"
+            ),
+            "damping_ns_m = -1 is outside 0..10000",
+        ),
+        (&format!("{JOINT_WALL}side = \"left\""), "there is no side `left`; sides are above, below"),
+        (JOINT_WALL, "`joint-wall` needs the key `side`"),
+        (&format!("{JOINT_WALL}side = \"above\""), "`joint-wall` needs the key `stiffness_nm_rad`"),
+        ("[[fault]]\nkind = \"payload\"\nat_s = 1\nmass_kg = 0", "mass_kg = 0 is outside 0.001..100"),
+        (
+            "[[fault]]\nkind = \"payload\"\nat_s = 1\nmass_kg = 2\ncom_m = [3, 0, 0]",
+            "com_m = 3 is outside -2..2",
+        ),
+        ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\ncom_m = [0, 0, 0]", "`com_m` means nothing for `bus-off`"),
         ("fault = 3", "invalid type"),
     ] {
         let message = message(text);

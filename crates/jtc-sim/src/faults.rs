@@ -4,6 +4,7 @@ use core::fmt;
 use jtc_bus::Joint;
 use jtc_core::ControllerState;
 
+use crate::arm::{Side, Wall};
 use crate::hand::HandPath;
 
 /// Declares the kinds of faults: meaning, name, the name in fault files and tables, and what belongs to it.
@@ -135,6 +136,42 @@ fault_kinds! {
         /// N·m.
         torque: f64,
     };
+    /// The flange meets a wall; see [`Wall::Plane`].
+    Wall "wall" {
+        /// A point of the surface in the base frame, m.
+        position: [f64; 3],
+        /// Direction out of the wall in the base frame, of any length but 0.
+        normal: [f64; 3],
+        /// N/m.
+        stiffness: f64,
+        /// N·s/m.
+        damping: f64,
+    };
+    /// A joint meets a wall; see [`Wall::Joint`].
+    JointWall "joint-wall" {
+        /// Which.
+        joint: Joint,
+        /// Angle at which the wall begins, rad.
+        rad: f64,
+        /// Side of the angle that the wall fills.
+        side: Side,
+        /// N·m/rad.
+        stiffness: f64,
+        /// N·m·s/rad.
+        damping: f64,
+    };
+    /// The arm has taken up a point mass.
+    Payload "payload" {
+        /// kg.
+        mass: f64,
+        /// Its centre in the flange frame, m.
+        com: [f64; 3],
+    };
+    /// The brake of a joint stays closed while its drive is enabled.
+    BrakeClosed "brake-closed" {
+        /// Which.
+        joint: Joint,
+    };
     /// A hand leads the arm while it is taught.
     Hand "hand" {
         /// Place in [`FaultPlan::hands`].
@@ -156,6 +193,7 @@ impl fmt::Display for FaultKind {
             Self::HardwareFault { joint }
             | Self::FaultState { joint }
             | Self::IgnoresState { joint }
+            | Self::BrakeClosed { joint }
             | Self::NotAccurate { joint } => {
                 write!(f, " {joint}")
             }
@@ -163,6 +201,13 @@ impl fmt::Display for FaultKind {
             Self::Friction { joint, factor } => write!(f, " {joint} times {factor}"),
             Self::Temperature { joint, celsius } => write!(f, " {joint} at {celsius} °C"),
             Self::Push { joint, torque } => write!(f, " {joint} by {torque} N·m"),
+            Self::Wall { position: [x, y, z], stiffness, .. } => {
+                write!(f, " at ({x}, {y}, {z}) m of {stiffness} N/m")
+            }
+            Self::JointWall { joint, rad, side, stiffness, .. } => {
+                write!(f, " {joint} {side} {rad} rad of {stiffness} N·m/rad")
+            }
+            Self::Payload { mass, com: [x, y, z] } => write!(f, " {mass} kg at ({x}, {y}, {z}) m"),
             Self::FramesLost { probability }
             | Self::FramesCorrupted { probability }
             | Self::FramesGarbled { probability }
@@ -174,6 +219,21 @@ impl fmt::Display for FaultKind {
             | Self::SerialDelayed
             | Self::TickOverrun
             | Self::Hand { .. } => Ok(()),
+        }
+    }
+}
+
+impl FaultKind {
+    /// The wall that it is.
+    pub(crate) fn wall(&self) -> Option<Wall> {
+        match *self {
+            Self::Wall { position, normal, stiffness, damping } => {
+                Some(Wall::Plane { position, normal, stiffness, damping })
+            }
+            Self::JointWall { joint, rad, side, stiffness, damping } => {
+                Some(Wall::Joint { joint, angle: rad, side, stiffness, damping })
+            }
+            _ => None,
         }
     }
 }
@@ -196,7 +256,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// When it begins.
     pub trigger: Trigger,
-    /// How long it lasts, ms; `None`: for good.
+    /// How long it lasts, ms, at least 1: no fault passes between two milliseconds; `None`: for good.
     pub duration_ms: Option<u64>,
 }
 
@@ -273,7 +333,7 @@ impl Running {
             if let Phase::Armed(start) = *phase
                 && now >= start
             {
-                let end = fault.duration_ms.map_or(u64::MAX, |d| now.saturating_add(d));
+                let end = fault.duration_ms.map_or(u64::MAX, |d| now.saturating_add(d.max(1)));
                 *phase = Phase::Active(end);
                 change(Change::Begin(fault.kind));
             }
@@ -284,6 +344,27 @@ impl Running {
                 self.open -= 1;
                 change(Change::End(fault.kind));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_lasts_at_least_a_millisecond() {
+        for (duration_ms, expected) in [(0, 1), (1, 1), (2, 2)] {
+            let fault =
+                Fault { kind: FaultKind::BusOff, trigger: Trigger::At(3), duration_ms: Some(duration_ms) };
+            let mut running = Running::new(&FaultPlan { faults: vec![fault], ..FaultPlan::default() });
+            let mut active = Vec::new();
+            for now in 0..10 {
+                running.step(now, ControllerState::Init, 0, |_| {});
+                active.extend(running.active().map(|_| now));
+            }
+            let expected: Vec<u64> = (3..3 + expected).collect();
+            assert_eq!(active, expected, "{duration_ms} ms");
         }
     }
 }

@@ -27,11 +27,11 @@ mod tap;
 mod typed;
 mod world;
 
-pub use arm::{Arm, SimArm};
+pub use arm::{Arm, Gear, Side, SimArm, Wall};
 pub use board::{Board, Pins, RECORDER_BLOCKS, SimRecorder, Worked};
 pub use bus::{Bus, BusFault, BusStatistics, TimedFrame, frame_us};
 pub use config::{ModelError, SimConfig, Support};
-pub use drive::{Drive, DriveConfig, DriveFault};
+pub use drive::{Drive, DriveConfig, DriveFault, EncoderPlace};
 pub use event::{Event, Log, LogEntry};
 pub use fault_file::{FAULT_FILE_HELP, FaultFileError};
 pub use faults::{Fault, FaultKind, FaultPlan, Trigger};

@@ -2,7 +2,7 @@
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
-use jtc_dynamics::{ArmModel, JointVec};
+use jtc_dynamics::{ArmModel, JointVec, Payload};
 
 use crate::arm::Arm;
 use crate::bus::{Bus, Nodes};
@@ -25,9 +25,11 @@ pub struct Truth {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
+    /// Position of the motors as seen through the gears, rad: `q` where gears are rigid.
+    pub motor: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
-    /// Torque of pushes and of a hand, N·m.
+    /// Torque of pushes, of a hand and of walls, N·m.
     pub outside: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
@@ -59,6 +61,8 @@ pub struct Plant {
     scales: [Scale; JOINTS],
     support: Support,
     stand: bool,
+    /// Brakes that a fault keeps closed.
+    stuck: [bool; JOINTS],
     safety_wired: bool,
 }
 
@@ -84,6 +88,7 @@ impl Plant {
             scales: config.drives.map(|d| Scale { velocity: d.velocity_full_scale }),
             support: config.support,
             stand: config.support == Support::Stand,
+            stuck: [false; JOINTS],
             safety_wired: config.safety_wired,
         };
         plant.read_truth();
@@ -140,7 +145,7 @@ impl Plant {
         for (j, drive) in self.nodes.drives.iter_mut().enumerate() {
             let own = drive.fault.safety_line;
             drive.fault.safety_line |= wired;
-            drive.tick(self.arm.q[j], self.arm.temperature[j]);
+            drive.tick(self.arm.motor[j], self.arm.q[j], self.arm.temperature[j]);
             drive.fault.safety_line = own;
         }
         if let Some(gripper) = &mut self.nodes.gripper {
@@ -158,25 +163,29 @@ impl Plant {
         }
         for (j, drive) in self.nodes.drives.iter().enumerate() {
             self.truth.torque[j] = drive.torque();
-            self.arm.braked[j] = match self.support {
+            let supported = match self.support {
                 Support::None => false,
                 Support::Stand => self.stand,
                 Support::Brakes => !enabled(drive),
             };
+            self.arm.braked[j] = supported || self.stuck[j];
         }
         self.move_arm();
     }
 
     fn move_arm(&mut self) {
         self.truth.outside = core::array::from_fn(|j| self.push[j] + self.hand[j]);
-        let total = core::array::from_fn(|j| self.truth.torque[j] + self.truth.outside[j]);
-        self.arm.step(&total, TICK);
+        self.arm.step_pushed(&self.truth.torque, &self.truth.outside, TICK);
         self.read_truth();
+        for (outside, wall) in self.truth.outside.iter_mut().zip(self.arm.wall_torque()) {
+            *outside += wall;
+        }
     }
 
     fn read_truth(&mut self) {
         self.truth.q = self.arm.q;
         self.truth.qd = self.arm.qd;
+        self.truth.motor = self.arm.motor;
         self.truth.temperature = self.arm.temperature;
     }
 
@@ -202,7 +211,10 @@ impl Plant {
         let (mut gripper_silent, mut gripper_line) = (false, false);
         let mut friction = [1.0; JOINTS];
         self.push = [0.0; JOINTS];
+        self.stuck = [false; JOINTS];
+        let (mut walls, mut carried) = (Vec::new(), Vec::new());
         for kind in kinds {
+            walls.extend(kind.wall());
             match kind {
                 FaultKind::NodeSilent { node } => match drives.get_mut(usize::from(node)) {
                     Some(drive) => drive.silent = true,
@@ -216,6 +228,8 @@ impl Plant {
                 FaultKind::HardwareFault { joint } => drives[joint.index()].hardware = true,
                 FaultKind::EncoderJump { joint, rad } => drives[joint.index()].encoder_offset += rad,
                 FaultKind::Push { joint, torque } => self.push[joint.index()] += torque,
+                FaultKind::Payload { mass, com } => carried.push(Payload { mass, com, ..Payload::NONE }),
+                FaultKind::BrakeClosed { joint } => self.stuck[joint.index()] = true,
                 FaultKind::IgnoresState { joint } => drives[joint.index()].ignores_state = true,
                 FaultKind::NotAccurate { joint } => drives[joint.index()].not_accurate = true,
                 FaultKind::Friction { joint, factor } => friction[joint.index()] *= factor,
@@ -232,6 +246,8 @@ impl Plant {
             gripper.silent = gripper_silent;
             gripper.safety_line = gripper_line;
         }
+        self.arm.set_walls(&walls);
+        self.arm.set_carried(&carried);
         if self.arm.friction_fault != friction {
             self.arm.friction_fault = friction;
             self.arm.friction_changed();

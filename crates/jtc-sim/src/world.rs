@@ -29,6 +29,11 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
+    /// Time by which the board measures silence on its line, and when it last heard a byte, µs.
+    line_us: u64,
+    heard_us: u64,
+    /// The silence on the line is no longer than this, µs; `None`: as long as in virtual time.
+    silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
     received: Vec<Frame>,
@@ -78,6 +83,9 @@ impl World {
             node_states: plant.node_states(),
             plant,
             to_device: Line::new(config.baud),
+            line_us: 0,
+            heard_us: 0,
+            silence_us: None,
             to_host: Line::new(config.baud),
             host_inbox: Vec::new(),
             received: Vec::with_capacity(16),
@@ -116,6 +124,7 @@ impl World {
         self.plant.step(self.safety_output);
         self.ticks += 1;
         let now = self.now_us();
+        self.line_us += TICK_US;
         self.to_host.arrived(now, usize::MAX, &mut self.host_inbox);
         self.note();
     }
@@ -201,12 +210,20 @@ impl World {
                 self.line_fault.apply(&mut fresh, &mut self.line_rng);
             }
         }
+        if let Some(most) = self.silence_us.filter(|_| self.to_device.is_idle()) {
+            // It never goes back.
+            let before = self.line_us.saturating_sub(TICK_US).max(self.heard_us);
+            self.line_us = self.line_us.min(self.heard_us.saturating_add(most)).max(before);
+        }
+        if !fresh.is_empty() {
+            self.heard_us = self.line_us;
+        }
         if let Some(exchange) = &mut self.exchange {
             // The pin keeps its level where no tick comes.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
-        self.board.receive(now, &fresh);
+        self.board.receive(self.line_us, &fresh);
     }
 
     fn tick_controller(&mut self) {

@@ -257,3 +257,32 @@ fn j12_ticks_that_go_on_missing_are_an_internal_error() {
         }
     }
 }
+
+/// A frame in two pieces, so many ticks apart in virtual time; the host was silent for `silence_us` of its own time. Returns what the
+/// controller made of it: good and bad frames.
+fn in_two_pieces(ticks: u64, silence_us: Option<u64>) -> (u64, u64) {
+    let mut operator = held();
+    let before = operator.world.statistics();
+    let frame = host::exec(ExecCommand::Stop);
+    operator.world.host_write(&frame[..5]);
+    operator.run(1);
+    operator.world.limit_host_silence(silence_us);
+    let start = operator.world.now_us();
+    operator.run(ticks);
+    assert_eq!(operator.world.now_us() - start, ticks * 1000, "the arm's time goes on");
+    operator.world.host_write(&frame[5..]);
+    operator.run(1);
+    operator.world.limit_host_silence(None);
+    operator.run(20);
+    let after = operator.world.statistics();
+    (after.good_frames - before.good_frames, (after.bad_frames - before.bad_frames).min(1))
+}
+
+#[test]
+fn j03_a_gap_within_a_frame_is_as_long_as_it_was_for_the_host() {
+    assert_eq!(in_two_pieces(3, None), (1, 0));
+    assert_eq!(in_two_pieces(8, None), (0, 1));
+    assert_eq!(in_two_pieces(200, Some(4_000)), (1, 0), "virtual time was faster than the host");
+    assert_eq!(in_two_pieces(200, Some(6_000)), (0, 1));
+    assert_eq!(in_two_pieces(3, Some(6_000)), (1, 0), "virtual time was slower");
+}

@@ -2,7 +2,7 @@
 
 use jtc_core::JOINTS;
 use jtc_host::trajectory::Loaded;
-use jtc_sim::{FaultPlan, HandPath, ModelError, SimArm, SimConfig, SimFriction, Support};
+use jtc_sim::{DriveConfig, FaultPlan, Gear, HandPath, ModelError, SimArm, SimConfig, SimFriction, Support};
 use pyo3::prelude::*;
 
 use crate::arm::Arm;
@@ -23,6 +23,8 @@ pub struct SimulatedArm<'py> {
     model_error: Option<ErrorNumbers>,
     start: Option<[f64; JOINTS]>,
     friction: bool,
+    gear_stiffness: Option<[f64; JOINTS]>,
+    over_speed: Option<[f64; JOINTS]>,
 }
 
 impl SimulatedArm<'_> {
@@ -63,7 +65,25 @@ impl SimulatedArm<'_> {
         if !self.friction {
             config.arm = SimArm { friction: [const { SimFriction::Frictionless }; JOINTS], ..config.arm };
         }
+        if let Some(stiffness) = self.gear_stiffness {
+            in_range("gear_stiffness", &stiffness, Gear::STIFFNESS, "N·m/rad")?;
+            config.arm.gears = stiffness.map(Gear::new);
+        }
+        if let Some(speeds) = self.over_speed {
+            in_range("over_speed", &speeds, DriveConfig::OVER_SPEED, "rad/s")?;
+            config.drives.iter_mut().zip(speeds).for_each(|(drive, speed)| drive.over_speed = speed);
+        }
         Ok(config)
+    }
+}
+
+/// Refuses the first number out of range, with its joint.
+fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: &str) -> Result<(), Failure> {
+    match (1..).zip(numbers).find(|(_, number)| !(low..=high).contains(*number)) {
+        None => Ok(()),
+        Some((joint, number)) => Err(Failure::usage(format!(
+            "{what}: joint {joint}: {number} {unit} is out of range ({low}–{high} {unit})"
+        ))),
     }
 }
 

@@ -214,3 +214,26 @@ def test_wrong_arguments_are_explained():
         Simulator().lead([[0] * 6], step=0)
     with pytest.raises(RuntimeError, match="watch"):
         Simulator().inputs
+
+
+def test_an_arm_on_gears_that_yield_meets_a_wall_and_takes_up_a_load():
+    simulator = Simulator(baud=None, model_error=None, gear_stiffness=20_000.0, over_speed=[3.0] * 6)
+    simulator.bring_up()
+    wall = {"kind": "joint-wall", "joint": 1, "rad": 0.01, "side": "above", "stiffness_nm_rad": 5_000.0}
+    simulator.inject(wall)
+    simulator.inject({"kind": "payload", "mass_kg": 1.0, "com_m": np.array([0.0, 0.0, 0.05]), "for_s": 0.5})
+    simulator.push(1, 79.0, 0.2)
+    outside = []
+    for _ in range(200):
+        simulator.step()
+        outside.append(simulator.outside_torque[0])
+        assert simulator.position[0] < 0.05
+    assert max(outside) == 79.0 and min(outside) < 70.0  # the wall is against the push
+    assert any("payload 1 kg" in text for _, text in simulator.events)
+    for wrong, match in (
+        ({"gear_stiffness": 5.0}, "gear_stiffness: joint 1: 5 N·m/rad is out of range"),
+        ({"over_speed": [1.0] * 5 + [0.0]}, "over_speed: joint 6: 0 rad/s is out of range"),
+        ({"gear_stiffness": [1e4, 1e4]}, "gear_stiffness: has the shape"),
+    ):
+        with pytest.raises(UsageError, match=match):
+            Simulator(**wrong)

@@ -61,7 +61,7 @@ impl PayloadArgs {
 }
 
 /// Numbers between commas.
-fn numbers(text: &str) -> Result<Vec<f64>, String> {
+pub(super) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| {
         let number = word.trim().parse::<f64>().ok().filter(|number| number.is_finite());
         number.ok_or_else(|| format!("'{word}' is no number"))

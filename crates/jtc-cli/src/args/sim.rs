@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use cli_kit::variables::on_off;
+use jtc_core::JOINTS;
+use jtc_sim::{DriveConfig, Gear};
 
 use super::OverwriteArgs;
 
@@ -14,6 +16,41 @@ pub enum SimSpeed {
     Realtime,
     /// As fast as this computer can.
     Max,
+}
+
+/// What carries a simulated arm while its drives do not.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum SimSupport {
+    /// Nothing: the arm falls from the start until its drives are enabled, and after an error
+    None,
+    /// A stand until all drives were enabled once; after that the arm falls, as with the known drives
+    Stand,
+    /// Holding brakes, which close at once when a drive is not enabled
+    Brakes,
+}
+
+fn gears(text: &str) -> Result<[f64; JOINTS], String> {
+    of_joints(text, Gear::STIFFNESS, "N·m/rad")
+}
+
+fn over_speed(text: &str) -> Result<[f64; JOINTS], String> {
+    of_joints(text, DriveConfig::OVER_SPEED, "rad/s")
+}
+
+/// A number for all joints, or one for each, within limits.
+fn of_joints(text: &str, (low, high): (f64, f64), unit: &str) -> Result<[f64; JOINTS], String> {
+    let numbers = super::payload::numbers(text)?;
+    let all = match numbers[..] {
+        [one] => [one; JOINTS],
+        _ => <[f64; JOINTS]>::try_from(numbers)
+            .map_err(|numbers| format!("{} numbers, expected 1 for all joints or {JOINTS}", numbers.len()))?,
+    };
+    match all.iter().position(|number| !(low..=high).contains(number)) {
+        Some(bad) => {
+            Err(format!("joint {}: {} {unit} is out of range ({low}–{high} {unit})", bad + 1, all[bad]))
+        }
+        None => Ok(all),
+    }
 }
 
 /// Options of `jtc demo`.
@@ -41,6 +78,15 @@ pub struct SimArgs {
     /// What the simulated arm carries at its flange, and the controller is not given: kg, or kg and its place in the flange frame in m
     #[arg(long, env = "JTC_SIM_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried)]
     pub payload: Option<jtc_core::Payload>,
+    /// What carries the simulated arm while its drives do not: brakes, a stand until all drives were enabled once, or nothing
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = SimSupport::Brakes)]
+    pub support: SimSupport,
+    /// Stiffness of the gears between motor and link, N·m/rad: of all joints, or of each; default: rigid
+    #[arg(long, value_name = "K[,K2,…,K6]", value_parser = gears, allow_hyphen_values = true)]
+    pub gear_stiffness: Option<[f64; JOINTS]>,
+    /// Speed at which the simulated drives trip, rad/s: of all joints, or of each; default: 1.2 times the velocity limit
+    #[arg(long, value_name = "V[,V2,…,V6]", value_parser = over_speed, allow_hyphen_values = true)]
+    pub over_speed: Option<[f64; JOINTS]>,
     /// File that keeps a stored arm, as the flash of a board does: read at the start, written by `jtc arm push --store`
     #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
     pub store: Option<PathBuf>,
@@ -68,4 +114,26 @@ pub struct SimArgs {
     pub record: Option<PathBuf>,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_is_for_all_joints() {
+        assert_eq!(gears("2e4"), Ok([20_000.0; JOINTS]));
+        assert_eq!(over_speed("1, 2,3,4,5,6"), Ok([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+        for (given, part) in [
+            (gears("1000,2000"), "2 numbers, expected 1 for all joints or 6"),
+            (gears("1e4,1e4,99,1e4,1e4,1e4"), "joint 3: 99 N·m/rad is out of range (100–1000000 N·m/rad)"),
+            (gears("rigid"), "'rigid' is no number"),
+            (over_speed("-1"), "joint 1: -1 rad/s is out of range (0.01–100 rad/s)"),
+            (over_speed("nan"), "'nan' is no number"),
+            (over_speed(""), "'' is no number"),
+        ] {
+            let message = given.unwrap_err();
+            assert!(message.contains(part), "{message}");
+        }
+    }
 }

@@ -9,8 +9,10 @@ use crate::args::SimArgs;
 const BRAKES: &str =
     "note: simulated holding brakes keep the arm up after an error; the known drives have none";
 #[cfg(unix)]
-const NO_BRAKES: &str =
-    "note: no holding brakes: without torque the simulated arm falls, as with the known drives";
+const STAND: &str = "note: a stand carries the simulated arm until all its drives were enabled once; after that it falls without torque, as with \
+                     the known drives";
+#[cfg(unix)]
+const NOTHING: &str = "note: nothing carries the simulated arm: without torque it falls, also before its drives are first enabled";
 
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
@@ -18,10 +20,11 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use std::path::Path;
 
     use jtc_host::recording::{Ending, Format};
-    use jtc_sim::{SimConfig, Support, World};
+    use jtc_sim::{Gear, SimConfig, Support, World};
     use serde_json::json;
 
     use super::{run_report, simulated::simulated};
+    use crate::args::SimSupport;
     use crate::serve::{Pty, Server, Typed};
     use crate::tape::Tape;
     use cli_kit::OutputFile;
@@ -43,14 +46,21 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let mut config =
         SimConfig { baud: (!args.no_throttle).then_some(args.baud), seed: args.seed, faults, ..config };
     config.arm.payload = args.payload.unwrap_or_default();
-    let support = config.support;
+    if let Some(stiffness) = args.gear_stiffness {
+        config.arm.gears = stiffness.map(Gear::new);
+    }
+    if let Some(speeds) = args.over_speed {
+        config.drives.iter_mut().zip(speeds).for_each(|(drive, speed)| drive.over_speed = speed);
+    }
+    let (support, brakes, words) = match args.support {
+        SimSupport::Brakes => (Support::Brakes, true, BRAKES),
+        SimSupport::Stand => (Support::Stand, false, STAND),
+        SimSupport::None => (Support::None, false, NOTHING),
+    };
+    config.support = support;
     let world = World::new(config);
     let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;
     let name = pty.name().display().to_string();
-    let (brakes, words) = match support {
-        Support::Brakes => (true, BRAKES),
-        Support::None | Support::Stand => (false, NO_BRAKES),
-    };
     out.note(words);
     let ready = || {
         let value = json!({ "ready": name, "holding_brakes": brakes, "note": words });

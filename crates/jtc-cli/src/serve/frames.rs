@@ -8,8 +8,8 @@ use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 /// First bytes of each status.
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
 
-/// Longest time for which virtual time stands still within a frame while no bytes come.
-const STANDSTILL: Duration = Duration::from_millis(5);
+/// Silence that ends a frame (J-03).
+const GAP: Duration = Duration::from_millis(5);
 
 /// Bytes that came, and the pieces that are complete.
 #[derive(Default)]
@@ -56,20 +56,29 @@ impl Frames {
     }
 }
 
-/// Follows the host's bytes just far enough to know whether a frame is under way.
-#[derive(Default)]
+/// Follows the host's bytes just far enough to know whether a frame is under way, and since when its next byte is missing.
+///
+/// Virtual time may pass faster than the host's: with `--speed max`, and while the simulator makes up for a delay. A gap between two pieces
+/// of a frame is then no longer than it was for the host.
 pub struct Incoming {
     head: Vec<u8>,
     /// Bytes of the present frame that have not come.
     missing: usize,
-    /// How long virtual time has stood still in the present gap.
-    stood: Duration,
+    /// Bytes have come that go on with a frame.
+    continued: bool,
+    /// When the line carried the last byte.
+    heard: Instant,
 }
 
 impl Incoming {
+    /// No byte has come.
+    pub fn new(now: Instant) -> Self {
+        Self { head: Vec::new(), missing: 0, continued: false, heard: now }
+    }
+
     /// Takes bytes of the host in.
     pub fn push(&mut self, bytes: &[u8]) {
-        self.stood = Duration::ZERO;
+        self.continued |= self.mid_frame();
         for &byte in bytes {
             if self.missing > 0 {
                 self.missing -= 1;
@@ -88,25 +97,29 @@ impl Incoming {
         }
     }
 
+    /// The line carries bytes at `now`.
+    pub fn carries(&mut self, now: Instant) {
+        self.heard = now;
+    }
+
     /// Bytes of a frame are still to come.
     fn mid_frame(&self) -> bool {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little for
-    /// them: such a gap is none of the host's making. `wait` waits for bytes, at most so long; `false`: time goes on.
-    pub fn stands_still<E>(&mut self, wait: impl FnOnce(Duration) -> Result<(), E>) -> Result<bool, E> {
-        if !self.mid_frame() || self.stood >= STANDSTILL {
-            return Ok(false);
+    /// How long the host has been silent within a frame, also in the moment that ends it; `None`: outside of one, or so long that the frame
+    /// will not be completed.
+    pub fn silence(&mut self, now: Instant) -> Option<Duration> {
+        if std::mem::take(&mut self.continued) {
+            self.heard = now;
+            return Some(Duration::ZERO);
         }
-        let before = Instant::now();
-        wait(STANDSTILL - self.stood)?;
-        self.stood += before.elapsed();
-        if self.stood >= STANDSTILL {
-            // The frame will not be completed.
-            *self = Self { stood: self.stood, ..Self::default() };
+        let silence = self.mid_frame().then(|| now.saturating_duration_since(self.heard))?;
+        if silence < GAP {
+            return Some(silence);
         }
-        Ok(true)
+        *self = Self::new(self.heard);
+        None
     }
 }
 
@@ -144,14 +157,25 @@ mod tests {
 
     #[test]
     fn a_frame_of_the_host_is_followed_to_its_end() {
-        let mut incoming = Incoming::default();
+        let start = Instant::now();
+        let mut incoming = Incoming::new(start);
         for &byte in &[0x00, 0x9B, 0x0B, 0x00, 0x07, 0x03, 0x7D] {
             incoming.push(&[byte]);
         }
-        assert!(incoming.mid_frame());
+        assert_eq!(incoming.silence(start), Some(Duration::ZERO));
+        let later = |ms| start + Duration::from_millis(ms);
+        assert_eq!(incoming.silence(later(4)), Some(Duration::from_millis(4)));
+        incoming.carries(later(4));
+        assert_eq!(incoming.silence(later(8)), Some(Duration::from_millis(4)));
         incoming.push(&[0x9E]);
-        assert!(!incoming.mid_frame());
+        assert_eq!(incoming.silence(later(8)), Some(Duration::ZERO), "the last byte came in time");
+        assert_eq!(incoming.silence(later(8)), None, "the frame is complete");
         incoming.push(&[0x9B, 0x0B, 0xFF, 0xFF]);
         assert!(!incoming.mid_frame(), "no frame has this length");
+        incoming.push(&[0x9B, 0x0B]);
+        incoming.carries(later(8));
+        assert_eq!(incoming.silence(later(12)), Some(Duration::from_millis(4)));
+        assert_eq!(incoming.silence(later(13)), None, "too late");
+        assert!(!incoming.mid_frame(), "the next byte begins anew");
     }
 }

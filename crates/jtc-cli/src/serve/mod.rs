@@ -60,7 +60,7 @@ impl Server {
             tap,
             typed,
             frames: Frames::default(),
-            incoming: Incoming::default(),
+            incoming: Incoming::new(Instant::now()),
             rest: Vec::new(),
             connected: false,
             stalled: false,
@@ -119,9 +119,7 @@ impl Server {
                     (start, start_us) = (Instant::now(), self.world.now_us());
                 }
             }
-            if self.stands_still()? {
-                continue;
-            }
+            self.note_silence();
             self.typed.act(&mut self.world);
             self.world.step();
             self.keep();
@@ -164,10 +162,14 @@ impl Server {
         }
     }
 
-    /// See [`Incoming::stands_still`]; bytes that the line has not carried yet are not waited for.
-    fn stands_still(&mut self) -> Result<bool, PtyError> {
-        Ok(self.world.host_write_pending() == 0
-            && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
+    /// Tells the world how long the host has been silent within a frame; see [`Incoming`].
+    fn note_silence(&mut self) {
+        let now = Instant::now();
+        if self.world.host_write_pending() > 0 {
+            self.incoming.carries(now);
+        }
+        let silence = self.incoming.silence(now);
+        self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
     /// Hands statuses to the host; without one they are lost, as on a line that nobody listens to.

@@ -1,5 +1,15 @@
 //! What drives differ in, and what faults do to them.
 
+/// Side of the gear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EncoderPlace {
+    /// The motor's, seen through the gear.
+    #[default]
+    Motor,
+    /// The link's.
+    Link,
+}
+
 /// What drives differ in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveConfig {
@@ -16,6 +26,8 @@ pub struct DriveConfig {
     /// Measured speed that trips, rad/s, either way. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times the default
     /// arm's velocity limit; [`SimConfig::new`](crate::SimConfig::new) sets each joint's to 1.2 times its limit.
     pub over_speed: f64,
+    /// Side of the gear at which the position is read; the speed is always the motor's. It makes a difference with gears that yield.
+    pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
     /// Torque at the joint over the torque that the drive was asked for and believes to give. Known drives: about 1/1.3.
@@ -38,6 +50,7 @@ impl Default for DriveConfig {
             rest_ms: 400,
             velocity_full_scale: 2.0,
             over_speed: 1.8,
+            encoder: EncoderPlace::Motor,
             working_area: 2.9905,
             delivers: 1.0,
             one_message_per_interrupt: false,
@@ -48,6 +61,9 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
+    /// Smallest and largest speed of the trip that the simulator's options take, rad/s.
+    pub const OVER_SPEED: (f64, f64) = (0.01, 100.0);
+
     /// The firmware before the present one: other speed scale, short answers, one message per interrupt.
     pub fn older() -> Self {
         Self {

@@ -1,4 +1,5 @@
-//! The sensors of a drive: a coarse absolute encoder behind the gear, and a late speed from the motor's own encoder.
+//! The sensors of a drive: a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and a late speed from the motor's own
+//! encoder.
 
 /// Full turns of the 16-bit absolute encoder.
 const ENCODER_COUNTS: f64 = 65_536.0;

@@ -3,7 +3,7 @@ use core::fmt;
 
 use jtc_dynamics::JOINTS;
 
-use super::STATES;
+use super::{SIDES, STATES};
 use crate::faults::FaultKind;
 
 /// Why a fault file cannot be used.
@@ -82,6 +82,29 @@ pub enum FaultFileError {
         /// As written.
         value: f64,
     },
+    /// Not three numbers.
+    NotThree {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// The key.
+        key: &'static str,
+        /// Numbers that are there.
+        count: usize,
+    },
+    /// The normal of a wall has no length.
+    NoDirection {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// As written.
+        normal: [f64; 3],
+    },
+    /// There is no such side of an angle.
+    UnknownSide {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// As written.
+        side: String,
+    },
     /// There is no such state.
     UnknownState {
         /// Number of the fault in the file, from 1.
@@ -133,6 +156,18 @@ impl fmt::Display for FaultFileError {
             }
             Self::NotWhole { fault, key, value } => {
                 write!(f, "fault {fault}: {key} = {value} is not a whole number")
+            }
+            Self::NotThree { fault, key, count } => {
+                write!(f, "fault {fault}: {key} has {count} numbers, expected 3: `{key} = [x, y, z]`")
+            }
+            Self::NoDirection { fault, normal: [x, y, z] } => write!(
+                f,
+                "fault {fault}: normal = [{x}, {y}, {z}] has no direction; write the direction out of the wall, as \
+                 `normal = [0, 0, 1]` for a table"
+            ),
+            Self::UnknownSide { fault, side } => {
+                let names: Vec<_> = SIDES.iter().map(|(name, _)| *name).collect();
+                write!(f, "fault {fault}: there is no side `{side}`; sides are {}", names.join(", "))
             }
             Self::UnknownState { fault, state } => {
                 let names: Vec<_> = STATES.iter().map(|(name, _)| *name).collect();

@@ -55,6 +55,13 @@ impl World {
         }
     }
 
+    /// The host has been silent for no longer than this (µs) in its own time, while virtual time may have passed faster: a frame whose bytes
+    /// come in pieces from another program is not interrupted by a gap (J-03) that is none of the host's making. Bytes that wait on the
+    /// line make gaps as before. `None`, the start: virtual time alone counts.
+    pub fn limit_host_silence(&mut self, us: Option<u64>) {
+        self.silence_us = us;
+    }
+
     /// Bytes of the host that are not yet at the device.
     pub fn host_write_pending(&self) -> usize {
         self.to_device.pending()

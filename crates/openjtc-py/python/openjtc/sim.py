@@ -69,7 +69,16 @@ def _plain(value: object) -> object:
     """A number of numpy as one of Python."""
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     raise UsageError(f"a fault has no value like {value!r}", "usage", next="`jtc help faults` lists kinds and keys")
+
+
+def _of_joints(value: ArrayLike | None, what: str) -> list[float] | None:
+    """A number for all joints, or one for each."""
+    if value is None:
+        return None
+    return _floats(np.full(6, value) if np.ndim(value) == 0 else value, 6, what)
 
 
 def _arm(
@@ -79,6 +88,8 @@ def _arm(
     model_error: ModelError | None,
     start: ArrayLike | None,
     friction: bool,
+    gear_stiffness: ArrayLike | None,
+    over_speed: ArrayLike | None,
 ) -> dict[str, object]:
     error = None
     if model_error is not None:
@@ -96,6 +107,8 @@ def _arm(
         "model_error": error,
         "start": None if start is None else _floats(start, 6, "start"),
         "friction": friction,
+        "gear_stiffness": _of_joints(gear_stiffness, "gear_stiffness"),
+        "over_speed": _of_joints(over_speed, "over_speed"),
     }
 
 
@@ -109,6 +122,8 @@ class Simulator:
         model_error: How far the true arm is from its file; None: not at all.
         start: Positions at the start; 0 where the joint gets there.
         friction: Joints have the friction of the arm's file.
+        gear_stiffness: Of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the motor.
+        over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
         support: What holds the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they first are, or ``"none"``.
         baud: Rate of the serial line, bit/s; None: bytes take no time.
         answer_jitter_ms: Answers of the drives are late by up to so many milliseconds.
@@ -128,13 +143,15 @@ class Simulator:
         model_error: ModelError | None = ModelError(),
         start: ArrayLike | None = None,
         friction: bool = True,
+        gear_stiffness: ArrayLike | None = None,
+        over_speed: ArrayLike | None = None,
         support: str = "brakes",
         baud: int | None = 115_200,
         answer_jitter_ms: int = 0,
         faults: str | None = None,
         watch: bool = False,
     ) -> None:
-        simulated = _arm(arm, seed, payload, model_error, start, friction)
+        simulated = _arm(arm, seed, payload, model_error, start, friction, gear_stiffness, over_speed)
         self._native = _native.Simulator(
             simulated, support=support, baud=baud, answer_jitter_ms=answer_jitter_ms, faults=faults, watch=watch
         )
@@ -171,7 +188,7 @@ class Simulator:
 
     @property
     def outside_torque(self) -> Floats:
-        """What pushes and hands do to the joints, N·m."""
+        """What pushes, hands and walls do to the joints, N·m."""
         return self._native.truth("outside")
 
     @property
@@ -368,6 +385,8 @@ class Plant:
         model_error: How far the true arm is from its file; None: not at all.
         start: Positions at the start; 0 where the joint gets there.
         friction: Joints have the friction of the arm's file; False: none.
+        gear_stiffness: Of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the motor.
+        over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
         drives: False: the arm alone. Torques act at once, states are exact, and nothing trips.
 
     Raises:
@@ -383,9 +402,11 @@ class Plant:
         model_error: ModelError | None = ModelError(),
         start: ArrayLike | None = None,
         friction: bool = True,
+        gear_stiffness: ArrayLike | None = None,
+        over_speed: ArrayLike | None = None,
         drives: bool = True,
     ) -> None:
-        simulated = _arm(arm, seed, payload, model_error, start, friction)
+        simulated = _arm(arm, seed, payload, model_error, start, friction, gear_stiffness, over_speed)
         self._native = _native.Plant(simulated, drives=drives)
 
     def step(self, torque: ArrayLike, ms: int = 1) -> PlantState:

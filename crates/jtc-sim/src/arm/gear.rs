@@ -1,0 +1,187 @@
+//! Gears that yield: between a motor and its link there is a spring with damping.
+//!
+//! The motor's side has friction, the brake, the drive's torque and most of the rotor's inertia; pushes, hands, walls and end stops
+//! act on the link. Positions and speeds of the motor are seen through the gear, as all of a joint's numbers are.
+use jtc_dynamics::{JOINTS, JointVec};
+
+use super::{Arm, BRAKED, LIGHTEST, along, braked};
+
+/// Part of the rotor's inertia that turns with the link, as the output of a gear does, kg·m²: without it a light last link would swing
+/// too fast for any step. A rotor has at least twice as much.
+pub(super) const OUTPUT: f64 = 0.01;
+/// Damping over stiffness of a gear of which only the stiffness is known, s.
+const DAMPING_TIME: f64 = 5e-4;
+
+/// How far a gear yields.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gear {
+    /// Torque per angle between motor and link, N·m/rad; infinite: a rigid gear.
+    pub stiffness: f64,
+    /// Torque per speed between motor and link, N·m·s/rad.
+    pub damping: f64,
+}
+
+impl Gear {
+    /// A gear that does not yield.
+    pub const RIGID: Self = Self { stiffness: f64::INFINITY, damping: 0.0 };
+    /// Smallest and largest stiffness that the simulator's options take, N·m/rad.
+    pub const STIFFNESS: (f64, f64) = (100.0, 1e6);
+
+    /// A gear of this stiffness (N·m/rad) with a damping of 0.0005 s times the stiffness: a joint that swings with 30 Hz on it has 5 %
+    /// of the critical damping.
+    pub fn new(stiffness: f64) -> Self {
+        Self { stiffness, damping: if stiffness.is_finite() { DAMPING_TIME * stiffness } else { 0.0 } }
+    }
+
+    /// It yields.
+    pub fn is_elastic(&self) -> bool {
+        self.stiffness.is_finite()
+    }
+}
+
+impl Default for Gear {
+    fn default() -> Self {
+        Self::RIGID
+    }
+}
+
+/// Positions and velocities of links and motors: a state, or how fast it changes.
+#[derive(Clone, Copy)]
+struct Sides {
+    q: JointVec,
+    qd: JointVec,
+    motor: JointVec,
+    motor_speed: JointVec,
+}
+
+impl Sides {
+    fn along(&self, rate: &Self, dt: f64) -> Self {
+        Self {
+            q: along(&self.q, &rate.q, dt),
+            qd: along(&self.qd, &rate.qd, dt),
+            motor: along(&self.motor, &rate.motor, dt),
+            motor_speed: along(&self.motor_speed, &rate.motor_speed, dt),
+        }
+    }
+}
+
+/// What stays the same during a step.
+struct Drives<'a> {
+    /// Torques of the drives, N·m.
+    torque: &'a JointVec,
+    /// Torques on the links, N·m.
+    outside: &'a JointVec,
+    /// Inertias that turn with the motors and with the links, kg·m². A rigid gear has all at its link.
+    motor: &'a JointVec,
+    link: &'a JointVec,
+}
+
+impl Arm {
+    /// A sub-step with motors and links apart; brakes are at the motors.
+    pub(super) fn elastic_substep(
+        &mut self,
+        tau: &JointVec,
+        outside: &JointVec,
+        inertia: &JointVec,
+        damped: f64,
+        dt: f64,
+    ) {
+        self.follow_rigid();
+        let (mut motor, mut link) = ([0.0; JOINTS], *inertia);
+        let steepness = self.friction.steepness(&self.motor_speed);
+        for j in 0..JOINTS {
+            let elastic = self.parts.gears[j].is_elastic();
+            if elastic {
+                let rotor = self.parts.rotor_inertia[j].max(LIGHTEST) - OUTPUT;
+                motor[j] = rotor.max(steepness[j] * dt);
+                link[j] = OUTPUT.max(self.stopping(j, dt) * dt);
+            }
+            if self.braked[j] {
+                let against =
+                    if elastic { -self.gear_torque(j) } else { self.stop_torque(j, self.q[j], self.qd[j]) };
+                let inertia = if elastic { motor[j] } else { link[j] };
+                self.motor_speed[j] = braked(self.motor_speed[j], against, inertia, dt);
+                if elastic {
+                    motor[j] = BRAKED;
+                } else {
+                    (self.qd[j], link[j]) = (self.motor_speed[j], BRAKED);
+                }
+            }
+        }
+        let drives = Drives { torque: tau, outside, motor: &motor, link: &link };
+        self.elastic_runge_kutta(&drives, damped, dt);
+    }
+
+    /// Torque of the spring on the link, N·m; 0 in a rigid gear.
+    fn gear_torque(&self, j: usize) -> f64 {
+        let gear = &self.parts.gears[j];
+        if gear.is_elastic() {
+            gear.stiffness * (self.motor[j] - self.q[j]) + gear.damping * (self.motor_speed[j] - self.qd[j])
+        } else {
+            0.0
+        }
+    }
+
+    /// Like `runge_kutta` of rigid gears, with the motors as bodies of their own.
+    fn elastic_runge_kutta(&mut self, drives: &Drives<'_>, damped: f64, dt: f64) {
+        let start = Sides { q: self.q, qd: self.qd, motor: self.motor, motor_speed: self.motor_speed };
+        let (z0, half) = (self.bristles, 0.5 * dt);
+        let friction = self.friction.at(&start.motor_speed, &z0);
+        for j in 0..JOINTS {
+            self.heat[j] += start.motor_speed[j] * friction[j] * dt;
+        }
+        let r1 = self.rate(&start, &friction, drives, damped);
+        let stage = |rate: &Sides, dt: f64| {
+            let state = start.along(rate, dt);
+            let bristles = self.friction.bend(&z0, &rate.motor, dt);
+            self.rate(&state, &self.friction.at(&state.motor_speed, &bristles), drives, damped)
+        };
+        let r2 = stage(&r1, half);
+        let r3 = stage(&r2, half);
+        let r4 = stage(&r3, dt);
+        let mean = |part: fn(&Sides) -> &JointVec| -> JointVec {
+            let (a, b, c, d) = (part(&r1), part(&r2), part(&r3), part(&r4));
+            core::array::from_fn(|j| (a[j] + 2.0 * (b[j] + c[j]) + d[j]) / 6.0)
+        };
+        let motor = mean(|rate| &rate.motor);
+        self.bristles = self.friction.bend(&z0, &motor, dt);
+        self.q = along(&start.q, &mean(|rate| &rate.q), dt);
+        self.qd = along(&start.qd, &mean(|rate| &rate.qd), dt);
+        self.motor = along(&start.motor, &motor, dt);
+        self.motor_speed = along(&start.motor_speed, &mean(|rate| &rate.motor_speed), dt);
+        self.follow_rigid();
+    }
+
+    /// Motors with rigid gears are where their links are.
+    pub(super) fn follow_rigid(&mut self) {
+        for (j, gear) in self.parts.gears.iter().enumerate() {
+            if !gear.is_elastic() {
+                (self.motor[j], self.motor_speed[j]) = (self.q[j], self.qd[j]);
+            }
+        }
+    }
+
+    fn rate(&self, state: &Sides, friction: &JointVec, drives: &Drives<'_>, damped: f64) -> Sides {
+        let (mut on_link, mut motor) = ([0.0; JOINTS], [0.0; JOINTS]);
+        for (j, gear) in self.parts.gears.iter().enumerate() {
+            let drive = drives.torque[j] - friction[j];
+            if gear.is_elastic() {
+                let spring = gear.stiffness * (state.motor[j] - state.q[j])
+                    + gear.damping * (state.motor_speed[j] - state.qd[j]);
+                motor[j] = (drive - spring) / drives.motor[j];
+                on_link[j] = spring;
+            } else {
+                on_link[j] = drive;
+            }
+            on_link[j] += drives.outside[j] + self.stop_torque(j, state.q[j], state.qd[j]);
+        }
+        self.push_of_walls(&state.q, &state.qd, damped, &mut on_link);
+        let qdd = self.dynamics.forward(&state.q, &state.qd, &on_link, drives.link);
+        for (j, gear) in self.parts.gears.iter().enumerate() {
+            if !gear.is_elastic() {
+                motor[j] = qdd[j];
+            }
+        }
+        Sides { q: state.qd, qd: qdd, motor: state.motor_speed, motor_speed: motor }
+    }
+}

@@ -1,0 +1,206 @@
+//! Walls that the arm meets: a plane at the flange, or an angle of one joint.
+use jtc_bus::Joint;
+use jtc_dynamics::{Dynamics, JOINTS, JointVec};
+
+use super::{Arm, SimArm};
+
+/// A wall this near counts as touched when the length of the steps is chosen, m or rad.
+const NEAR: f64 = 0.01;
+
+/// Side of an angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Angles greater than it.
+    Above,
+    /// Angles less than it.
+    Below,
+}
+
+impl core::fmt::Display for Side {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(if *self == Self::Above { "above" } else { "below" })
+    }
+}
+
+/// A flat or angular obstacle. It only pushes: its force is stiffness times depth plus damping times the speed inwards, and never
+/// less than 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wall {
+    /// A plane that the origin of the flange meets.
+    Plane {
+        /// A point of the surface in the base frame, m.
+        position: [f64; 3],
+        /// Direction out of the wall in the base frame, of any length but 0.
+        normal: [f64; 3],
+        /// N/m.
+        stiffness: f64,
+        /// N·s/m.
+        damping: f64,
+    },
+    /// An angle that a joint meets.
+    Joint {
+        /// Which.
+        joint: Joint,
+        /// Angle at which the wall begins, rad.
+        angle: f64,
+        /// Side of the angle that the wall fills.
+        side: Side,
+        /// N·m/rad.
+        stiffness: f64,
+        /// N·m·s/rad.
+        damping: f64,
+    },
+}
+
+/// Where a wall is.
+#[derive(Clone, Debug)]
+enum Surface {
+    Plane {
+        normal: [f64; 3],
+        /// Place of the surface along the normal, m.
+        offset: f64,
+        /// The arm under a gravity of 1 m/s² into the wall: it knows the torques of a force along the normal at the flange.
+        pulled: Box<Dynamics>,
+    },
+    Joint {
+        index: usize,
+        /// 1: it pushes to greater angles.
+        sign: f64,
+        angle: f64,
+    },
+}
+
+/// A wall in contact with an arm, or out of it.
+#[derive(Clone, Debug)]
+pub(super) struct Contact {
+    wall: Wall,
+    surface: Surface,
+    stiffness: f64,
+    damping: f64,
+    /// How far the surface is behind its place, m or rad.
+    recess: f64,
+}
+
+/// Depth of the arm in a wall, and the joint torques of a unit force of the wall.
+struct Touch {
+    depth: f64,
+    torques: JointVec,
+}
+
+impl Touch {
+    /// Speed out of the wall, m/s or rad/s.
+    fn speed(&self, qd: &JointVec) -> f64 {
+        self.torques.iter().zip(qd).map(|(g, v)| g * v).sum()
+    }
+}
+
+impl Contact {
+    /// `dynamics` computes the flange of the arm at `q`. A wall that would begin inside the arm begins at its surface, and goes to its own
+    /// place as the arm leaves: no wall throws an arm.
+    pub fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
+        let (surface, stiffness, damping) = match wall {
+            Wall::Plane { position, normal, stiffness, damping } => {
+                let length = dot(&normal, &normal).sqrt();
+                let normal = normal.map(|x| x / length);
+                let pulled = Box::new(Dynamics::new(&parts.model, normal.map(|x| -x)));
+                let offset = dot(&normal, &position);
+                (Surface::Plane { normal, offset, pulled }, stiffness, damping)
+            }
+            Wall::Joint { joint, angle, side, stiffness, damping } => {
+                let sign = if side == Side::Above { -1.0 } else { 1.0 };
+                (Surface::Joint { index: joint.index(), sign, angle }, stiffness, damping)
+            }
+        };
+        let mut contact = Self { wall, surface, stiffness, damping, recess: 0.0 };
+        contact.recess = contact.touch(dynamics, q).depth.max(0.0);
+        contact
+    }
+
+    pub fn wall(&self) -> &Wall {
+        &self.wall
+    }
+
+    fn touch(&self, dynamics: &Dynamics, q: &JointVec) -> Touch {
+        let (depth, torques) = match &self.surface {
+            Surface::Plane { normal, offset, pulled } => {
+                let flange = dynamics.forward_kinematics(q)[JOINTS].position;
+                (offset - dot(normal, &flange), pulled.flange_torque(q))
+            }
+            Surface::Joint { index, sign, angle } => {
+                let mut torques = [0.0; JOINTS];
+                torques[*index] = *sign;
+                (sign * (angle - q[*index]), torques)
+            }
+        };
+        Touch { depth: depth - self.recess, torques }
+    }
+
+    /// Adds the torques of the wall's force (N·m) to `sum`; `damped`: share of the damping that acts.
+    pub fn push(&self, dynamics: &Dynamics, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
+        let touch = self.touch(dynamics, q);
+        if touch.depth > 0.0 {
+            let force = self.stiffness * touch.depth - damped * self.damping * touch.speed(qd);
+            if force > 0.0 {
+                sum.iter_mut().zip(touch.torques).for_each(|(sum, g)| *sum += g * force);
+            }
+        }
+    }
+
+    /// What the wall adds to the square of the highest natural frequency (1/s²), and to the fastest decay (1/s), of an arm that may touch
+    /// it within `dt`; 0 of one that is far. `mobility`: acceleration of the joints by torques.
+    pub fn rates(
+        &self,
+        dynamics: &Dynamics,
+        q: &JointVec,
+        qd: &JointVec,
+        dt: f64,
+        mobility: impl Fn(&JointVec) -> JointVec,
+    ) -> (f64, f64) {
+        let touch = self.touch(dynamics, q);
+        let reach = (-2.0 * dt * touch.speed(qd)).max(0.0) + NEAR;
+        if touch.depth + reach <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let inverse_mass = touch.speed(&mobility(&touch.torques));
+        (self.stiffness * inverse_mass, self.damping * inverse_mass)
+    }
+
+    /// The arm has moved: a surface behind its place follows it.
+    pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
+        if self.recess > 0.0 {
+            self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
+        }
+    }
+}
+
+impl Arm {
+    /// Torques of the walls' forces at `q`, `qd` (N·m) are added to `sum`.
+    pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
+        for contact in &self.contacts {
+            contact.push(&self.dynamics, q, qd, damped, sum);
+        }
+    }
+
+    /// Torques of the walls on the joints, N·m.
+    pub fn wall_torque(&self) -> JointVec {
+        let mut sum = [0.0; JOINTS];
+        self.push_of_walls(&self.q, &self.qd, 1.0, &mut sum);
+        sum
+    }
+
+    /// These walls are there and no others; those that were there already stay as they are.
+    pub fn set_walls(&mut self, walls: &[Wall]) {
+        let mut known = core::mem::take(&mut self.contacts);
+        for &wall in walls {
+            let contact = match known.iter().position(|contact| *contact.wall() == wall) {
+                Some(place) => known.swap_remove(place),
+                None => Contact::new(wall, &self.parts, &self.dynamics, &self.q),
+            };
+            self.contacts.push(contact);
+        }
+    }
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

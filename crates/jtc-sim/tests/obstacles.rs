@@ -1,0 +1,183 @@
+//! The controller and an arm that meets walls, takes up loads, has gears that yield and drives that trip at their own speed.
+use jtc_bus::{Joint, NodeState};
+use jtc_core::{ControllerState, error, joint_error};
+use jtc_sim::{Fault, FaultKind, Gear, ModelError, Operator, Side, SimConfig, Support, Trigger, host};
+use jtc_wire::ExecCommand;
+
+const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
+const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
+
+fn config() -> SimConfig {
+    SimConfig { start: FROM, baud: None, model_error: ModelError::NONE, ..SimConfig::default() }
+}
+
+fn held(config: SimConfig) -> Operator {
+    let mut operator = Operator::new(config);
+    operator.bring_up().unwrap();
+    operator.run(200);
+    operator
+}
+
+fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
+    let now = Trigger::At(operator.world.now_us() / 1000);
+    operator.world.inject(Fault { kind, trigger: now, duration_ms: ms });
+}
+
+/// Joint 1 alone turns from 0 to 1 rad and back; a wall stands at 0.5 rad. Its torque is the deepest that the kinetic energy can press
+/// it, v·√(K·J), and what the drive adds; it never pulls; nothing of it is left when it is away.
+#[test]
+fn a_joint_that_runs_into_a_wall_is_pushed_back() {
+    let start = [0.0, -0.4, 0.9, 0.2, -0.3, 0.5];
+    for stiffness in [3_000.0, 20_000.0] {
+        let mut operator = held(SimConfig { start, ..config() });
+        let mut to = start;
+        to[0] = 1.0;
+        operator.upload(&host::there_and_back(&start, &to, 2.0, 1, 10), 10).unwrap();
+        let wall = FaultKind::JointWall {
+            joint: Joint::ALL[0],
+            rad: 0.5,
+            side: Side::Above,
+            stiffness,
+            damping: 0.0,
+        };
+        inject(&mut operator, wall, Some(4_000));
+        operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+        let (mut strongest, mut speed) = (0.0f64, 0.0);
+        for _ in 0..3_000 {
+            operator.step();
+            let truth = operator.world.truth();
+            let torque = truth.outside[0];
+            assert!(torque <= 0.0 && truth.outside[1..] == [0.0; 5], "{:?}", truth.outside);
+            assert!((torque == 0.0) == (truth.q[0] <= 0.5), "{torque} N·m at {} rad", truth.q[0]);
+            if torque == 0.0 && strongest == 0.0 {
+                speed = truth.qd[0];
+            }
+            strongest = strongest.max(-torque);
+        }
+        let inertia = 7.2;
+        let kinetic = speed * f64::sqrt(stiffness * inertia);
+        println!(
+            "{stiffness} N·m/rad met at {speed:.2} rad/s: {strongest:.0} N·m, {kinetic:.0} N·m by the kinetic energy"
+        );
+        assert!(strongest > 0.8 * kinetic && strongest < kinetic + 110.0, "{strongest} {kinetic}");
+        operator.run(1_500);
+        assert_eq!(operator.world.truth().outside, [0.0; 6], "the wall is away");
+    }
+}
+
+/// A load that is taken up and dropped again: the torque that holds the arm changes by its weight, and comes back.
+#[test]
+fn a_load_that_is_taken_up_is_held_and_dropped() {
+    let mut operator = held(config());
+    let torque = |operator: &mut Operator| {
+        operator.run(3_000);
+        operator.world.truth().torque
+    };
+    let before = torque(&mut operator);
+    let (mass, com) = (1.5, [0.0, 0.02, 0.06]);
+    inject(&mut operator, FaultKind::Payload { mass, com }, Some(3_000));
+    let with = torque(&mut operator);
+    let after = torque(&mut operator);
+    let config = operator.world.config();
+    let of = |payload| {
+        jtc_dynamics::Dynamics::with_payload(&config.arm.model, config.arm.gravity, &payload)
+            .gravity_torque(&FROM)
+    };
+    let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
+    let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
+    for j in 0..6 {
+        // Stiction carries some of it.
+        let weight = loaded[j] - empty[j];
+        assert!(
+            (with[j] - before[j] - weight).abs() < 9.0,
+            "joint {}: {} of {weight}",
+            j + 1,
+            with[j] - before[j]
+        );
+        assert!((after[j] - before[j]).abs() < 9.0, "joint {}", j + 1);
+    }
+    assert!((with[1] - before[1]).abs() > 5.0, "{with:?} {before:?}");
+    assert_eq!(operator.state(), ControllerState::HoldPos);
+    let events: Vec<_> = operator.world.log().entries().map(|entry| entry.event.to_string()).collect();
+    assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
+}
+
+/// The controller's own check of the speed (J-35) is seen with drives that trip later than they do by default.
+#[test]
+fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
+    let run = |over_speed: Option<f64>| {
+        let mut config = SimConfig { support: Support::Stand, ..config() };
+        for drive in &mut config.drives {
+            drive.over_speed = over_speed.unwrap_or(drive.over_speed);
+        }
+        let mut operator = held(config);
+        let push = FaultKind::Push { joint: Joint::ALL[4], torque: 150.0 };
+        inject(&mut operator, push, Some(300));
+        let (mut internal, mut tripped) = (0, false);
+        for _ in 0..400 {
+            operator.step();
+            internal |= operator.world.telemetry().joints[4].internal;
+            tripped |= operator.world.node_states()[4] == NodeState::FAULT;
+        }
+        (internal & joint_error::VELOCITY != 0, tripped)
+    };
+    assert_eq!(run(None), (false, true), "the drives are first");
+    assert_eq!(run(Some(50.0)), (true, false));
+}
+
+/// A brake that stays closed holds its joint, whatever its drive does, and opens when the fault is over.
+#[test]
+fn a_brake_that_stays_closed_holds_the_joint() {
+    for support in [Support::Brakes, Support::Stand] {
+        let mut operator = held(SimConfig { support, ..config() });
+        operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+        inject(&mut operator, FaultKind::BrakeClosed { joint: Joint::ALL[5] }, Some(2_000));
+        operator.run(5);
+        let before = operator.world.truth().q[5];
+        operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+        operator.run(1_500);
+        let moved = (operator.world.truth().q[5] - before).abs();
+        assert!(moved < 1e-9, "{support:?}: {moved} rad");
+        assert_ne!(operator.state(), ControllerState::Operate, "{support:?}: it is noticed");
+    }
+}
+
+/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved; the drives' positions are those of the motors.
+#[test]
+fn an_arm_with_gears_that_yield_is_held_and_moved() {
+    let run = || {
+        let mut config = config();
+        config.arm.gears = [Gear::new(20_000.0); 6];
+        let mut operator = held(config);
+        operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+        operator.execute(10_000).unwrap();
+        operator.run(500);
+        let t = operator.world.telemetry();
+        assert_eq!((t.state, t.errors & error::INTERNAL), (ControllerState::HoldPos, 0));
+        assert!(t.joints.iter().all(|joint| joint.state == NodeState::ENABLED));
+        let truth = *operator.world.truth();
+        for (j, joint) in t.joints.iter().enumerate() {
+            assert!((joint.position - truth.motor[j]).abs() < 2e-4, "joint {}", j + 1);
+        }
+        truth
+    };
+    let truth = run();
+    let model = run();
+    assert_eq!(truth, model, "the same, to the last bit");
+    let twist = truth.motor[1] - truth.q[1];
+    assert!(twist.abs() > 2e-4 && twist.abs() < 0.02, "joint 2 is loaded: {twist} rad");
+}
+
+/// A fault without a duration that a tick could show is there in one tick.
+#[test]
+fn a_fault_of_no_duration_is_there_for_a_millisecond() {
+    let mut operator = held(config());
+    inject(&mut operator, FaultKind::Push { joint: Joint::ALL[2], torque: 5.0 }, Some(0));
+    let pushed: Vec<_> = (0..5)
+        .map(|_| {
+            operator.step();
+            operator.world.truth().outside[2]
+        })
+        .collect();
+    assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
+}

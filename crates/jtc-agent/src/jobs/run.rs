@@ -29,9 +29,15 @@ const MOVING: Duration = Duration::from_secs(1);
 pub enum Course {
     /// Along a trajectory.
     Along(Trajectory),
-    /// From where the arm stands to this place; true: with the flange on a straight line, else straight in joint space where that takes no
-    /// longer.
-    To(Target, bool),
+    /// From where the arm stands to a place.
+    To {
+        /// The place.
+        target: Target,
+        /// The flange keeps to a straight line; else straight in joint space where that takes no longer.
+        line: bool,
+        /// Torque that the move leaves, % of each limit.
+        margin_pct: f64,
+    },
 }
 
 /// What is run, and how.
@@ -163,19 +169,21 @@ impl Run<'_> {
                 None | Some(100.0) => Ok(trajectory.clone()),
                 Some(percent) => plan::at_speed(trajectory, percent).map_err(|e| plan_error(&e)),
             },
-            Course::To(place, line) => {
+            Course::To { target, line, margin_pct } => {
                 let (config, friction) =
                     (site.arm.config_on_device(&site.options.device), site.arm.friction());
                 let planner = Planner {
                     model: Some(&site.arm.model),
                     friction: friction.as_ref(),
                     speed_pct: move_speed.percent,
+                    margin_pct: *margin_pct,
                     ..Planner::new(&config)
                 };
-                let planned = planner.to_target(&site.arm.model, &status.positions(), place, *line);
+                let planned = planner.to_target(&site.arm.model, &status.positions(), target, *line);
                 let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
                 let of_speed = move_speed.note("speed_percent").map(|words| format!("move {words}"));
-                planned.notes.into_iter().chain(of_speed).for_each(|text| self.task.note(text));
+                let low = planned.verdict.margin.and_then(|margin| margin.warning());
+                planned.notes.into_iter().chain(of_speed).chain(low).for_each(|text| self.task.note(text));
                 Ok(planned.trajectory)
             }
         }

@@ -29,8 +29,9 @@ use crate::error::Failure;
 pub enum Course {
     /// Along a trajectory.
     Along(Arc<Trajectory>),
-    /// From where the arm stands to this place; `line`: with the flange on a straight line.
-    To { target: Target, line: bool },
+    /// From where the arm stands to this place; `line`: with the flange on a straight line; `margin_pct`: torque that the move leaves, % of
+    /// each limit.
+    To { target: Target, line: bool, margin_pct: f64 },
 }
 
 /// What is run, and how.
@@ -347,18 +348,20 @@ fn trajectory(
             None | Some(100.0) => Ok((Arc::clone(trajectory), Vec::new())),
             Some(percent) => Ok((Arc::new(plan::at_speed(trajectory, percent)?), Vec::new())),
         },
-        Course::To { target, line } => {
+        Course::To { target, line, margin_pct } => {
             let (config, friction) = (arm.config_on_device(&options.device), arm.friction());
             let planner = Planner {
                 model: Some(&arm.model),
                 friction: friction.as_ref(),
                 speed_pct: move_speed.percent,
+                margin_pct: *margin_pct,
                 ..Planner::new(&config)
             };
             let planned = planner.to_target(&arm.model, &status.positions(), target, *line);
             let planned =
                 planned.map_err(|error| Failure { message: error.of_move(), ..Failure::from(error) })?;
-            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).collect();
+            let low = planned.verdict.margin.and_then(|margin| margin.warning());
+            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).chain(low).collect();
             Ok((Arc::new(planned.trajectory), notes))
         }
     }

@@ -4,16 +4,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, MoveSpeed, Planner};
+use jtc_host::plan::{self, MoveSpeed, Planner, RunCourse, RunStart, StartError};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{
-    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory,
-};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory};
 use jtc_wire::Status;
 
 use super::report::{self, Made, MotionReport};
@@ -102,25 +99,27 @@ impl Run<'_> {
         let trajectory = self.trajectory(order, &site, &status, move_speed)?;
         closed(&trajectory, order, &site)?;
         for n in 1..=order.repeat.max(1) {
-            let mut checked = site.check(&trajectory, &status);
-            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let way = site.approach(&trajectory, &status, move_speed.percent)?;
+            let course = RunCourse {
+                trajectory: &trajectory,
+                then: (n == 1 && order.repeat > 1).then_some(&trajectory),
+                approach_pct: order.approach.then_some(move_speed.percent),
+            };
+            let start = course.start(&site.arm, &status.positions(), &site.options);
+            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
+            if is_approach {
                 move_speed
                     .note("speed_percent")
                     .into_iter()
                     .for_each(|words| task.note(format!("approach {words}")));
-                if !self.motion("approach", &way, &site, done)? {
+                if !self.motion("approach", &checked, &site, done)? {
                     return Ok(());
                 }
                 // From where the approach ended, not from where it should have.
                 status = self.fresh_status()?;
-                checked = site.check(&trajectory, &status);
+                let again =
+                    CheckedTrajectory::check(&trajectory, &site.arm, &status.positions(), &site.options);
+                checked = again.map_err(|e| ErrorObject::of(&e.into()))?;
             }
-            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
-            let checked = checked.map_err(|e| {
-                let error = ErrorObject::of(&e.into());
-                if elsewhere { error.next("ask for the run with approach: true") } else { error }
-            })?;
             if !self.motion("motion", &checked, &site, done)? {
                 return Ok(());
             }
@@ -286,22 +285,6 @@ impl Run<'_> {
     }
 }
 
-impl Site {
-    fn approach(
-        &self,
-        trajectory: &Trajectory,
-        status: &Status,
-        speed_percent: f64,
-    ) -> Result<CheckedTrajectory, ErrorObject> {
-        plan::approach(trajectory, &self.arm, &status.positions(), speed_percent, &self.options)
-            .map_err(|error| approach_error(&error))
-    }
-
-    fn check(&self, trajectory: &Trajectory, status: &Status) -> Result<CheckedTrajectory, CheckError> {
-        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &self.options)
-    }
-}
-
 /// A motion that is repeated leads back to its start, or an approach does.
 fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), ErrorObject> {
     if order.repeat <= 1 || order.approach {
@@ -322,9 +305,15 @@ fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), Err
     Err(object.with(&facts))
 }
 
-/// The arm stands elsewhere than at the first point.
-fn is_elsewhere(error: &CheckError) -> bool {
-    matches!(error, CheckError::Refused(verdict) if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose))
+/// Why nothing of the run was begun.
+fn not_begun(error: StartError) -> ErrorObject {
+    match error {
+        StartError::Check(error) => ErrorObject::of(&error.into()),
+        StartError::Elsewhere(error) => {
+            ErrorObject::of(&error.into()).next("ask for the run with approach: true")
+        }
+        StartError::Approach(error) => approach_error(&error),
+    }
 }
 
 /// There is no such motion.

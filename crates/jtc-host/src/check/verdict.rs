@@ -191,6 +191,11 @@ impl Verdict {
         self.problems.iter().all(|p| p.warning)
     }
 
+    /// The arm does not stand at the first point, and nothing else forbids to run it.
+    pub fn is_only_elsewhere(&self) -> bool {
+        !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
+    }
+
     /// What the whole of the problems looks like.
     pub fn suspicion(&self) -> Suspicion {
         use ProblemKind::*;

@@ -5,17 +5,15 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 
-use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner};
+use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner, RunCourse, RunStart, StartError};
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{
-    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError,
-    Sample,
+    Arm, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError, Sample,
 };
 use jtc_wire::{Status, TrajectoryState};
 
@@ -178,30 +176,23 @@ impl Machine {
         mut status: Status,
     ) -> Result<(), Failure> {
         let Way { order, trajectory, arm, options, move_speed } = way;
-        for _ in 0..order.repeat {
-            let check =
-                |status: &Status| CheckedTrajectory::check(trajectory, arm, &status.positions(), options);
-            let mut checked = check(&status);
-            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let approach =
-                    plan::approach(trajectory, arm, &status.positions(), move_speed.percent, options);
-                let approach = approach.map_err(|error| no_approach(&error))?;
+        for n in 1..=order.repeat {
+            let course = RunCourse {
+                trajectory,
+                then: (n == 1 && order.repeat > 1).then_some(trajectory),
+                approach_pct: order.approach.then_some(move_speed.percent),
+            };
+            let start = course.start(arm, &status.positions(), options);
+            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
+            if is_approach {
                 ran.notes.extend(of_speed("approach", *move_speed).filter(|note| !ran.notes.contains(note)));
-                if !self.leg(&approach, (order, "approach"), asked, ran, None)? {
+                if !self.leg(&checked, (order, "approach"), asked, ran, None)? {
                     return Ok(());
                 }
+                // From where the approach ended, not from where it should have.
                 status = self.session.fresh_status()?;
-                checked = check(&status);
+                checked = CheckedTrajectory::check(trajectory, arm, &status.positions(), options)?;
             }
-            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
-            let checked = checked.map_err(|error| {
-                let failure = Failure::from(error);
-                if elsewhere {
-                    failure.next("pass approach=True: the arm is moved to the first point")
-                } else {
-                    failure
-                }
-            })?;
             if !self.leg(&checked, (order, "motion"), asked, ran, recording.as_deref_mut())? {
                 return Ok(());
             }
@@ -315,14 +306,14 @@ impl Machine {
     }
 }
 
-/// The arm is not at the first point, and that alone is wrong.
-fn is_elsewhere(error: &CheckError) -> bool {
+/// Why nothing of the run was begun.
+fn not_begun(error: StartError) -> Failure {
     match error {
-        CheckError::Refused(verdict) => {
-            verdict.refusals().next().is_some()
-                && verdict.refusals().all(|p| p.kind == ProblemKind::StartPose)
+        StartError::Check(error) => error.into(),
+        StartError::Elsewhere(error) => {
+            Failure::from(error).next("pass approach=True: the arm is moved to the first point")
         }
-        _ => false,
+        StartError::Approach(error) => no_approach(&error),
     }
 }
 

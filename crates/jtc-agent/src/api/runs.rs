@@ -6,6 +6,7 @@ use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
+use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
 use jtc_host::plan::margin_in_range;
 use jtc_host::{Arm, ErrorKind};
@@ -269,7 +270,8 @@ pub(super) async fn begin_move(
         accept_device_limits,
     } = request;
     within("speed_percent", speed_percent.unwrap_or(100.0), 100.0)?;
-    margin_in_range(margin_pct).map_err(|error| ErrorObject::diagnosed(&error))?;
+    margin_in_range(margin_pct)
+        .map_err(|error| ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error)))?;
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {

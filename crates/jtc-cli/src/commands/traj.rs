@@ -95,7 +95,8 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        let margin = margin_line(verdict.margin);
+        // What is refused has its reasons already.
+        let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
         format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.replace('`', ""))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }

@@ -169,8 +169,10 @@ pub enum Command {
                             the same keys: `jtc help files`. The arm stops at each waypoint; --blend rounds\n\
                             the corners where that is faster than a stop. Legs are straight in joint space; with --line, or where the column\n\
                             `leg` asks for it, the flange keeps to straight lines and arcs, and --blend-m rounds their corners.\n\
-                            Limits are those of velocity and acceleration (98 % of them), torque by the arm model (90 %) and\n\
-                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\nExamples:\n  \
+                            Limits are those of velocity and acceleration (98 % of them), torque by the arm model less --margin, and\n\
+                            jerk (the highest acceleration within 100 ms). What comes out passed the check of `jtc traj check`.\n\
+                            The margin is for masses and friction that the model does not know. Where gravity and friction leave less of a limit,\n\
+                            the motion uses a quarter of what they leave, and a note names the joint. A margin below 10 % is warned of.\n\nExamples:\n  \
                             jtc plan waypoints.csv -o cycle.csv\n  jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
                             jtc plan poses-of-flange.csv -o lines.csv --line --blend-m 0.02\n  \
                             jtc plan cycle.json --arm my-arm.toml -o cycle.csv --payload 2,0,0,0.08"
@@ -180,7 +182,8 @@ pub enum Command {
     #[command(
         after_help = "Straight in joint space, or with --line so that the flange keeps to a straight line, within the limits of velocity,\n\
                             acceleration, jerk and torque, checked before anything is sent; nobody looks for obstacles. It runs and ends as\n\
-                            `jtc traj run` does: on a terminal space pauses and resumes, s stops, + and - change the speed; Ctrl-C stops on the path.\n\nExamples:\n  \
+                            `jtc traj run` does: on a terminal space pauses and resumes, s stops, + and - change the speed; Ctrl-C stops on the path.\n\
+                            --margin is that of `jtc plan`.\n\nExamples:\n  \
                             jtc move --to home --arm my-arm.toml\n  jtc move --to 0,0.5,-1,0,0.5,0\n  \
                             jtc move --to 0,30,-60,0,30,0 --deg --speed 20\n  jtc move --to-flange 0.6,0.3,0.4,0,0,0 --line --speed 20"
     )]

@@ -49,6 +49,34 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!(!approach(&["--speed", "100"]).contains("of the limits"));
 }
 
+/// J-55: the arm of the controller, its limits and its payload decide about the whole run before an approach begins.
+#[test]
+fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
+    let sim = Sim::start(&FAST);
+    let slow = include_str!("../../../arms/avena.toml")
+        .replace("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 0.4");
+    let arm = sim.file("slow.toml", &slow);
+    let folder = sim.path("examples");
+    sim.jtc(&["example", "motion", "-o", &folder]).ends(0);
+    let motion = format!("{folder}/motion.csv");
+    let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
+    let refused = |sim: &Sim, kind: &str| {
+        sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "100"]).ends(0);
+        let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
+        let kinds: Vec<_> =
+            refused["verdict"]["problems"].as_array().unwrap().iter().map(|p| p["kind"].clone()).collect();
+        assert!(kinds.iter().any(|k| k == kind) && kinds.iter().any(|k| k == "start_pose"), "{kinds:?}");
+        at(sim, elsewhere);
+    };
+    let narrow = Sim::start(&[&FAST[..], &["--arm", &arm]].concat()).held();
+    refused(&narrow, "velocity");
+    let loaded = sim.held();
+    loaded.jtc(&["payload", "set", "--mass", "7", "--com", "0,0,0.1"]).ends(0);
+    refused(&loaded, "torque");
+    loaded.jtc(&["payload", "clear"]).ends(0);
+    loaded.jtc(&["traj", "run", &motion, "--approach", "--speed", "100"]).ends(0);
+}
+
 /// To a pose of the flange in joint space, and from there on a straight line; what cannot be is refused before anything moves.
 #[test]
 fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {

@@ -55,6 +55,47 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
+/// The margin of a plan is kept, printed and warned of, by `plan` and `traj check` alike; what is no margin is refused with its range.
+#[test]
+fn a_plan_leaves_the_margin_that_is_asked_for() {
+    let dir = Dir::new();
+    let swing =
+        "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n1.2,0.4,-0.9,0.8,0.6,1\n-1.2,-0.5,0.9,-0.8,-0.6,-1\n0,0,0,0,0,0\n";
+    let waypoints = dir.file("waypoints.csv", swing);
+    let out = dir.path("out.csv");
+    let plan = |words: &[&str]| {
+        let output =
+            jtc(&[&["--json", "plan", &waypoints, "-o", &out, "--overwrite"], words].concat()).ends(0);
+        let checked = jtc(&["--json", "traj", "check", &out]).ends(0);
+        let (plan, check) = (output.json(), checked.json());
+        assert_eq!(plan["margin"], check["verdict"]["margin"], "{words:?}");
+        let left = plan["margin"]["percent"].as_f64().unwrap();
+        for err in [&output.err, &checked.err] {
+            assert_eq!(err.contains("warning") && err.contains("torque margin"), left < 10.0, "{err}");
+        }
+        (left, plan["duration_s"].as_f64().unwrap())
+    };
+    let (default, of_default) = plan(&[]);
+    let (none, _) = plan(&["--margin", "0"]);
+    assert!(default >= 15.0 && none < 10.0, "{default} % {none} %");
+    assert_eq!((default, of_default), plan(&["--margin", "15"]));
+    assert_eq!((default, of_default), plan(&["--torque-margin", "15"]));
+    let (wide, of_wide) = plan(&["--margin", "30"]);
+    assert!(wide >= 30.0 && of_wide > of_default, "{wide} %");
+    let text = jtc(&["traj", "check", &out]).ends(0).out;
+    assert!(text.contains("\ntorque margin 3") && text.contains("N·m with bearings at"), "{text}");
+    for wrong in ["NaN", "-1", "50.1", "100", "1e9", "inf", "x", "", "15%"] {
+        for words in [
+            &["plan", &waypoints, "-o", &out, "--overwrite", "--margin", wrong][..],
+            &["move", "--to", "0,0,0,0,0,0", "--margin", wrong],
+        ] {
+            let error = jtc(words).ends(2).err;
+            assert!(error.contains(&format!("'{wrong}' for '--margin <PERCENT>'")), "{error}");
+            assert!(error.contains("0 to 50") && error.contains("by default 15"), "{error}");
+        }
+    }
+}
+
 /// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is no slower without a
 /// limit; what is printed is what is in the file.
 #[test]

@@ -71,6 +71,34 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     assert_eq!(anna.over(job)["stage"], "finished");
 }
 
+/// J-55: a trajectory that cannot be run moves nothing, also where an approach would lead to its first point.
+#[test]
+fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
+    let served = Served::start(921_600);
+    let anna = Program::new(&served, "anna", 60.0, "continue");
+    anna.recover();
+    let away = anna
+        .begin("POST /api/moves", json!({ "to_rad": [0.3, 0.2, -0.3, 0.0, 0.0, 0.0], "speed_percent": 100 }));
+    assert_eq!(anna.over(away)["stage"], "finished");
+    let place = || {
+        get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
+    };
+    let before = place();
+    // 2 rad/s in the middle, and what the check does not refuse.
+    assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
+    let ended = anna.over(job);
+    assert_eq!((&ended["stage"], &ended["runs"]), (&json!("failed"), &json!(0)), "{ended}");
+    assert!(
+        ended["error"]["message"].as_str().is_some_and(|m| m.contains("velocity over its limit")),
+        "{ended}"
+    );
+    assert!((place() - before).abs() < 2e-3, "{} after {before}", place());
+    assert_eq!(put(&served, "7", "slow enough", 0.4).0, 200);
+    let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
+    assert_eq!(anna.over(job)["stage"], "finished");
+}
+
 #[test]
 fn what_is_new_replaces_nothing() {
     let served = Served::start(921_600);

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use test_kit::written::text_with;
 
 const THREE: &str = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0.2,-0.3,0,0.2,0\n0,0,0,0,0,0\n";
+const SWING: &str = "q1,q2,q3,q4,q5,q6\n1.2,0.4,-0.9,0.8,0.6,1\n-1.2,-0.5,0.9,-0.8,-0.6,-1\n";
 const CORNER: &str = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.4,0,0,0,0,0\n0.4,0,0,0.4,0,0\n";
 
 #[test]
@@ -35,6 +36,15 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
         "{binding:?}"
     );
     assert!(planned["joints"][1]["torque_peak_nm"].as_f64().is_some_and(|torque| torque > 1.0), "{planned}");
+
+    // The default margin is kept; without one less is left, and that is a warning.
+    let left = |planned: &Value| planned["margin"]["percent"].as_f64().expect("a margin");
+    assert!(left(&planned) >= 15.0 && planned["warnings"] == json!([]), "{}", planned["margin"]);
+    let tight = plan(json!({ "waypoints": SWING, "margin_percent": 0 })).1;
+    assert!(left(&tight) < 10.0, "{}", tight["margin"]);
+    assert!(tight["warnings"].to_string().contains("torque margin"), "{}", tight["warnings"]);
+    let wide = plan(json!({ "waypoints": THREE, "margin_percent": 50 })).1;
+    assert!(seconds(&wide) > seconds(&planned), "{}", seconds(&wide));
 
     // Slower, rounded, and under a number.
     let slower = plan(json!({ "waypoints": THREE, "speed_percent": 50 })).1;
@@ -103,6 +113,9 @@ fn what_cannot_be_planned_is_refused_with_place_value_and_limit_and_is_not_kept(
         (body(&many), json!(503.0), json!(500.0)),
         (change("speed_percent", json!(101)), json!(101.0), json!(100.0)),
         (change("temperature_c", json!(-41)), json!(-41.0), json!(-40.0)),
+        (change("margin_percent", json!(-1)), json!(-1.0), json!(0.0)),
+        (change("margin_percent", json!(50.5)), json!(50.5), json!(50.0)),
+        (change("margin_percent", json!(100)), json!(100.0), json!(50.0)),
         (change("blend_rad", json!(-1)), Value::Null, Value::Null),
         (change("blend_rad", json!(5)), json!(5.0), json!(0.5)),
         (change("blend_m", json!(20)), json!(20.0), json!(0.5)),

@@ -20,11 +20,13 @@ const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
 /// Share of what the torque limit leaves over for motion that the speed may take.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
-/// Share of the torque limit that is planned with.
-pub(crate) const TORQUE_SHARE: f64 = 0.9975;
+/// Share of the usable torque that is planned with.
+const TORQUE_SHARE: f64 = 0.9975;
 /// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of it with which the arm can still creep.
+/// Share of what standing leaves of the usable torque that has to be left for motion where that is less.
+const STANDING_SHARE: f64 = 0.5;
+/// Share of the torque limit with which the arm can still creep.
 const CREEP_SHARE: f64 = 0.002;
 
 /// The parts of the torque at a place, N·m: q̈ = q′·s̈ + q″·ṡ² makes it hold + mass·s̈ + speed·ṡ², and friction.
@@ -129,19 +131,27 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// What is left of the torque at one end of a cell for motion up (`high`) and down (`low`), N·m: the limit less what holds the arm and
-/// the worst friction of the way's direction up to the speed.
+/// What is left of the torque at one end of a cell for motion up (`high`) and down (`low`), N·m: the usable torque less what holds the arm
+/// and the worst friction of the way's direction up to the speed.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,
+    /// Usable torque.
+    limit: JointVec,
+}
+
+/// Torque that a plan uses of a joint where holding takes `hold`, N·m.
+pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
+    TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }
 
 impl Room {
     /// Where the squared speed of the parameter is `cap` at most.
     pub fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
-        let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS] };
+        let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS], limit: [0.0; JOINTS] };
         for j in 0..JOINTS {
-            let limit = TORQUE_SHARE * limits.torque[j];
+            let limit = planned_torque(arm, limits, j, loads.hold[j]);
+            room.limit[j] = limit;
             let fastest = end.point.first[j] * cap.sqrt();
             let (low, high) = arm.friction_range(j, fastest);
             room.high[j] = limit - loads.hold[j] - high;
@@ -150,10 +160,13 @@ impl Room {
         room
     }
 
-    /// The joint with the least of it, as a share of its torque limit.
-    fn least(&self, limits: &Limits) -> (f64, usize) {
+    /// The joint with the least of it, and that as a share of its torque limit; which of them it is, by how much more than `needed` there
+    /// is.
+    fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
-        (0..JOINTS).map(|j| (share(j), j)).fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a })
+        let over = |j: &usize| share(*j) - needed[*j];
+        let least = (0..JOINTS).min_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
+        (share(least), least)
     }
 }
 
@@ -190,9 +203,15 @@ impl Cell {
         let fastest = cap;
         for end in &self.ends {
             let Some(loads) = &end.loads else { continue };
+            let needed = std::array::from_fn(|j| {
+                let stands = loads.hold[j].abs() + arm.breakaway(j);
+                let left = planned_torque(arm, limits, j, loads.hold[j]) - stands;
+                (STANDING_SHARE * left / limits.torque[j]).clamp(CREEP_SHARE, MOTION_SHARE)
+            });
             loop {
-                let (share, j) = Room::new(end, loads, cap, limits, arm).least(limits);
-                if share >= MOTION_SHARE {
+                let room = Room::new(end, loads, cap, limits, arm);
+                let (share, j) = room.least(limits, &needed);
+                if share >= needed[j] {
                     break;
                 }
                 if cap <= SLOWEST * fastest {
@@ -201,8 +220,8 @@ impl Cell {
                         break;
                     }
                     let joint = Joint::ALL[j];
-                    let of_limit = |share: f64| (TORQUE_SHARE - share) * limits.torque[j];
-                    return Err((joint, of_limit(share), of_limit(CREEP_SHARE)));
+                    let with = |share: f64| room.limit[j] - share * limits.torque[j];
+                    return Err((joint, with(share), with(CREEP_SHARE)));
                 }
                 cap *= 0.8;
             }

@@ -3,6 +3,7 @@ use jtc_wire::Joint;
 
 use crate::LimitKind;
 use crate::kinematics::PoseError;
+use crate::limits::MARGIN_MAX;
 
 /// Why there is no motion. Waypoints and legs are counted from 1; leg 1 leads from waypoint 1 to waypoint 2.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -57,6 +58,16 @@ pub enum PlanError {
         min: f64,
         /// rad.
         max: f64,
+    },
+    /// A torque margin that is out of range.
+    #[error(
+        "{joint}: torque margin {} % of the limit is out of range (0–{} %)", 100.0 * .share, 100.0 * MARGIN_MAX
+    )]
+    Margin {
+        /// Of this joint.
+        joint: Joint,
+        /// Share of the torque limit.
+        share: f64,
     },
     /// A blend that is none.
     #[error("blend of {value} rad; it is 0 (a stop at each waypoint) or more")]
@@ -143,6 +154,7 @@ impl PlanError {
             Self::TooFew { .. }
             | Self::Limit { .. }
             | Self::Range { .. }
+            | Self::Margin { .. }
             | Self::Blend { .. }
             | Self::Path { .. }
             | Self::NoTimeLaw { .. } => None,
@@ -177,6 +189,7 @@ impl PlanError {
             Self::Limit { .. } | Self::Range { .. } => {
                 "correct the limits of the arm, or ask for a higher speed"
             }
+            Self::Margin { .. } => "give a share of 0 to 0.5 of the torque limit",
             Self::Blend { .. } => "give a blend of 0 rad or more",
             Self::Time { .. } => {
                 "let the times rise from waypoint to waypoint, beginning at 0, or leave them out"

@@ -34,7 +34,7 @@ pub use blend::BlendedPath;
 pub use distance::furthest_joint;
 pub use error::PlanError;
 pub use jtc_dynamics::{JOINTS, JointVec};
-pub use limits::{JERK_TIME, Limits};
+pub use limits::{JERK_TIME, Limits, MARGIN_MAX};
 pub use motion::{Motion, State};
 pub use p2p::point_to_point;
 pub use path::{Path, PathPoint};

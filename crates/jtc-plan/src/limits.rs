@@ -7,6 +7,9 @@ use crate::{JOINTS, JointVec, LimitKind, PlanError};
 /// Time in which an arm's limits let a joint go from rest to its highest acceleration, s: the jerk limit of [`Limits::of`].
 pub const JERK_TIME: f64 = 0.1;
 
+/// Largest share of a torque limit that a motion can leave free.
+pub const MARGIN_MAX: f64 = 0.5;
+
 /// Limits that a motion keeps, per joint, base to wrist.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
@@ -20,6 +23,8 @@ pub struct Limits {
     pub jerk: JointVec,
     /// Highest torque, N·m; asked for only where a motion is planned with an [`crate::ArmDynamics`].
     pub torque: JointVec,
+    /// Share of the torque limit that a motion leaves free, 0 to [`MARGIN_MAX`]; see [`crate::ArmDynamics::usable_torque`].
+    pub margin: JointVec,
 }
 
 impl Limits {
@@ -33,11 +38,17 @@ impl Limits {
             acceleration,
             jerk: acceleration.map(|a| a / JERK_TIME),
             torque: of(|j| j.torque_max),
+            margin: [0.0; JOINTS],
         }
     }
 
+    /// Leaves this share of each torque limit free.
+    pub fn with_margin(self, share: f64) -> Self {
+        Self { margin: [share; JOINTS], ..self }
+    }
+
     /// Those at which a motion that these bind takes 1/`share` of the time: velocity × `share`, acceleration × its square, jerk × its
-    /// cube. Positions and torques remain.
+    /// cube. Positions, torques and their margin remain.
     pub fn at_speed(&self, share: f64) -> Self {
         Self {
             velocity: self.velocity.map(|v| v * share),
@@ -62,7 +73,7 @@ impl Limits {
     /// # Errors
     ///
     /// [`PlanError::Limit`] for the first limit that is no positive number (only that of jerk may be infinite), or a range of
-    /// positions without any.
+    /// positions without any, and [`PlanError::Margin`].
     pub fn check(&self) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let j = joint.index();
@@ -81,6 +92,10 @@ impl Limits {
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }
+            }
+            let share = self.margin[j];
+            if !(0.0..=MARGIN_MAX).contains(&share) {
+                return Err(PlanError::Margin { joint, share });
             }
         }
         Ok(())

@@ -3,7 +3,7 @@ use jtc_wire::Joint;
 
 use crate::binding::{Binding, LimitKind};
 use crate::motion::Motion;
-use crate::{ArmDynamics, Limits, verify};
+use crate::{ArmDynamics, JOINTS, Limits, verify};
 
 /// From this share of it on a limit binds.
 const BINDS: f64 = 0.985;
@@ -57,7 +57,14 @@ pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) 
 /// The limit that is used most at `time`, and the one that is used up.
 fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
     let state = motion.at(time);
-    let torque = arm.map(|arm| arm.torque(&state));
+    // What holds the arm is looked at only where the torque is near what the margin leaves.
+    let torque = arm.map(|arm| {
+        let torque = arm.torque(&state);
+        let least = |j: usize| (1.0 - limits.margin[j]) * limits.torque[j];
+        let far = (0..JOINTS).all(|j| torque[j].abs() < TORQUE * least(j));
+        let hold = if far { [0.0; JOINTS] } else { arm.holding(&state.position) };
+        (torque, std::array::from_fn::<f64, JOINTS, _>(|j| arm.usable_torque(limits, j, hold[j])))
+    });
     let jerk = motion.jerk_at(time);
     let mut most: Use = (0.0, Joint::ALL[0], LimitKind::Velocity);
     let mut used_up: Option<Use> = None;
@@ -75,9 +82,9 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
         take(state.velocity[j], limits.velocity[j], LimitKind::Velocity, |share| share);
         take(state.acceleration[j], limits.acceleration[j], LimitKind::Acceleration, f64::sqrt);
         take(jerk[j], limits.jerk[j], LimitKind::Jerk, f64::cbrt);
-        if let Some(torque) = torque {
+        if let Some((torque, usable)) = torque {
             let moves = |share| if share > TORQUE { share } else { 0.0 };
-            take(torque[j], limits.torque[j], LimitKind::Torque, moves);
+            take(torque[j], usable[j], LimitKind::Torque, moves);
         }
     }
     (most, used_up)

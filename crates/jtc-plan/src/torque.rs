@@ -2,10 +2,14 @@
 use jtc_core::{Config, Friction, friction};
 use jtc_dynamics::{ArmModel, Dynamics};
 
-use crate::{JOINTS, JointVec, State};
+use crate::{JOINTS, JointVec, Limits, State};
 
 /// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
 pub const HOLD_SHARE: f64 = 0.97;
+
+/// Share of what standing leaves of a torque limit that a motion may use, whatever the margin is, and the least as a share of the limit.
+const MOTION_SHARE: f64 = 0.25;
+const MOTION_LEAST: f64 = 0.02;
 
 /// What the torque of a motion is computed with: the arm with its payload, the inertia of its rotors, and the friction
 /// compensation that the controller adds (J-40, J-42, J-60).
@@ -14,7 +18,8 @@ pub struct ArmDynamics<'a> {
     dynamics: Dynamics,
     rotor: JointVec,
     friction: Option<&'a Friction>,
-    temperature: f64,
+    /// Bearing temperatures, °C: of both the one counts that takes more torque.
+    temperatures: [f64; 2],
     sign_width: f64,
     ranges: FrictionRanges,
 }
@@ -39,7 +44,7 @@ impl<'a> ArmDynamics<'a> {
             dynamics: Dynamics::with_payload(model, config.gravity, &config.payload),
             rotor: config.joints.each_ref().map(|j| j.rotor_inertia),
             friction,
-            temperature: 30.0,
+            temperatures: [30.0; 2],
             sign_width: config.friction_sign_width,
             ranges: FrictionRanges { step, ranges: Vec::new() },
         };
@@ -48,7 +53,13 @@ impl<'a> ArmDynamics<'a> {
 
     /// The same at another bearing temperature, °C.
     pub fn at_temperature(self, temperature: f64) -> Self {
-        Self { temperature, ..self }.with_ranges()
+        self.at_temperatures([temperature; 2])
+    }
+
+    /// The same at two bearing temperatures, °C. Everywhere the one counts at which the torque is higher: cold bearings take more to
+    /// speed up, and warm ones more to slow down.
+    pub fn at_temperatures(self, temperatures: [f64; 2]) -> Self {
+        Self { temperatures, ..self }.with_ranges()
     }
 
     /// The controller compensates for friction.
@@ -66,8 +77,8 @@ impl<'a> ArmDynamics<'a> {
             [-1.0, 1.0].map(|sign| {
                 let (mut low, mut high) = (0.0f64, 0.0f64);
                 std::array::from_fn(|i| {
-                    let friction = self.friction(j, sign * i as f64 * self.ranges.step[j]);
-                    (low, high) = (low.min(friction), high.max(friction));
+                    let friction = self.frictions(j, sign * i as f64 * self.ranges.step[j]);
+                    (low, high) = (low.min(friction.0), high.max(friction.1));
                     (low, high)
                 })
             })
@@ -87,8 +98,8 @@ impl<'a> ArmDynamics<'a> {
             return (low, high);
         }
         // Beyond the highest speed of the arm.
-        let friction = self.friction(j, fastest);
-        (low.min(friction), high.max(friction))
+        let friction = self.frictions(j, fastest);
+        (low.min(friction.0), high.max(friction.1))
     }
 
     /// The same without jumps: low and high, those of a step later between the steps on a straight line, and the slopes of both by the speed.
@@ -106,8 +117,8 @@ impl<'a> ArmDynamics<'a> {
             // Beyond the highest speed of the arm.
             let (u, step) = (steps.fract(), self.ranges.step[j].copysign(fastest));
             let with = |speed: f64| {
-                let (friction, (low, high)) = (self.friction(j, speed), ranges[STEPS]);
-                (low.min(friction), high.max(friction))
+                let (friction, (low, high)) = (self.frictions(j, speed), ranges[STEPS]);
+                (low.min(friction.0), high.max(friction.1))
             };
             (u, with(fastest + (1.0 - u) * step), with(fastest + (2.0 - u) * step))
         };
@@ -117,11 +128,33 @@ impl<'a> ArmDynamics<'a> {
 
     /// Joint torques that the controller commands at `state` where the arm follows exactly, N·m.
     pub fn torque(&self, state: &State) -> JointVec {
-        let mut torque = self.dynamics.inverse(&state.position, &state.velocity, &state.acceleration);
+        let mut torque = self.rigid(&state.position, &state.velocity, &state.acceleration);
         for (j, torque) in torque.iter_mut().enumerate() {
-            *torque += self.rotor[j] * state.acceleration[j] + self.friction(j, state.velocity[j]);
+            *torque += self.friction(j, state.velocity[j], *torque);
         }
         torque
+    }
+
+    /// Torque that a motion may use of the joint with index `j` where holding the arm takes `hold`, N·m: its limit less the margin. Where
+    /// gravity, with the friction of the first movement, leaves less, a quarter of what they leave of the limit is added to them, and at
+    /// least 2 % of the limit: a pose that can be held can be left and reached.
+    pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
+        let (whole, margin) = (limits.torque[j], limits.margin[j]);
+        if margin == 0.0 {
+            return whole;
+        }
+        let stands = hold.abs() + self.breakaway(j);
+        let needed = stands + (MOTION_SHARE * (whole - stands)).max(MOTION_LEAST * whole);
+        ((1.0 - margin) * whole).max(needed).min(whole)
+    }
+
+    /// Highest friction of the joint with index `j` up to the speed at which its sign is whole, N·m.
+    pub(crate) fn breakaway(&self, j: usize) -> f64 {
+        let of = |speed: f64| {
+            let (low, high) = self.friction_range(j, speed);
+            high.max(-low)
+        };
+        of(self.sign_width).max(of(-self.sign_width))
     }
 
     /// Joint torques that hold the arm at rest, N·m.
@@ -129,17 +162,33 @@ impl<'a> ArmDynamics<'a> {
         self.dynamics.inverse(position, &[0.0; JOINTS], &[0.0; JOINTS])
     }
 
-    /// Torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m. Velocities that the table
-    /// does not have count as its nearest.
-    pub(crate) fn friction(&self, j: usize, velocity: f64) -> f64 {
+    /// Torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m, at the temperature at which it
+    /// and the torque `rigid` take more together. Velocities that the table does not have count as its nearest.
+    pub(crate) fn friction(&self, j: usize, velocity: f64, rigid: f64) -> f64 {
+        let (low, high) = self.frictions(j, velocity);
+        if (rigid + high).abs() >= (rigid + low).abs() { high } else { low }
+    }
+
+    /// The lower and the higher one at both temperatures.
+    fn frictions(&self, j: usize, velocity: f64) -> (f64, f64) {
+        let [first, second] = self.temperatures;
+        let friction = self.friction_at(j, velocity, first);
+        if first == second {
+            return (friction, friction);
+        }
+        let other = self.friction_at(j, velocity, second);
+        (friction.min(other), friction.max(other))
+    }
+
+    fn friction_at(&self, j: usize, velocity: f64, temperature: f64) -> f64 {
         match self.friction {
             Some(Friction::Polynomial(c)) => {
-                friction::polynomial(&c[j], velocity, self.temperature, self.sign_width)
+                friction::polynomial(&c[j], velocity, temperature, self.sign_width)
             }
             Some(Friction::Table(tables)) => {
                 let (low, high) = friction::velocities(&tables[j]);
                 let velocity = velocity.max(low).min(high);
-                friction::table(&tables[j], velocity, self.temperature).unwrap_or(0.0)
+                friction::table(&tables[j], velocity, temperature).unwrap_or(0.0)
             }
             None => 0.0,
         }

@@ -85,14 +85,18 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
     let same = usize::from(limits.has_jerk());
     for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm).into_iter().skip(same) {
         let state = piece.at(t);
-        let torque = arm.torque(&state);
-        if (0..JOINTS).all(|j| torque[j].abs() <= TORQUE_SHARE * limits.torque[j]) {
+        let rigid = arm.rigid(&state.position, &state.velocity, &state.acceleration);
+        let friction: JointVec = std::array::from_fn(|j| arm.friction(j, state.velocity[j], rigid[j]));
+        let torque: JointVec = std::array::from_fn(|j| rigid[j] + friction[j]);
+        let suffices =
+            |j: usize| torque[j].abs() <= TORQUE_SHARE * (1.0 - limits.margin[j]) * limits.torque[j];
+        if (0..JOINTS).all(suffices) {
             continue;
         }
         let hold = arm.holding(&state.position);
         for j in 0..JOINTS {
-            let limit = TORQUE_SHARE * limits.torque[j];
-            let still = hold[j] + arm.friction(j, state.velocity[j]);
+            let limit = TORQUE_SHARE * arm.usable_torque(limits, j, hold[j]);
+            let still = hold[j] + friction[j];
             let (room, needed) = (limit - (still * torque[j].signum()), (torque[j] - still).abs());
             if torque[j].abs() > limit && room > 0.0 {
                 most = most.max((needed / room).sqrt());
@@ -162,11 +166,10 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
         let slow = 1.0 / factor;
         Joint::ALL.into_iter().find_map(|joint| {
             let j = joint.index();
-            let friction = arm.friction(j, load.velocity[j] * slow);
-            let torque = load.hold[j] + load.motion[j] * slow * slow + friction;
-            let limit = limits.torque[j];
-            (torque.abs() > TORQUE_SHARE * limit || torque.is_nan())
-                .then_some((load.time, joint, torque, limit))
+            let rigid = load.hold[j] + load.motion[j] * slow * slow;
+            let torque = rigid + arm.friction(j, load.velocity[j] * slow, rigid);
+            let limit = TORQUE_SHARE * arm.usable_torque(limits, j, load.hold[j]);
+            (torque.abs() > limit || torque.is_nan()).then_some((load.time, joint, torque, limit))
         })
     };
     let mut factor = 1.0;
@@ -179,8 +182,9 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
         if some.len() == before {
             break;
         }
-        let (slow, joint) =
-            factor_for(&motion, factor, |factor| some.iter().find_map(|load| over(load, factor)))?;
+        let (slow, joint) = factor_for(&motion, &limits.torque, factor, |factor| {
+            some.iter().find_map(|load| over(load, factor))
+        })?;
         (factor, slowed) = (slow, (slow > MUCH).then_some(joint).or(slowed));
     }
     if factor == 1.0 {
@@ -189,12 +193,13 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     Ok(Motion { slowed, ..motion.stretched(factor) })
 }
 
-/// Time, joint, torque and limit of a place where the torque does not suffice.
+/// Time, joint, torque and what it may be of a place where the torque does not suffice.
 type Over = (f64, Joint, f64, f64);
 
-/// The least factor of the time, above `least`, with which nothing is `over`, and the joint that was last.
+/// The least factor of the time, above `least`, with which nothing is `over`, and the joint that was last; `whole` are the torque limits.
 fn factor_for(
     motion: &Motion,
+    whole: &JointVec,
     least: f64,
     over: impl Fn(f64) -> Option<Over>,
 ) -> Result<(f64, Joint), PlanError> {
@@ -203,8 +208,7 @@ fn factor_for(
     while let Some((time, joint, torque, limit)) = over(slow) {
         if slow > SLOWEST {
             let waypoint = waypoint_at(motion, time);
-            let (torque, whole) = (torque.abs(), limit);
-            let limit = TORQUE_SHARE * whole;
+            let (torque, whole) = (torque.abs(), whole[joint.index()]);
             return Err(PlanError::Torque { waypoint, joint, torque, limit, whole, holding: false });
         }
         fast = slow;

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
-use jtc_host::plan::{COLD, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint};
+use jtc_host::plan::{
+    COLD, MARGIN_PCT, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint, margin_in_range,
+};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use numpy::PyArray1;
@@ -25,7 +27,9 @@ pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, P
     all.set_item("ok", verdict.is_ok())?;
     all.set_item("text", verdict.to_string())?;
     all.set_item("refusals", verdict.refusals().map(ToString::to_string).collect::<Vec<_>>())?;
-    all.set_item("warnings", verdict.warnings().map(ToString::to_string).collect::<Vec<_>>())?;
+    let low = verdict.margin.and_then(|margin| margin.warning());
+    let warnings: Vec<String> = verdict.warnings().map(ToString::to_string).chain(low).collect();
+    all.set_item("warnings", warnings)?;
     all.set_item("next", if verdict.is_ok() { String::new() } else { verdict.hint() })?;
     Ok(all)
 }
@@ -82,6 +86,7 @@ pub struct Planner {
     line: bool,
     jerk: bool,
     temperature: f64,
+    margin_pct: f64,
 }
 
 impl Planner {
@@ -103,6 +108,7 @@ impl Planner {
                 temperature: self.temperature,
                 speed_pct: self.speed,
                 jerk: self.jerk,
+                margin_pct: self.margin_pct,
                 ..HostPlanner::new(&self.config)
             };
             let planned = plan(&planner)?;
@@ -133,6 +139,13 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     Err(Failure::usage(format!("{what}: {value} is no distance")))
 }
 
+/// The torque margin that is given (%), or the default one.
+pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
+    let percent = given.unwrap_or(MARGIN_PCT);
+    margin_in_range(percent)?;
+    Ok(percent)
+}
+
 fn of_waypoints(error: &WaypointError) -> Failure {
     Failure::with(error, Facts::of_waypoints(error))
 }
@@ -140,7 +153,7 @@ fn of_waypoints(error: &WaypointError) -> Failure {
 #[pymethods]
 impl Planner {
     #[new]
-    #[pyo3(signature = (arm, speed, blend, blend_m, line, jerk, temperature, payload))]
+    #[pyo3(signature = (arm, speed, blend, blend_m, line, jerk, temperature, payload, margin))]
     #[allow(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         arm: &Arm,
@@ -151,12 +164,15 @@ impl Planner {
         jerk: bool,
         temperature: Option<f64>,
         payload: Option<PayloadNumbers>,
+        margin: Option<f64>,
     ) -> Result<Self, Failure> {
+        let margin_pct = margin_of(margin)?;
         let payload = crate::dynamics::payload(payload)?;
         let (blend, blend_m) = (distance("blend", blend)?, distance("blend_m", blend_m)?);
         let config = jtc_core::Config { payload, ..arm.inner.config() };
         let temperature = temperature.unwrap_or(COLD);
-        Ok(Self { arm: Arc::clone(&arm.inner), config, speed, blend, blend_m, line, jerk, temperature })
+        let arm = Arc::clone(&arm.inner);
+        Ok(Self { arm, config, speed, blend, blend_m, line, jerk, temperature, margin_pct })
     }
 
     /// From a position at rest to another one.

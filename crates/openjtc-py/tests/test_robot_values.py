@@ -27,6 +27,9 @@ def test_odd_numbers_are_refused_with_value_and_limit(robot):
         (lambda: robot.run(plan, repeat=2**40), 2.0**40, 2.0**32 - 1),
         (lambda: robot.move(HOME, speed=0.5), 0.5, 1.0),
         (lambda: robot.move(HOME, speed=101), 101.0, 100.0),
+        (lambda: robot.move(HOME, margin=-1), -1.0, 0.0),
+        (lambda: robot.plan([robot.position, HOME], margin=50.5), 50.5, 50.0),
+        (lambda: openjtc.Planner(margin=100), 100.0, 50.0),
         (lambda: robot.jog(0.1, 601.0, joint=1), 601.0, 600.0),
         (lambda: robot.jog(0.1, -1.0, joint=1), -1.0, 0.0),
         (lambda: robot.jog(0.1, INF, joint=1), INF, 600.0),
@@ -57,6 +60,14 @@ def test_odd_numbers_are_refused_with_value_and_limit(robot):
     assert motion.wait(-1).outcome == "finished"
 
 
+def test_a_plan_leaves_its_margin():
+    places = [[1.2, 0.4, -0.9, 0.8, 0.6, 1.0], [-1.2, -0.5, 0.9, -0.8, -0.6, -1.0]]
+    default, none = openjtc.Planner().through(places), openjtc.Planner(margin=0).through(places)
+    assert default.check.margin["percent"] >= 15 and not default.check.warnings
+    assert none.check.margin["percent"] < 10 and "torque margin" in none.check.warnings[0]
+    assert openjtc.Planner().check(none).margin == none.check.margin
+
+
 def test_no_number_panics(robot):
     odd = [NAN, INF, -INF, 0.0, -1.0, 1e300, 2**70]
     acts = [
@@ -66,6 +77,7 @@ def test_no_number_panics(robot):
         lambda x: robot.move(flange=[x] * 6),
         lambda x: robot.move(HOME, speed=x),
         lambda x: robot.plan([HOME, [x] * 6]),
+        lambda x: robot.plan([HOME, HOME + 0.1], margin=x),
         lambda x: robot.plan([HOME, HOME + 0.1], times=[0, x]),
         lambda x: robot.plan([HOME, HOME + 0.1], blend=x),
         lambda x: robot.wait_ready(x),

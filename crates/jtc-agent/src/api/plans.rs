@@ -6,9 +6,9 @@ use agent_kit::api::Refusals;
 use axum::extract::{Request, State};
 use axum::{Extension, Json};
 use jtc_core::Config;
-use jtc_host::check::JointFigures;
+use jtc_host::check::{JointFigures, TorqueMargin};
 use jtc_host::error::Facts;
-use jtc_host::plan::{Bound, COLD, Planned, Planner, Way, WayOptions};
+use jtc_host::plan::{Bound, COLD, MARGIN_PCT, Planned, Planner, Way, WayOptions};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_host::{Arm, ErrorKind, Session};
 use jtc_wire::Joint;
@@ -55,6 +55,10 @@ pub struct PlanRequest {
     /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load.
     #[serde(default)]
     pub no_jerk_limit: bool,
+    /// Torque to leave for masses and friction that the model does not know, % of each limit.
+    #[serde(default = "margin")]
+    #[schema(minimum = 0, maximum = 50)]
+    pub margin_percent: f64,
     /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque.
     #[serde(default = "cold")]
     #[schema(minimum = -40, maximum = 120)]
@@ -89,6 +93,10 @@ fn cold() -> f64 {
     COLD
 }
 
+pub(super) fn margin() -> f64 {
+    MARGIN_PCT
+}
+
 /// A motion that passed the check.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PlanObject {
@@ -107,9 +115,12 @@ pub struct PlanObject {
     /// Figures of each joint, from the base.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<JointPlan>,
+    /// The smallest torque margin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin: Option<MarginObject>,
     /// What was changed or is to be known, in words.
     pub notes: Vec<String>,
-    /// What does not forbid to run it.
+    /// What does not forbid to run it; a torque margin below 10 % is among it.
     pub warnings: Vec<String>,
     /// The trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`.
     pub text: String,
@@ -135,6 +146,30 @@ impl From<&Bound> for BoundObject {
     fn from(bound: &Bound) -> Self {
         let Bound { from_s, to_s, joint, limit } = *bound;
         Self { from_s, to_s, joint: joint.number(), limit: limit.to_owned() }
+    }
+}
+
+/// What a motion leaves of a torque limit, where that is the smallest share of it.
+#[derive(Clone, Debug, serde::Serialize, ToSchema)]
+pub struct MarginObject {
+    /// What is left, % of the limit.
+    pub percent: f64,
+    /// Joint that has the least left, 1 to 6 from the base.
+    pub joint: u8,
+    /// When, s from the start.
+    pub time_s: f64,
+    /// Torque by the model there, N·m.
+    pub torque_nm: f64,
+    /// Torque limit, N·m.
+    pub limit_nm: f64,
+    /// Bearing temperature of its friction, °C.
+    pub temperature_c: f64,
+}
+
+impl From<TorqueMargin> for MarginObject {
+    fn from(margin: TorqueMargin) -> Self {
+        let TorqueMargin { percent, joint, time_s, torque_nm, limit_nm, temperature_c } = margin;
+        Self { percent, joint: joint.number(), time_s, torque_nm, limit_nm, temperature_c }
     }
 }
 
@@ -293,6 +328,7 @@ fn planned(
         speed_pct: request.speed_percent,
         blend: request.blend_rad,
         jerk: !request.no_jerk_limit,
+        margin_pct: request.margin_percent,
         ..Planner::new(&config)
     };
     let mut planned = way.planned(&planner).map_err(|error| {
@@ -334,8 +370,13 @@ fn kept(
         waypoint_times_s: waypoint_times.clone(),
         binding: binding.iter().map(BoundObject::from).collect(),
         joints: Joint::ALL.into_iter().zip(&verdict.joints).map(JointPlan::new).collect(),
+        margin: verdict.margin.map(MarginObject::from),
         notes: notes.clone(),
-        warnings: verdict.warnings().map(ToString::to_string).collect(),
+        warnings: verdict
+            .warnings()
+            .map(ToString::to_string)
+            .chain(verdict.margin.and_then(|margin| margin.warning()))
+            .collect(),
         text,
         kept,
     })

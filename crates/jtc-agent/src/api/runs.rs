@@ -6,13 +6,16 @@ use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
+use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
+use jtc_host::plan::margin_in_range;
 use jtc_host::{Arm, ErrorKind};
 use serde_json::json;
 use utoipa::ToSchema;
 
 use super::arm::GivenObject;
 use super::error::Denials;
+use super::plans::margin;
 use super::poses::pose_error;
 use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, Stored, run};
@@ -69,6 +72,10 @@ pub struct MoveRequest {
     #[serde(default)]
     #[schema(minimum = 1, maximum = 100)]
     pub speed_percent: Option<f64>,
+    /// Torque to leave for masses and friction that the model does not know, % of each limit.
+    #[serde(default = "margin")]
+    #[schema(minimum = 0, maximum = 50)]
+    pub margin_percent: f64,
     /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
     #[serde(default)]
     pub policy: Option<Policy>,
@@ -252,9 +259,19 @@ pub(super) async fn begin_move(
     after: AskedAfter,
     Body(request): Body<MoveRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
-    let MoveRequest { to_rad, to_pose, to_flange, line, speed_percent, policy, accept_device_limits } =
-        request;
+    let MoveRequest {
+        to_rad,
+        to_pose,
+        to_flange,
+        line,
+        speed_percent,
+        margin_percent: margin_pct,
+        policy,
+        accept_device_limits,
+    } = request;
     within("speed_percent", speed_percent.unwrap_or(100.0), 100.0)?;
+    margin_in_range(margin_pct)
+        .map_err(|error| ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error)))?;
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
@@ -278,7 +295,7 @@ pub(super) async fn begin_move(
         }
     };
     let what = format!("move to {place}{}", if line { ", straight" } else { "" });
-    let course = Course::To(target, line);
+    let course = Course::To { target, line, margin_pct };
     let order = Order { course, approach: false, speed_percent, repeat: 1, accept_device_limits };
     begin(&agent, (&asker, after), what, policy, order)
 }

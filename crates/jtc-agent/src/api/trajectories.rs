@@ -15,6 +15,7 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::body::{blocking, read};
 use super::error::Denials;
+use super::plans::MarginObject;
 use super::{Agent, Caller, ErrorObject};
 use crate::jobs::Stored;
 use crate::owner::ClientPort;
@@ -145,6 +146,9 @@ pub struct CheckObject {
     pub duration_s: f64,
     /// What was checked, in short: the digest of the trajectory.
     pub digest: String,
+    /// The smallest torque margin; the motion is warned of below 10 %.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin: Option<MarginObject>,
     /// What is wrong, worst first.
     pub problems: Vec<ProblemObject>,
 }
@@ -183,7 +187,13 @@ impl CheckObject {
             limit: finite(problem.limit),
             warning: problem.warning,
         });
-        Self { passed: verdict.is_ok(), duration_s: verdict.duration_s, digest, problems: problems.collect() }
+        Self {
+            passed: verdict.is_ok(),
+            duration_s: verdict.duration_s,
+            digest,
+            margin: verdict.margin.map(MarginObject::from),
+            problems: problems.collect(),
+        }
     }
 }
 

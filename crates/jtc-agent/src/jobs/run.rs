@@ -4,16 +4,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, MoveSpeed, Planner};
+use jtc_host::plan::{self, MoveSpeed, Planner, RunCourse, RunStart, StartError};
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{
-    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory,
-};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory};
 use jtc_wire::Status;
 
 use super::report::{self, Made, MotionReport};
@@ -29,9 +26,15 @@ const MOVING: Duration = Duration::from_secs(1);
 pub enum Course {
     /// Along a trajectory.
     Along(Trajectory),
-    /// From where the arm stands to this place; true: with the flange on a straight line, else straight in joint space where that takes no
-    /// longer.
-    To(Target, bool),
+    /// From where the arm stands to a place.
+    To {
+        /// The place.
+        target: Target,
+        /// The flange keeps to a straight line; else straight in joint space where that takes no longer.
+        line: bool,
+        /// Torque that the move leaves, % of each limit.
+        margin_pct: f64,
+    },
 }
 
 /// What is run, and how.
@@ -96,25 +99,27 @@ impl Run<'_> {
         let trajectory = self.trajectory(order, &site, &status, move_speed)?;
         closed(&trajectory, order, &site)?;
         for n in 1..=order.repeat.max(1) {
-            let mut checked = site.check(&trajectory, &status);
-            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let way = site.approach(&trajectory, &status, move_speed.percent)?;
+            let course = RunCourse {
+                trajectory: &trajectory,
+                then: (n == 1 && order.repeat > 1).then_some(&trajectory),
+                approach_pct: order.approach.then_some(move_speed.percent),
+            };
+            let start = course.start(&site.arm, &status.positions(), &site.options);
+            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
+            if is_approach {
                 move_speed
                     .note("speed_percent")
                     .into_iter()
                     .for_each(|words| task.note(format!("approach {words}")));
-                if !self.motion("approach", &way, &site, done)? {
+                if !self.motion("approach", &checked, &site, done)? {
                     return Ok(());
                 }
                 // From where the approach ended, not from where it should have.
                 status = self.fresh_status()?;
-                checked = site.check(&trajectory, &status);
+                let again =
+                    CheckedTrajectory::check(&trajectory, &site.arm, &status.positions(), &site.options);
+                checked = again.map_err(|e| ErrorObject::of(&e.into()))?;
             }
-            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
-            let checked = checked.map_err(|e| {
-                let error = ErrorObject::of(&e.into());
-                if elsewhere { error.next("ask for the run with approach: true") } else { error }
-            })?;
             if !self.motion("motion", &checked, &site, done)? {
                 return Ok(());
             }
@@ -163,19 +168,21 @@ impl Run<'_> {
                 None | Some(100.0) => Ok(trajectory.clone()),
                 Some(percent) => plan::at_speed(trajectory, percent).map_err(|e| plan_error(&e)),
             },
-            Course::To(place, line) => {
+            Course::To { target, line, margin_pct } => {
                 let (config, friction) =
                     (site.arm.config_on_device(&site.options.device), site.arm.friction());
                 let planner = Planner {
                     model: Some(&site.arm.model),
                     friction: friction.as_ref(),
                     speed_pct: move_speed.percent,
+                    margin_pct: *margin_pct,
                     ..Planner::new(&config)
                 };
-                let planned = planner.to_target(&site.arm.model, &status.positions(), place, *line);
+                let planned = planner.to_target(&site.arm.model, &status.positions(), target, *line);
                 let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
                 let of_speed = move_speed.note("speed_percent").map(|words| format!("move {words}"));
-                planned.notes.into_iter().chain(of_speed).for_each(|text| self.task.note(text));
+                let low = planned.verdict.margin.and_then(|margin| margin.warning());
+                planned.notes.into_iter().chain(of_speed).chain(low).for_each(|text| self.task.note(text));
                 Ok(planned.trajectory)
             }
         }
@@ -278,22 +285,6 @@ impl Run<'_> {
     }
 }
 
-impl Site {
-    fn approach(
-        &self,
-        trajectory: &Trajectory,
-        status: &Status,
-        speed_percent: f64,
-    ) -> Result<CheckedTrajectory, ErrorObject> {
-        plan::approach(trajectory, &self.arm, &status.positions(), speed_percent, &self.options)
-            .map_err(|error| approach_error(&error))
-    }
-
-    fn check(&self, trajectory: &Trajectory, status: &Status) -> Result<CheckedTrajectory, CheckError> {
-        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &self.options)
-    }
-}
-
 /// A motion that is repeated leads back to its start, or an approach does.
 fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), ErrorObject> {
     if order.repeat <= 1 || order.approach {
@@ -314,9 +305,15 @@ fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), Err
     Err(object.with(&facts))
 }
 
-/// The arm stands elsewhere than at the first point.
-fn is_elsewhere(error: &CheckError) -> bool {
-    matches!(error, CheckError::Refused(verdict) if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose))
+/// Why nothing of the run was begun.
+fn not_begun(error: StartError) -> ErrorObject {
+    match error {
+        StartError::Check(error) => ErrorObject::of(&error.into()),
+        StartError::Elsewhere(error) => {
+            ErrorObject::of(&error.into()).next("ask for the run with approach: true")
+        }
+        StartError::Approach(error) => approach_error(&error),
+    }
 }
 
 /// There is no such motion.

@@ -49,7 +49,8 @@ impl CheckArgs {
 pub enum TrajCommand {
     /// Limits at and between points, torques by the arm model; nothing is sent
     #[command(
-        after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml\n  \
+        after_help = "The torque margin is the smallest share of a torque limit that the motion leaves; below 10 % it is warned of.\n\nExamples:\n  \
+                            jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml\n  \
                             jtc traj check motion.csv --payload 2,0,0,0.08"
     )]
     Check {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use jtc_host::plan::{MARGIN_PCT, margin_of};
 use jtc_wire::JOINTS;
 
 use super::{ExecuteArgs, LinkArgs, OverwriteArgs};
@@ -27,6 +28,8 @@ pub struct PlanArgs {
     /// Speed in percent of what the limits allow, 1 to 100
     #[arg(long, value_name = "PCT", default_value_t = 100.0, allow_hyphen_values = true)]
     pub speed: f64,
+    #[command(flatten)]
+    pub margin: MarginArgs,
     /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load
     #[arg(long)]
     pub no_jerk_limit: bool,
@@ -80,11 +83,28 @@ pub struct MoveArgs {
     /// Speed in percent of what the limits allow, 1 to 100; default: 10, and 25 in a simulator
     #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
     pub speed: Option<f64>,
+    #[command(flatten)]
+    pub margin: MarginArgs,
     /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
     pub execute: ExecuteArgs,
+}
+
+/// Torque that a plan leaves.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct MarginArgs {
+    /// Torque to leave for what the model does not know, percent of each limit, 0 to 50
+    #[arg(
+        long = "margin",
+        alias = "torque-margin",
+        value_name = "PERCENT",
+        default_value_t = MARGIN_PCT,
+        value_parser = margin_of,
+        allow_hyphen_values = true
+    )]
+    pub percent: f64,
 }
 
 /// Where a move leads.

@@ -7,6 +7,7 @@ use jtc_host::plan::{COLD, MoveSpeed, PlanError, Planner};
 
 use super::job::Job;
 use super::named_arm;
+use super::plan::note_low_margin;
 use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
@@ -43,13 +44,15 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     let mut make = |job: &mut Job, status: &jtc_wire::Status, speed: MoveSpeed| {
         let friction = job.arm.friction();
         let temperature = coldest(status);
-        let planner = Planner { speed_pct: speed.percent, temperature, ..job.planner(friction.as_ref()) };
+        let (speed_pct, margin_pct) = (speed.percent, args.margin.percent);
+        let planner = Planner { speed_pct, margin_pct, temperature, ..job.planner(friction.as_ref()) };
         // The start is where the arm stands, the end what was asked for.
         let planned = planner.to_target(&job.arm.model, &status.positions(), &target, args.line);
         let planned = planned.map_err(|e| refused(&e, &name))?;
         for note in &planned.notes {
             out.note(format!("note: {note}"));
         }
+        note_low_margin(planned.verdict.margin, out);
         let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
         out.note(format!("move to {name}: {:.2} s{of_speed}", planned.trajectory.duration_s()));
         job.take(planned.trajectory);

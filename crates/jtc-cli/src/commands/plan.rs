@@ -5,6 +5,7 @@ use std::path::Path;
 use cli_kit::{Failure, Output, OutputFile, figure, table};
 use jtc_core::Config;
 use jtc_host::arm::Arm;
+use jtc_host::check::TorqueMargin;
 use jtc_host::plan::{Aside, Bound, PlanError, Planned, Planner, Way, WayOptions};
 use jtc_host::report::{Digest, Facts, ReportInput, html};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
@@ -50,6 +51,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
         speed_pct: args.speed,
         blend,
         jerk: !args.no_jerk_limit,
+        margin_pct: args.margin.percent,
         ..Planner::new(&config)
     };
     let mut planned = way.planned(&planner).map_err(|e| located(&e, &file))?;
@@ -63,6 +65,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     for warning in planned.verdict.warnings() {
         out.note(format!("warning: {warning}"));
     }
+    note_low_margin(planned.verdict.margin, out);
     trajectory.write(planned.trajectory.to_exact_csv())?;
     if let Some(page) = page {
         page.write(report(&planned, &arm, &planner, args))?;
@@ -123,6 +126,7 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
         "waypoint_times_s": waypoint_times,
         "binding": binding,
         "joints": verdict.joints,
+        "margin": verdict.margin,
         "notes": notes,
         "report": args.report,
     });
@@ -142,12 +146,13 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
         let page = args.report.as_deref().map_or(String::new(), |page| format!("\n{}   open it in a browser", page.display()));
         let arm = named_arm::typed_option(args.arm.as_deref());
         format!(
-            "{}: {waypoints} waypoints, {:.3} s, {} points every {} ms\n{}next: jtc traj run {}{arm} --approach{page}",
+            "{}: {waypoints} waypoints, {:.3} s, {} points every {} ms\n{}{}next: jtc traj run {}{arm} --approach{page}",
             args.out.display(),
             trajectory.duration_s(),
             trajectory.points.len(),
             trajectory.step_ms,
             table(&head, &rows),
+            margin_line(verdict.margin),
             typed(&args.out),
         )
     });
@@ -168,6 +173,29 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
+/// The smallest torque margin of a motion as a line; empty where none was computed.
+pub fn margin_line(margin: Option<TorqueMargin>) -> String {
+    margin.map_or(String::new(), |margin| format!("{margin}\n"))
+}
+
+/// Prints a warning where the torque margin is low.
+pub fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
+    if let Some(warning) = margin.and_then(|margin| margin.warning()) {
+        out.note(format!("warning: {warning}"));
+    }
+}
+
+/// The margin that was asked for, and the one that is left.
+fn margin_words(planned: &Planned, percent: f64) -> String {
+    let asked = format!("{percent} % of each limit");
+    match planned.verdict.margin {
+        Some(left) => {
+            format!("{asked}; left: {:.1} % ({} at {:.3} s)", left.percent, left.joint, left.time_s)
+        }
+        None => asked,
+    }
+}
+
 /// The page of a run, with what is commanded alone, and what binds it.
 fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> String {
     let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
@@ -179,6 +207,7 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
         ("Speed", format!("{} % of what the limits allow", args.speed)),
         ("Payload", super::payload::words(&planner.config.payload)),
         ("Torque", format!("by the model, with the friction at {} °C", args.temperature)),
+        ("Torque margin", margin_words(planned, args.margin.percent)),
     ];
     let notes = planned.notes.iter().map(|note| ("Note", note.clone()));
     let rows = of_plan.into_iter().chain(notes).map(|(name, value)| (name.to_owned(), value));

@@ -10,8 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output};
-use jtc_host::check::ProblemKind;
-use jtc_host::plan::{MoveSpeed, furthest_joint};
+use jtc_host::plan::{MoveSpeed, RunCourse, RunStart, StartError, furthest_joint};
 use jtc_host::port::Port;
 use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::Summary;
@@ -229,7 +228,7 @@ impl Stage<'_> {
         let mut done = Finished::default();
         let repeat = self.repeat();
         for n in 1..=repeat {
-            let (checked, phase) = self.next(&status)?;
+            let (checked, phase) = self.next(&status, n)?;
             let mut leg = self.leg(session, &checked, phase, operator)?;
             let mut verdict = checked.verdict().clone();
             if phase == APPROACH && leg.is_finished() {
@@ -261,20 +260,27 @@ impl Stage<'_> {
         self.course.repeat.max(1) + self.job.later.as_ref().map_or(0, |(_, often)| *often)
     }
 
-    /// The motion from where the arm stands, or the way to its first point where that is asked for and needed.
-    fn next(&self, status: &Status) -> Result<(CheckedTrajectory, &'static str), Failure> {
-        let (job, course) = (&*self.job, self.course);
-        let refused = match job.checked(&job.trajectory, status, course) {
-            Ok(checked) => return Ok((checked, "motion")),
-            Err(error) => error,
+    /// The motion of run `n` from where the arm stands, or the way to its first point where that is asked for and needed. Before the first
+    /// run those after it are checked as well.
+    fn next(&self, status: &Status, n: u32) -> Result<(CheckedTrajectory, &'static str), Failure> {
+        let (job, course, speed) = (&*self.job, self.course, self.move_speed);
+        let later = job.later.as_ref().map_or(&job.trajectory, |(later, _)| later);
+        let run = RunCourse {
+            trajectory: &job.trajectory,
+            then: (n == 1 && self.repeat() > 1).then_some(later),
+            approach_pct: course.approach.then_some(speed.percent),
         };
-        if let CheckError::Refused(verdict) = &refused
-            && course.approach
-            && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
-        {
-            return Ok((approach::approach(job, status, course, self.move_speed, self.out)?, APPROACH));
+        match run.start(&job.arm, &status.positions(), &job.options(course)) {
+            Ok(RunStart { checked, is_approach: false }) => Ok((checked, "motion")),
+            Ok(RunStart { checked, is_approach: true }) => {
+                approach::note(&checked, course, speed, self.out);
+                Ok((checked, APPROACH))
+            }
+            Err(StartError::Check(error) | StartError::Elsewhere(error)) => {
+                Err(job.not_checked(error, self.out))
+            }
+            Err(StartError::Approach(error)) => Err(approach::not_possible(error, course, self.out)),
         }
-        Err(job.not_checked(refused, self.out))
     }
 
     /// Runs one motion; the recording is begun with the first one.

@@ -11,6 +11,7 @@ use jtc_wire::Joint;
 use serde_json::json;
 
 use super::job::{Job, typed};
+use super::plan::{margin_line, note_low_margin};
 use super::{continued, halt, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 
@@ -76,6 +77,9 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
         ));
     }
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
+    if verdict.is_ok() {
+        note_low_margin(verdict.margin, out);
+    }
     let passing_speed = job.passing_speed(&verdict);
     let hint = job.hint(&verdict, passing_speed);
     let value = json!({
@@ -91,7 +95,9 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        format!("{verdict}\n{}{without}next: {}", figures(&verdict), hint.replace('`', ""))
+        // What is refused has its reasons already.
+        let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
+        format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.replace('`', ""))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
 }

@@ -10,6 +10,7 @@ mod checked;
 mod hint;
 mod holding;
 mod kind;
+mod margin;
 mod problem;
 mod stopping;
 mod verdict;
@@ -25,10 +26,15 @@ use jtc_wire::Joint;
 pub use cause::Cause;
 pub use checked::{CheckOptions, CheckedTrajectory};
 pub use kind::{HOLD_SHARE, ProblemKind};
+pub use margin::{MARGIN_LOW_PCT, TorqueMargin};
 pub use problem::{Problem, Seen};
 pub use verdict::{JointFigures, Suspicion, Verdict};
 
+use crate::plan::COLD;
 use crate::trajectory::{Trajectory, UploadOptions};
+
+/// Bearing temperature that a check reckons with, °C.
+pub const TEMPERATURE: f64 = 30.0;
 
 /// What a trajectory is checked against.
 #[derive(Clone, Debug)]
@@ -55,7 +61,7 @@ impl<'a> Checker<'a> {
     /// Against the limits of `config` alone.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
-        Self { config, model: None, friction: None, temperature: 30.0, start: None, upload }
+        Self { config, model: None, friction: None, temperature: TEMPERATURE, start: None, upload }
     }
 
     /// Checks all of it and returns all that is wrong.
@@ -254,20 +260,28 @@ impl<'a> Checker<'a> {
             over(ProblemKind::Acceleration, a, -limit.acceleration_max, limit.acceleration_max);
             let mut whole = None;
             if let Some(torque) = torque {
-                let tau = torque[j] + limit.rotor_inertia * a + self.friction_torque(j, v);
+                let rigid = torque[j] + limit.rotor_inertia * a;
+                let tau = rigid + self.friction_torque(j, v);
                 over(ProblemKind::Torque, tau, -limit.torque_max, limit.torque_max);
                 whole = Some(tau);
+                let cold = rigid + self.friction_at(j, v, COLD);
+                let most = if cold.abs() > tau.abs() { (cold, COLD) } else { (tau, self.temperature) };
+                verdict.take_margin(joint, (i, ms), most, limit.torque_max);
             }
             verdict.joints[j].take(q, v, a, whole);
         }
     }
 
     pub(crate) fn friction_torque(&self, j: usize, v: f64) -> f64 {
+        self.friction_at(j, v, self.temperature)
+    }
+
+    fn friction_at(&self, j: usize, v: f64, temperature: f64) -> f64 {
         match self.friction {
             Some(Friction::Polynomial(c)) => {
-                jtc_core::friction::polynomial(&c[j], v, self.temperature, self.config.friction_sign_width)
+                jtc_core::friction::polynomial(&c[j], v, temperature, self.config.friction_sign_width)
             }
-            Some(Friction::Table(t)) => jtc_core::friction::table(&t[j], v, self.temperature).unwrap_or(0.0),
+            Some(Friction::Table(t)) => jtc_core::friction::table(&t[j], v, temperature).unwrap_or(0.0),
             None => 0.0,
         }
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::cause::{Cause, Places, causes};
 use super::kind::ProblemKind;
+use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
@@ -84,6 +85,8 @@ pub struct Verdict {
     places: Places,
     /// What the joints do along the path.
     pub joints: [JointFigures; JOINTS],
+    /// The smallest torque margin by the model, friction at 20 °C and at the temperature of the check; `None`: not computed.
+    pub margin: Option<TorqueMargin>,
 }
 
 /// Points this far apart, ms, are waypoints and no samples of a motion.
@@ -100,6 +103,7 @@ impl Verdict {
             causes: Vec::new(),
             places: Places::new(),
             joints,
+            margin: None,
         }
     }
 
@@ -185,6 +189,11 @@ impl Verdict {
     /// Nothing forbids to run it.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
+    }
+
+    /// The arm does not stand at the first point, and nothing else forbids to run it.
+    pub fn is_only_elsewhere(&self) -> bool {
+        !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
     }
 
     /// What the whole of the problems looks like.

@@ -7,7 +7,7 @@ use jtc_wire::{Joint, Status};
 
 use super::{CheckError, Error, ExtensionError, MotionError, StateError};
 use crate::check::{ProblemKind, Verdict};
-use crate::plan::{ApproachError, PlanError};
+use crate::plan::{ApproachError, MARGIN_PCT_MAX, PlanError};
 use crate::waypoints::WaypointError;
 use crate::{explain, words};
 
@@ -56,6 +56,9 @@ impl Facts {
         match error {
             PlanError::Refused(verdict) => Self::of_verdict(verdict),
             PlanError::Speed { percent, most } => known(None, *percent, *most),
+            PlanError::Margin { percent } => {
+                known(None, *percent, if *percent < 0.0 { 0.0 } else { MARGIN_PCT_MAX })
+            }
             PlanError::TooManyCorners { corners, most } => known(None, *corners as f64, *most as f64),
             PlanError::Plan(Of::Position { joint, value, min, max, .. }) => {
                 let limit = if value < min { *min } else { *max };

@@ -4,6 +4,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::POINTS_MAX;
 use jtc_plan::kinematics;
 
+use super::margin::{MARGIN_PCT, MARGIN_PCT_MAX};
 use crate::check::Verdict;
 
 /// Why there is no plan.
@@ -29,6 +30,14 @@ pub enum PlanError {
         percent: f64,
         /// The most, %.
         most: f64,
+    },
+    /// A torque margin that is out of range.
+    #[error(
+        "torque margin {percent} % is out of range, expected 0 to {MARGIN_PCT_MAX} % of each limit, by default {MARGIN_PCT}"
+    )]
+    Margin {
+        /// As it was asked for, %.
+        percent: f64,
     },
     /// A blend that is meant in another unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
@@ -121,6 +130,10 @@ impl Diagnose for PlanError {
             Self::Plan(Of::Flange(e @ kinematics::PoseError::Blend { .. })) => {
                 Diagnosis::new(ErrorKind::Usage, "waypoints", e.hint())
             }
+            Self::Plan(e @ Of::TooEarly { limit: jtc_plan::LimitKind::Torque, .. }) => {
+                let hint = format!("{}; or plan with a smaller torque margin", e.hint());
+                Diagnosis::new(ErrorKind::Refused, "plan", hint)
+            }
             Self::Plan(e) => Diagnosis::new(ErrorKind::Refused, "plan", e.hint()),
             Self::Refused(verdict) => {
                 let what = "choose other waypoints or poses: less stretched out, or nearer to each other; or carry a lighter payload";
@@ -139,6 +152,11 @@ impl Diagnose for PlanError {
                 } else {
                     "100 is as fast as the limits allow"
                 },
+            ),
+            Self::Margin { .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "margin",
+                "a larger margin is for an arm whose model is uncertain; 0 plans with the whole torque",
             ),
             Self::Blend { unit, .. } => {
                 let of_joints = "is it in degrees? A blend is in rad (5° = 0.0873 rad), and in degrees with `--deg`, as the positions are";

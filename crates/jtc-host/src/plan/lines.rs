@@ -65,11 +65,12 @@ impl Planner<'_> {
         times: &[Option<f64>],
         start: Option<[f64; JOINTS]>,
     ) -> Result<Planned, PlanError> {
-        let (limits, arm) = (self.limits(route.positions())?, self.dynamics());
-        let motion = on_route(route, times, &limits, arm.as_ref())?;
+        let arm = self.dynamics();
+        let within = self.within(|limits| on_route(route, times, limits, arm.as_ref()))?;
         let first = route.positions().first().copied().unwrap_or_default();
         let timed = times.iter().skip(1).any(Option::is_some);
-        let mut planned = self.checked(&motion, &first, start, timed)?;
+        let mut planned = self.checked(&within, &first, start, timed)?;
+        let motion = &within.motion;
         planned.notes.extend(corners::notes(&planned, route.positions(), self.blend));
         let seconds = planned.trajectory.duration_s();
         let scale = if timed { 1.0 } else { seconds / motion.duration() };

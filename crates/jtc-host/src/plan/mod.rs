@@ -22,10 +22,12 @@ mod corners;
 mod default_speed;
 mod error;
 mod lines;
+mod margin;
 mod rest_of;
 mod sampled;
 mod samples;
 mod speed;
+mod start;
 #[cfg(test)]
 mod tests;
 mod way;
@@ -42,11 +44,13 @@ pub use corners::{BLEND_M_MAX, BLEND_MAX};
 pub use default_speed::MoveSpeed;
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
+pub use margin::{MARGIN_PCT, MARGIN_PCT_MAX, margin_in_range, margin_of};
 pub use rest_of::rest_of;
 pub use speed::at_speed;
+pub use start::{RunCourse, RunStart, StartError};
 pub use way::{Way, WayOptions};
 
-use crate::check::{Checker, HOLD_SHARE, Problem, ProblemKind, Verdict};
+use crate::check::{Checker, Problem, ProblemKind, TEMPERATURE, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};
 use sampled::{least_s, sampled, step_ms};
 
@@ -57,9 +61,6 @@ const STEP_MS: u16 = 10;
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
 /// Share of the velocity and acceleration limits that a plan uses: the rest is for the rounding of the wire.
 const SHARE: f64 = 0.98;
-/// Share of the torque limit that a plan uses: the rest is for the controller's own corrections, or it would be at its limit for longer
-/// than it may (J-43).
-const TORQUE_SHARE: f64 = 0.9;
 /// Time in which the rest of a trajectory gets to its speed, s, and longer ones where the check refuses that.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
@@ -69,6 +70,10 @@ pub const COLD: f64 = 20.0;
 const SLOWEST: f64 = 50.0;
 /// Least and most by which one step slows a motion down.
 const SLOWER: (f64, f64) = (1.01, 2.0);
+/// Least by which one step slows a motion down for the torque margin: it is exceeded by rounding alone.
+const SLOWER_FOR_MARGIN: f64 = 1.002;
+/// A motion that is made slower than this for the torque margin, as a factor of its time, has a note.
+const NOTED: f64 = 1.01;
 
 /// Makes motions for an arm, and checks them.
 #[derive(Clone, Debug)]
@@ -87,6 +92,8 @@ pub struct Planner<'a> {
     pub blend: f64,
     /// Whether jerk is limited, too; else the acceleration changes within two steps.
     pub jerk: bool,
+    /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit: what the plan leaves for masses and friction that the model does not know.
+    pub margin_pct: f64,
     /// Segments that the trajectory will be sent in.
     pub upload: UploadOptions,
 }
@@ -120,7 +127,8 @@ pub struct Planned {
 }
 
 impl<'a> Planner<'a> {
-    /// Within the limits of `config` alone, as fast as they allow, with a stop at each waypoint.
+    /// Within the limits of `config` alone, as fast as they allow, with a stop at each waypoint. With a model it leaves [`MARGIN_PCT`] of
+    /// each torque limit.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self {
@@ -131,6 +139,7 @@ impl<'a> Planner<'a> {
             speed_pct: 100.0,
             blend: 0.0,
             jerk: true,
+            margin_pct: MARGIN_PCT,
             upload,
         }
     }
@@ -139,12 +148,11 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// [`PlanError::Speed`]; [`PlanError::Plan`] for a place outside the limits or that no torque holds; [`PlanError::Refused`] when the
+    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] for a place outside the limits or that no torque holds; [`PlanError::Refused`] when the
     /// check finds what no speed mends.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
-        let motion =
-            self.within(&[*from, *to], |limits| jtc_plan::point_to_point(from, to, limits, arm.as_ref()))?;
+        let motion = self.within(|limits| jtc_plan::point_to_point(from, to, limits, arm.as_ref()))?;
         self.checked(&motion, from, Some(*from), false)
     }
 
@@ -163,8 +171,7 @@ impl<'a> Planner<'a> {
         sampled::fits_corners(&positions, self.blend)?;
         self.fits_time(&positions)?;
         let arm = self.dynamics();
-        let motion =
-            self.within(&positions, |limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
+        let motion = self.within(|limits| jtc_plan::through(waypoints, self.blend, limits, arm.as_ref()))?;
         let first = positions.first().copied().unwrap_or_default();
         let timed = waypoints.iter().skip(1).any(|w| w.time.is_some());
         let mut planned = self.checked(&motion, &first, None, timed)?;
@@ -201,7 +208,7 @@ impl<'a> Planner<'a> {
     /// Refuses what would be too long at the highest speed all the way, before it is planned. Positions outside the limits, and blends
     /// that are none, are left to the plan.
     fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
-        let limits = self.limits(positions)?;
+        let limits = self.limits()?;
         let is_inside = |q: &[f64; JOINTS]| {
             let mut ranges = q.iter().zip(&limits.position);
             ranges.all(|(q, (min, max))| (*min..=*max).contains(q))
@@ -213,8 +220,9 @@ impl<'a> Planner<'a> {
     }
 
     fn dynamics(&self) -> Option<ArmDynamics<'a>> {
+        let temperatures = [self.temperature, TEMPERATURE];
         self.model
-            .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperature(self.temperature))
+            .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperatures(temperatures))
     }
 
     /// The check before a run, where the arm stands at `start`.
@@ -223,45 +231,34 @@ impl<'a> Planner<'a> {
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// A motion within the limits of a plan; where a joint's share of the torque leaves nothing for it, that joint has more of it.
+    /// A motion within the limits of a plan. A joint whose margin leaves no torque for it has none.
     fn within(
         &self,
-        places: &[[f64; JOINTS]],
         plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
-    ) -> Result<Motion, PlanError> {
-        let mut limits = self.limits(places)?;
-        let mut raised = [false; JOINTS];
+    ) -> Result<Within, PlanError> {
+        let mut limits = self.limits()?;
         loop {
             match plan(&limits) {
-                Err(jtc_plan::PlanError::Torque { joint, .. })
-                    if limits.torque[joint.index()] < self.config.joints[joint.index()].torque_max =>
+                Err(jtc_plan::PlanError::Torque { joint, holding: false, .. })
+                    if limits.margin[joint.index()] > 0.0 =>
                 {
-                    let (j, whole) = (joint.index(), self.config.joints[joint.index()].torque_max);
-                    // The half of it first: a little is left for the controller's own corrections.
-                    limits.torque[j] = if raised[j] { whole } else { 0.5 * (limits.torque[j] + whole) };
-                    raised[j] = true;
+                    limits.margin[joint.index()] = 0.0;
                 }
-                motion => return Ok(motion?),
+                motion => return Ok(Within { motion: motion?, limits }),
             }
         }
     }
 
-    /// What a plan keeps to. A place that takes more than the usual share of a torque to be held, but not too much, can be left again.
-    fn limits(&self, places: &[[f64; JOINTS]]) -> Result<Limits, PlanError> {
+    /// What a plan keeps to.
+    fn limits(&self) -> Result<Limits, PlanError> {
         if !(1.0..=100.0).contains(&self.speed_pct) {
             return Err(PlanError::Speed { percent: self.speed_pct, most: 100.0 });
         }
-        let mut limits = Limits::of(self.config);
-        let holding = self.dynamics().map(|arm| {
-            let finite = places.iter().filter(|q| q.iter().all(|v| v.is_finite()));
-            finite.map(|q| arm.holding(q)).collect::<Vec<_>>()
-        });
+        margin_in_range(self.margin_pct)?;
+        let mut limits = Limits::of(self.config).with_margin(0.01 * self.margin_pct);
         for j in 0..JOINTS {
             limits.velocity[j] *= SHARE;
             limits.acceleration[j] *= SHARE;
-            let most = holding.iter().flatten().map(|torque| torque[j].abs()).fold(0.0, f64::max);
-            let to_hold = most / (HOLD_SHARE * limits.torque[j]);
-            limits.torque[j] *= to_hold.clamp(TORQUE_SHARE, 1.0);
         }
         let limits = limits.at_speed(self.speed_pct / 100.0);
         if self.jerk {
@@ -273,41 +270,79 @@ impl<'a> Planner<'a> {
     /// The motion as a trajectory that passes the check, slowed down as far as it has to be; one that is `timed` is not.
     fn checked(
         &self,
-        motion: &Motion,
+        within: &Within,
         first: &[f64; JOINTS],
         start: Option<[f64; JOINTS]>,
         timed: bool,
     ) -> Result<Planned, PlanError> {
-        let checker = self.checker(start);
-        let (mut stretch, mut slowed) = (1.0, None::<Problem>);
+        let Within { motion, limits } = within;
+        let (checker, arm) = (self.checker(start), self.dynamics());
+        let (mut stretch, mut for_margin) = (1.0, 1.0);
+        let (mut slowed, mut joint) = (None::<Problem>, None);
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
             // Cold, and as before a run: where friction brakes, it is its lack that costs torque.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
-            let verdict = if cold.is_ok() { checker.check(&sampled.trajectory) } else { cold };
+            let verdict =
+                if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
             // Corners closer than its steps are no motion that a longer trajectory could carry.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
-            let Some(worst) = verdict.refusals().next().cloned() else {
-                let scale = sampled.scale;
-                return Ok(Planned {
-                    binding: binding(motion, scale, slowed.as_ref()),
-                    waypoint_times: motion.waypoint_times().iter().map(|t| t * scale).collect(),
-                    notes: slowed.map(|p| slowed_words(&p, stretch)).into_iter().collect(),
-                    trajectory: sampled.trajectory,
-                    verdict,
-                });
-            };
-            let Some(factor) = slower(&verdict).filter(|factor| !timed && stretch * factor <= SLOWEST) else {
-                return Err(PlanError::Refused(Box::new(verdict)));
-            };
-            stretch *= factor;
-            slowed = Some(worst);
+            let worst = verdict.refusals().next().cloned();
+            if let Some(worst) = worst {
+                let Some(factor) = slower(&verdict).filter(|factor| !timed && stretch * factor <= SLOWEST)
+                else {
+                    return Err(PlanError::Refused(Box::new(verdict)));
+                };
+                stretch *= factor;
+                slowed = Some(worst);
+                continue;
+            }
+            // Rounding to the wire's steps, and what lies between the samples of the plan.
+            let excess = arm.as_ref().filter(|_| !timed);
+            let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
+            if let Some(excess) = excess {
+                let factor = excess.stretch.clamp(SLOWER_FOR_MARGIN, SLOWER.1);
+                if stretch * factor <= SLOWEST {
+                    (stretch, for_margin, joint) =
+                        (stretch * factor, for_margin * factor, Some(excess.joint));
+                    continue;
+                }
+            }
+            let scale = sampled.scale;
+            let of_margin = joint.filter(|_| for_margin > NOTED).map(|joint| {
+                format!(
+                    "slowed down to {:.0} % of the speed that was planned, for the torque margin of {joint}",
+                    100.0 / for_margin
+                )
+            });
+            return Ok(Planned {
+                binding: binding(motion, scale, slowed.as_ref()),
+                waypoint_times: motion.waypoint_times().iter().map(|t| t * scale).collect(),
+                notes: slowed
+                    .map(|p| slowed_words(&p, stretch))
+                    .into_iter()
+                    .chain(of_margin)
+                    .chain(
+                        arm.as_ref().and_then(|arm| {
+                            margin::note(&verdict, self.margin_pct, &sampled.trajectory, arm)
+                        }),
+                    )
+                    .collect(),
+                trajectory: sampled.trajectory,
+                verdict,
+            });
         }
     }
+}
+
+/// A motion with the limits that it keeps.
+struct Within {
+    motion: Motion,
+    limits: Limits,
 }
 
 /// By how much a motion is slowed down for what is wrong with it; `None` where that does not mend it.

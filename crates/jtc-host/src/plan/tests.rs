@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::Arm;
+use crate::check::HOLD_SHARE;
 
 fn pose() -> impl Strategy<Value = [f64; JOINTS]> {
     prop::array::uniform6(-1.5..1.5f64)
@@ -210,7 +211,7 @@ proptest! {
         let planner = Planner { blend, speed_pct: speed, ..Planner::new(&config) };
         let size = if dense { 0.1 } else { 1.0 };
         let places: Vec<_> = places.iter().map(|q| q.map(|q| size * q)).collect();
-        let velocity = planner.limits(&places).unwrap().velocity;
+        let velocity = planner.limits().unwrap().velocity;
         let least = least_s(&places, blend, &velocity);
         let planned = planner.through(&waypoints(&places)).unwrap();
         prop_assert!(least <= planned.trajectory.duration_s(), "{least} s");

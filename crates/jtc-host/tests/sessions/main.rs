@@ -2,6 +2,7 @@
 
 mod checked;
 mod denied;
+mod heavier;
 mod imported;
 mod link;
 mod presence;

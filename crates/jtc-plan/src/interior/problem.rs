@@ -3,7 +3,7 @@ use super::Problem;
 use super::place::{Place, Three, Torque};
 use super::spline::knot;
 use crate::along::Plan;
-use crate::cells::{Cell, End, TORQUE_SHARE};
+use crate::cells::{Cell, End, planned_torque};
 use crate::path::PathPoint;
 use crate::{JOINTS, JointVec};
 
@@ -104,11 +104,11 @@ impl<'a> Problem<'a> {
             place.cap = cap(cell).min(cap(other));
             place.weight = weight;
             self.limits += 2.0 * JOINTS as f64 + 1.0;
-            if let (Some(loads), Some(_)) = (&end.loads, plan.arm) {
+            if let (Some(loads), Some(arm)) = (&end.loads, plan.arm) {
                 self.limits += 2.0 * JOINTS as f64;
                 let share = plan.shares[cell] / slower[cell];
                 let square = share * share;
-                let limit = |j: usize| TORQUE_SHARE * plan.limits.torque[j];
+                let limit = |j: usize| planned_torque(arm, plan.limits, j, loads.hold[j]);
                 place.torque = Some(Torque {
                     first: end.point.first,
                     mass: loads.mass.map(|m| 0.5 * m / square),

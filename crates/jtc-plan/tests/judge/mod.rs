@@ -62,7 +62,11 @@ impl Case {
         let (waypoints, blend) =
             (waypoints(rng, count, &limits), *rng.choice(&[0.0, 0.01, 0.05, 0.2, 1.0]).unwrap_or(&0.0));
         let temperature = between(rng, 22.0, 42.0);
-        Self { config, model, friction, temperature, limits, with_torque: rng.u8(0..3) > 0, waypoints, blend }
+        let with_torque = rng.u8(0..3) > 0;
+        if rng.bool() {
+            limits = limits.with_margin(*rng.choice(&[0.15, 0.15, 0.05, 0.3, 0.5]).unwrap_or(&0.15));
+        }
+        Self { config, model, friction, temperature, limits, with_torque, waypoints, blend }
     }
 
     pub fn arm(&self) -> Option<ArmDynamics<'_>> {
@@ -79,15 +83,7 @@ impl Case {
         let mut torque = dynamics.inverse(q, v, a);
         for j in 0..JOINTS {
             torque[j] += self.config.joints[j].rotor_inertia * a[j];
-            torque[j] += match &self.friction {
-                None => 0.0,
-                Some(Friction::Polynomial(c)) => {
-                    friction::polynomial(&c[j], v[j], self.temperature, self.config.friction_sign_width)
-                }
-                Some(Friction::Table(t)) => {
-                    friction::table(&t[j], v[j], self.temperature).unwrap_or(f64::NAN)
-                }
-            };
+            torque[j] += self.friction_at(j, v[j]);
         }
         torque
     }
@@ -126,6 +122,7 @@ impl Case {
 
     fn differences(&self, motion: &Motion, wrong: &mut String) -> [f64; 4] {
         let dynamics = Dynamics::with_payload(&self.model, self.config.gravity, &self.config.payload);
+        let breakaway = self.breakaway();
         // The arm rests before and after.
         let count = (motion.duration() / H).ceil() as i64 + 4;
         // Long motions are sampled in stretches.
@@ -143,6 +140,7 @@ impl Case {
                 std::array::from_fn(|j| (p[3][j] - 3.0 * p[2][j] + 3.0 * p[1][j] - p[0][j]) / (H * H * H));
             let time = (k + 1) as f64 * H;
             let torque = self.with_torque.then(|| self.torque_at(&dynamics, motion, time));
+            let usable = torque.map(|_| self.usable(&dynamics, &p[1], &breakaway));
             for j in 0..JOINTS {
                 let (low, high) = self.limits.position[j];
                 let mut take = |which: usize, name: &str, value: f64, limit: f64, noise: f64| {
@@ -158,9 +156,9 @@ impl Case {
                 // Positions and times are rounded.
                 let rounding = 4e-15 + 4.0 * f64::EPSILON * time * v[j].abs();
                 take(2, "jerk", jerk[j], self.limits.jerk[j], rounding / (H * H * H));
-                if let Some(torque) = torque {
+                if let (Some(torque), Some(usable)) = (torque, usable) {
                     // Rounding of positions over the square of that time.
-                    take(3, "torque", torque[j], self.limits.torque[j], 1e-4);
+                    take(3, "torque", torque[j], usable[j], 1e-4);
                 }
                 if !(low - 1e-9..=high + 1e-9).contains(&p[1][j]) && wrong.len() < 2000 {
                     let _ = writeln!(wrong, "joint {}: position {} at {time} s", j + 1, p[1][j]);
@@ -169,6 +167,35 @@ impl Case {
             k += 1;
         }
         used
+    }
+
+    /// Largest friction of each joint up to a little more than the speed at which its sign is whole.
+    fn breakaway(&self) -> JointVec {
+        std::array::from_fn(|j| {
+            let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
+            let friction = |i: i32| self.friction_at(j, 0.05 * f64::from(i) * fastest).abs();
+            (-20..=20).map(friction).fold(0.0, f64::max)
+        })
+    }
+
+    /// What the margin leaves of each torque limit; a little of what gravity leaves where that is less.
+    fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
+        let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
+        std::array::from_fn(|j| {
+            let (limit, stands) = (self.limits.torque[j], hold[j].abs() + breakaway[j]);
+            let moves = (0.25 * (limit - stands)).max(0.02 * limit);
+            ((1.0 - self.limits.margin[j]) * limit).max(stands + moves).min(limit)
+        })
+    }
+
+    fn friction_at(&self, j: usize, v: f64) -> f64 {
+        match &self.friction {
+            None => 0.0,
+            Some(Friction::Polynomial(c)) => {
+                friction::polynomial(&c[j], v, self.temperature, self.config.friction_sign_width)
+            }
+            Some(Friction::Table(t)) => friction::table(&t[j], v, self.temperature).unwrap_or(f64::NAN),
+        }
     }
 
     /// By differences over so short a time that an acceleration that jumps, and friction, hardly change in it.

@@ -35,6 +35,7 @@ class Planner:
         jerk: Whether jerk is limited, too.
         temperature: Lowest bearing temperature at which friction has to be overcome, °C; None: that of a cold hall, 20.
         payload: What the flange carries.
+        margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
     """
 
     def __init__(
@@ -48,11 +49,12 @@ class Planner:
         jerk: bool = True,
         temperature: float | None = None,
         payload: Payload | None = None,
+        margin: float | None = None,
     ) -> None:
         self.arm = arm or Arm.avena()
         numbers = payload._numbers() if payload else None
         self._native = _native.Planner(
-            self.arm, speed, blend, blend_m, line, jerk, temperature, numbers
+            self.arm, speed, blend, blend_m, line, jerk, temperature, numbers, margin
         )
 
     def to(

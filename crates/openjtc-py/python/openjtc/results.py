@@ -226,7 +226,7 @@ class Check:
 
     @property
     def warnings(self) -> list[str]:
-        """What is near a limit."""
+        """What is near a limit; a torque margin below 10 % is among it."""
         return list(self._verdict["warnings"])
 
     @property
@@ -238,6 +238,12 @@ class Check:
     def joints(self) -> list[dict[str, Any]]:
         """Peaks of each joint: velocity (rad/s), acceleration (rad/s²), torque (N·m) and their shares of the limits."""
         return list(self._verdict["joints"])
+
+    @property
+    def margin(self) -> dict[str, Any] | None:
+        """The smallest torque margin: ``percent`` of the limit, ``joint`` (from 1), ``time_s``, ``torque_nm``, ``limit_nm``,
+        ``temperature_c``; None without a model."""
+        return self._verdict["margin"]
 
     @property
     def next(self) -> str:

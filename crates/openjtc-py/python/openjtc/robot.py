@@ -46,6 +46,7 @@ class Robot(Connected):
         blend: float = 0.0,
         line: bool = False,
         degrees: bool = False,
+        margin: float | None = None,
     ) -> Plan:
         """Plans a motion of the controller's arm with its payload; nothing moves.
 
@@ -54,7 +55,7 @@ class Robot(Connected):
         """
         mass, com, inertia = self._link.payload() if self.info else (0.0, [0.0] * 3, [0.0] * 6)
         payload = Payload(mass, tuple(com), tuple(inertia)) if mass else None
-        planner = Planner(self.arm, speed=speed, line=line, payload=payload)
+        planner = Planner(self.arm, speed=speed, line=line, payload=payload, margin=margin)
         return planner.through(waypoints, times=times, blend=blend, degrees=degrees)
 
     def check(
@@ -213,6 +214,7 @@ class Robot(Connected):
         overwrite: bool = False,
         accept_device_limits: bool = False,
         progress: bool | None = None,
+        margin: float | None = None,
     ) -> Run:
         """Moves the arm from where it stands to a place, and waits for its end. **The arm moves.** Ctrl-C stops it on its path.
 
@@ -223,8 +225,10 @@ class Robot(Connected):
             speed: Percent of what the limits allow, 1 to 100; None: 10, and 25 where the controller is a simulator. `Run.notes` says which.
             degrees: Whether angles are degrees.
             record, overwrite, accept_device_limits, progress: As of `run`.
+            margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
 
         Raises:
+            UsageError: A margin out of range.
             RefusedError: The place is outside the limits, cannot be reached, or no torque holds it; nothing was sent.
             StoppedError: Somebody stopped it on its way; ``run`` of the error is what was seen until then.
         """
@@ -237,11 +241,11 @@ class Robot(Connected):
 
         def begin() -> Motion:
             if isinstance(to, str):
-                native = self._link.move_to_joints(joints_of(self.arm, to, degrees), line, options)
+                native = self._link.move_to_joints(joints_of(self.arm, to, degrees), line, margin, options)
             elif to is not None:
-                native = self._link.move_to_joints(radians_of(to, degrees), line, options)
+                native = self._link.move_to_joints(radians_of(to, degrees), line, margin, options)
             else:
-                native = self._link.move_to_flange(flange_of(flange, degrees), line, options)
+                native = self._link.move_to_flange(flange_of(flange, degrees), line, margin, options)
             return Motion(native, self, asked)
 
         return followed(self, begin, progress)

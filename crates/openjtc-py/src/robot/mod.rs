@@ -195,27 +195,33 @@ impl Link {
         options.begin(slf, Course::Along(Arc::clone(&trajectory.inner)))
     }
 
+    #[pyo3(signature = (position, line, margin, options))]
     fn move_to_joints(
         slf: &Bound<'_, Self>,
         position: &Bound<'_, PyAny>,
         line: bool,
+        margin: Option<f64>,
         options: Options,
     ) -> Result<Motion, Failure> {
         let target = Place::Joints(array::joints(position, "position")?);
-        options.begin(slf, Course::To { target, line })
+        let margin_pct = crate::planner::margin_of(margin)?;
+        options.begin(slf, Course::To { target, line, margin_pct })
     }
 
     /// `flange`: x y z (m), roll pitch yaw (rad) in the base frame.
+    #[pyo3(signature = (flange, line, margin, options))]
     fn move_to_flange(
         slf: &Bound<'_, Self>,
         flange: &Bound<'_, PyAny>,
         line: bool,
+        margin: Option<f64>,
         options: Options,
     ) -> Result<Motion, Failure> {
+        let margin_pct = crate::planner::margin_of(margin)?;
         let [x, y, z, angles @ ..] = array::joints(flange, "flange")?;
         let pose = Orientation::Rpy(angles).at([x, y, z]);
         let pose = pose.map_err(|error| Failure::usage(error.to_string()))?;
-        options.begin(slf, Course::To { target: Place::Flange(pose), line })
+        options.begin(slf, Course::To { target: Place::Flange(pose), line, margin_pct })
     }
 
     fn pause(&self, py: Python<'_>) -> PyResult<()> {

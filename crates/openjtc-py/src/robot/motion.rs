@@ -5,17 +5,15 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 
-use jtc_host::check::ProblemKind;
 use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner};
+use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner, RunCourse, RunStart, StartError};
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{
-    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError,
-    Sample,
+    Arm, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError, Sample,
 };
 use jtc_wire::{Status, TrajectoryState};
 
@@ -29,8 +27,9 @@ use crate::error::Failure;
 pub enum Course {
     /// Along a trajectory.
     Along(Arc<Trajectory>),
-    /// From where the arm stands to this place; `line`: with the flange on a straight line.
-    To { target: Target, line: bool },
+    /// From where the arm stands to this place; `line`: with the flange on a straight line; `margin_pct`: torque that the move leaves, % of
+    /// each limit.
+    To { target: Target, line: bool, margin_pct: f64 },
 }
 
 /// What is run, and how.
@@ -177,30 +176,23 @@ impl Machine {
         mut status: Status,
     ) -> Result<(), Failure> {
         let Way { order, trajectory, arm, options, move_speed } = way;
-        for _ in 0..order.repeat {
-            let check =
-                |status: &Status| CheckedTrajectory::check(trajectory, arm, &status.positions(), options);
-            let mut checked = check(&status);
-            if order.approach && checked.as_ref().is_err_and(is_elsewhere) {
-                let approach =
-                    plan::approach(trajectory, arm, &status.positions(), move_speed.percent, options);
-                let approach = approach.map_err(|error| no_approach(&error))?;
+        for n in 1..=order.repeat {
+            let course = RunCourse {
+                trajectory,
+                then: (n == 1 && order.repeat > 1).then_some(trajectory),
+                approach_pct: order.approach.then_some(move_speed.percent),
+            };
+            let start = course.start(arm, &status.positions(), options);
+            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
+            if is_approach {
                 ran.notes.extend(of_speed("approach", *move_speed).filter(|note| !ran.notes.contains(note)));
-                if !self.leg(&approach, (order, "approach"), asked, ran, None)? {
+                if !self.leg(&checked, (order, "approach"), asked, ran, None)? {
                     return Ok(());
                 }
+                // From where the approach ended, not from where it should have.
                 status = self.session.fresh_status()?;
-                checked = check(&status);
+                checked = CheckedTrajectory::check(trajectory, arm, &status.positions(), options)?;
             }
-            let elsewhere = checked.as_ref().is_err_and(is_elsewhere);
-            let checked = checked.map_err(|error| {
-                let failure = Failure::from(error);
-                if elsewhere {
-                    failure.next("pass approach=True: the arm is moved to the first point")
-                } else {
-                    failure
-                }
-            })?;
             if !self.leg(&checked, (order, "motion"), asked, ran, recording.as_deref_mut())? {
                 return Ok(());
             }
@@ -314,14 +306,14 @@ impl Machine {
     }
 }
 
-/// The arm is not at the first point, and that alone is wrong.
-fn is_elsewhere(error: &CheckError) -> bool {
+/// Why nothing of the run was begun.
+fn not_begun(error: StartError) -> Failure {
     match error {
-        CheckError::Refused(verdict) => {
-            verdict.refusals().next().is_some()
-                && verdict.refusals().all(|p| p.kind == ProblemKind::StartPose)
+        StartError::Check(error) => error.into(),
+        StartError::Elsewhere(error) => {
+            Failure::from(error).next("pass approach=True: the arm is moved to the first point")
         }
-        _ => false,
+        StartError::Approach(error) => no_approach(&error),
     }
 }
 
@@ -347,18 +339,20 @@ fn trajectory(
             None | Some(100.0) => Ok((Arc::clone(trajectory), Vec::new())),
             Some(percent) => Ok((Arc::new(plan::at_speed(trajectory, percent)?), Vec::new())),
         },
-        Course::To { target, line } => {
+        Course::To { target, line, margin_pct } => {
             let (config, friction) = (arm.config_on_device(&options.device), arm.friction());
             let planner = Planner {
                 model: Some(&arm.model),
                 friction: friction.as_ref(),
                 speed_pct: move_speed.percent,
+                margin_pct: *margin_pct,
                 ..Planner::new(&config)
             };
             let planned = planner.to_target(&arm.model, &status.positions(), target, *line);
             let planned =
                 planned.map_err(|error| Failure { message: error.of_move(), ..Failure::from(error) })?;
-            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).collect();
+            let low = planned.verdict.margin.and_then(|margin| margin.warning());
+            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).chain(low).collect();
             Ok((Arc::new(planned.trajectory), notes))
         }
     }

@@ -778,6 +778,7 @@ export interface components {
              * @description s.
              */
             duration_s: number;
+            margin?: components["schemas"]["MarginObject"] | null;
             /** @description Nothing forbids to run it from its first point. */
             passed: boolean;
             /** @description What is wrong, worst first. */
@@ -1382,6 +1383,39 @@ export interface components {
             /** @description Time of each row, s, 0 at the last one. */
             times_s: number[];
         };
+        /** @description What a motion leaves of a torque limit, where that is the smallest share of it. */
+        MarginObject: {
+            /**
+             * Format: u-int8
+             * @description Joint that has the least left, 1 to 6 from the base.
+             */
+            joint: number;
+            /**
+             * Format: double
+             * @description Torque limit, N·m.
+             */
+            limit_nm: number;
+            /**
+             * Format: double
+             * @description What is left, % of the limit.
+             */
+            percent: number;
+            /**
+             * Format: double
+             * @description Bearing temperature of its friction, °C.
+             */
+            temperature_c: number;
+            /**
+             * Format: double
+             * @description When, s from the start.
+             */
+            time_s: number;
+            /**
+             * Format: double
+             * @description Torque by the model there, N·m.
+             */
+            torque_nm: number;
+        };
         /** @description A joint: where it is, and its limits. */
         ModelJoint: {
             /**
@@ -1461,6 +1495,11 @@ export interface components {
             accept_device_limits?: boolean;
             /** @description The flange keeps to a straight line. */
             line?: boolean;
+            /**
+             * Format: double
+             * @description Torque to leave for masses and friction that the model does not know, % of each limit.
+             */
+            margin_percent?: number;
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: double
@@ -1525,6 +1564,7 @@ export interface components {
             /** @description Figures of each joint, from the base. */
             joints: components["schemas"]["JointPlan"][];
             kept?: components["schemas"]["TrajectoryObject"] | null;
+            margin?: components["schemas"]["MarginObject"] | null;
             /** @description What was changed or is to be known, in words. */
             notes: string[];
             /** @description Points. */
@@ -1536,7 +1576,7 @@ export interface components {
             step_ms: number;
             /** @description The trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`. */
             text: string;
-            /** @description What does not forbid to run it. */
+            /** @description What does not forbid to run it; a torque margin below 10 % is among it. */
             warnings: string[];
             /** @description When the motion is nearest to each waypoint, s. */
             waypoint_times_s: number[];
@@ -1560,6 +1600,11 @@ export interface components {
             keep?: components["schemas"]["KeepRequest"] | null;
             /** @description The flange keeps to a straight line on each leg of which the waypoints do not say how the arm moves. */
             line?: boolean;
+            /**
+             * Format: double
+             * @description Torque to leave for masses and friction that the model does not know, % of each limit.
+             */
+            margin_percent?: number;
             /** @description Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load. */
             no_jerk_limit?: boolean;
             payload?: components["schemas"]["PayloadObject"] | null;
@@ -1911,6 +1956,7 @@ export type LogFile = components['schemas']['LogFile'];
 export type LogJoint = components['schemas']['LogJoint'];
 export type LogStatusObject = components['schemas']['LogStatusObject'];
 export type LogValues = components['schemas']['LogValues'];
+export type MarginObject = components['schemas']['MarginObject'];
 export type ModelJoint = components['schemas']['ModelJoint'];
 export type ModelLink = components['schemas']['ModelLink'];
 export type ModelObject = components['schemas']['ModelObject'];

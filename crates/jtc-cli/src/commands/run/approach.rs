@@ -3,43 +3,34 @@
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::CheckError;
 use jtc_host::check::CheckedTrajectory;
-use jtc_host::plan::{self, ApproachError, MoveSpeed};
-use jtc_wire::Status;
+use jtc_host::plan::{ApproachError, MoveSpeed};
 use serde_json::json;
 
-use super::super::job::Job;
 use super::{APPROACH, Course};
 
-/// A motion to the first point, checked.
-pub fn approach(
-    job: &Job,
-    status: &Status,
-    course: &Course,
-    speed: MoveSpeed,
-    out: &Output,
-) -> Result<CheckedTrajectory, Failure> {
-    let (here, options) = (status.positions(), job.options(course));
-    let checked = plan::approach(&job.trajectory, &job.arm, &here, speed.percent, &options);
-    let checked = checked.map_err(|error| {
-        let verdict = match error {
-            ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
-            ApproachError::Check(CheckError::Refused(verdict)) => verdict,
-            ApproachError::Check(e) => return e.into(),
-        };
-        let failure = refused(&verdict.to_string(), &course.words);
-        if !out.is_json() {
-            return failure;
-        }
-        let error = failure.to_json();
-        let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
-        out.result(&value, String::new);
-        out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-        Failure::printed(failure.kind)
-    })?;
+/// Prints how long an approach takes, and at which speed.
+pub fn note(checked: &CheckedTrajectory, course: &Course, speed: MoveSpeed, out: &Output) {
     let duration_s = checked.trajectory().duration_s();
     let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
-    Ok(checked)
+}
+
+/// The failure of a run whose approach is not possible; with `--json` its verdict is printed.
+pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
+    let verdict = match error {
+        ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
+        ApproachError::Check(CheckError::Refused(verdict)) => verdict,
+        ApproachError::Check(e) => return e.into(),
+    };
+    let failure = refused(&verdict.to_string(), &course.words);
+    if !out.is_json() {
+        return failure;
+    }
+    let error = failure.to_json();
+    let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
+    out.result(&value, String::new);
+    out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
+    Failure::printed(failure.kind)
 }
 
 /// The way to the first point cannot be gone; the trajectory itself is sound.

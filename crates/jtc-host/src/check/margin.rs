@@ -1,0 +1,85 @@
+//! What a trajectory leaves of the torque limits.
+
+use std::fmt;
+
+use jtc_wire::Joint;
+use serde::Serialize;
+
+use super::Verdict;
+
+/// Torque margin below which a check warns, % of the limit: with 10 % more mass and 20 % more friction than in its model, an arm then
+/// reaches the limit on its path.
+pub const MARGIN_LOW_PCT: f64 = 10.0;
+
+/// What is left of a torque limit, where that is the smallest share of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TorqueMargin {
+    /// What is left, % of the limit; negative where the torque is above it.
+    pub percent: f64,
+    /// Joint that has the least left.
+    pub joint: Joint,
+    /// When, s from the start.
+    pub time_s: f64,
+    /// Torque by the model there, N·m.
+    pub torque_nm: f64,
+    /// Torque limit, N·m.
+    pub limit_nm: f64,
+    /// Bearing temperature of its friction, the one that takes more, °C.
+    pub temperature_c: f64,
+}
+
+impl TorqueMargin {
+    /// The margin is below [`MARGIN_LOW_PCT`].
+    pub fn is_low(&self) -> bool {
+        self.percent < MARGIN_LOW_PCT
+    }
+
+    /// A warning where the margin is low.
+    pub fn warning(&self) -> Option<String> {
+        self.is_low().then(|| {
+            format!(
+                "torque margin {:.1} % is below {MARGIN_LOW_PCT} %: {} reaches its limit, and the motion is held back, when the arm is \
+                 heavier or has more friction than its model; a lower speed leaves more, and so does a plan with a larger margin",
+                self.percent, self.joint
+            )
+        })
+    }
+}
+
+impl fmt::Display for TorqueMargin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { percent, joint, time_s, torque_nm, limit_nm, temperature_c } = self;
+        write!(
+            f,
+            "torque margin {percent:.1} %: {joint} at {time_s:.3} s, {:.1} of {limit_nm:.1} N·m with bearings at {temperature_c} °C",
+            torque_nm.abs()
+        )
+    }
+}
+
+impl Verdict {
+    /// Takes the torque of a joint, with the bearing temperature (°C), at a millisecond of the path.
+    pub(super) fn take_margin(
+        &mut self,
+        joint: Joint,
+        (point, ms): (usize, f64),
+        (torque_nm, temperature_c): (f64, f64),
+        limit_nm: f64,
+    ) {
+        let percent = 100.0 * (1.0 - torque_nm.abs() / limit_nm);
+        if !percent.is_nan() && self.margin.is_none_or(|margin| percent < margin.percent) {
+            let time_s = (point as f64 * f64::from(self.step_ms) + ms) * 1e-3;
+            self.margin = Some(TorqueMargin { percent, joint, time_s, torque_nm, limit_nm, temperature_c });
+        }
+    }
+
+    /// The verdict with the smaller one of its margin and another one of the same trajectory.
+    pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
+        if let Some(other) = other
+            && self.margin.is_none_or(|margin| other.percent < margin.percent)
+        {
+            self.margin = Some(other);
+        }
+        self
+    }
+}

@@ -77,6 +77,11 @@ impl Catch {
         self.left_ms > 0
     }
 
+    /// The joint has come to rest in another way.
+    pub fn calm_down(&mut self) {
+        *self = Self { settled: true, ..Self::default() };
+    }
+
     /// The swing of a joint that has not settled yet has grown from one half to the next: its loop is unstable.
     pub fn swing_grows(&self) -> bool {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)

@@ -39,6 +39,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.braking_ms = None;
+        self.motion.hold_back = HoldBack::default();
         self.phase = if self.clock.time == 0.0 || self.parameters.blend_left_ms() > 0 {
             Phase::BEGIN
         } else if self.motion.set.point.position == paused {
@@ -83,10 +84,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return;
         }
         let (pressed, lags) = self.motion.presses(&self.nodes, &self.config);
-        let next = self.motion.hold_back.step(pressed.contains(&true));
-        if next == Next::Stop || lags {
-            let cause = |pressed: bool| if pressed { joint_error::TORQUE } else { 0 };
-            self.hold_stop(&pressed.map(cause));
+        let next = self.motion.hold_back.step(&pressed);
+        if next == Next::Stop || lags.contains(&true) {
+            let cause = |j: usize| match (lags[j], self.motion.hold_back.has_pressed(j)) {
+                (true, _) => joint_error::POSITION_ERROR,
+                (false, true) => joint_error::TORQUE,
+                (false, false) => 0,
+            };
+            self.hold_stop(&core::array::from_fn(cause));
         } else if next == Next::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
         }
@@ -99,6 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Phase::Running { leave } => {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
+                    self.motion.hold_back.end();
                     self.begin_braking();
                 }
             }
@@ -243,7 +249,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         let still = self.trajectory != TrajectoryState::Execute && stands;
         let over = ms >= self.config.braking_ms_max;
-        if over && self.trajectory == TrajectoryState::Execute {
+        let jogged = self.motion.set.jogging();
+        if over && (jogged || self.trajectory == TrajectoryState::Execute) {
             let causes = moving.map(|moves| if moves { joint_error::TORQUE } else { 0 });
             if self.config.torque_release {
                 self.errors.raise_joints(&causes);
@@ -253,8 +260,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.motion.begin_yield(j, true, &self.config);
                 }
                 self.hold_stop(&causes);
-                self.clock.rest();
-                self.set_trajectory(self.phase.leave().unwrap_or(TrajectoryState::Pause));
+                if jogged {
+                    self.motion.set.drop_jog();
+                } else {
+                    self.clock.rest();
+                    self.set_trajectory(self.phase.leave().unwrap_or(TrajectoryState::Pause));
+                }
             }
         }
         self.braking_ms = if over || still { None } else { Some(ms + 1) };

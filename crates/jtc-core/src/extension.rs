@@ -214,7 +214,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         match self.state {
             ControllerState::Teaching => true,
             ControllerState::HoldPos => {
-                self.trajectory != TrajectoryState::Execute && !self.motion.set.jogging()
+                self.trajectory != TrajectoryState::Execute
+                    && !self.motion.set.jogging()
+                    && !self.motion.law.is_yielding()
             }
             _ => false,
         }

@@ -3,6 +3,7 @@
 //! A path at the torque limits asks for more than there is where the arm is heavier or has more friction than its model. Slower, it asks
 //! for less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling under
 //! torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
+use crate::JOINTS;
 use crate::remembered::remembered;
 
 /// Time for which the inertia of the arm is taken for constant, ms.
@@ -26,9 +27,11 @@ pub(crate) struct HoldBack {
     quiet_ms: u16,
     /// Ticks of holding back in this run.
     run_ms: u16,
+    /// Joints that have been at their limits, a bit for each.
+    pressed: u8,
 }
 
-remembered!(HoldBack { active, since_ms, pressed_ms, quiet_ms, run_ms });
+remembered!(HoldBack { active, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
 
 /// What follows from a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,14 +56,28 @@ impl HoldBack {
             return false;
         }
         if !self.active {
-            (self.pressed_ms, self.quiet_ms) = (0, 0);
+            (self.pressed_ms, self.quiet_ms, self.pressed) = (0, 0, 0);
         }
         (self.active, self.since_ms) = (true, 0);
         true
     }
 
-    /// A tick on the path; `pressed`: a joint is at its torque limit.
-    pub fn step(&mut self, pressed: bool) -> Next {
+    /// The path stops: it is not held back any more. What it took in this run counts on.
+    pub fn end(&mut self) {
+        self.active = false;
+    }
+
+    /// Whether the joint has been at its limit since the path is held back.
+    pub fn has_pressed(&self, joint: usize) -> bool {
+        self.pressed & (1 << joint) != 0
+    }
+
+    /// A tick on the path; `joints` that are at their torque limits.
+    pub fn step(&mut self, joints: &[bool; JOINTS]) -> Next {
+        let pressed = joints.contains(&true);
+        for (j, at_limit) in joints.iter().enumerate() {
+            self.pressed |= u8::from(*at_limit) << j;
+        }
         self.since_ms = self.since_ms.saturating_add(1);
         self.run_ms = self.run_ms.saturating_add(1);
         if pressed {
@@ -83,12 +100,14 @@ impl HoldBack {
 mod tests {
     use super::*;
 
+    const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
+
     #[test]
     fn j75_the_inertia_is_computed_anew_from_time_to_time() {
         let mut hold_back = HoldBack::default();
         assert!(hold_back.begin());
         for ms in 1..=2 * INERTIA_MS {
-            hold_back.step(true);
+            hold_back.step(&PRESSED);
             assert_eq!(hold_back.begin(), ms % INERTIA_MS == 0, "{ms} ms");
         }
     }
@@ -98,10 +117,10 @@ mod tests {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
         for pressed in [true, false, true] {
-            assert_eq!(hold_back.step(pressed), Next::Nothing);
+            assert_eq!(hold_back.step(&[false, false, pressed, false, false, false]), Next::Nothing);
         }
-        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(false), Next::Nothing));
-        assert_eq!(hold_back.step(false), Next::Restore);
+        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(&[false; JOINTS]), Next::Nothing));
+        assert_eq!(hold_back.step(&[false; JOINTS]), Next::Restore);
         assert!(!hold_back.is_active());
     }
 
@@ -109,14 +128,14 @@ mod tests {
     fn j75_what_lasts_too_long_in_one_go_or_in_a_run_is_a_stop() {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        let after = (1..1_000).find(|_| hold_back.step(true) == Next::Stop);
+        let after = (1..1_000).find(|_| hold_back.step(&PRESSED) == Next::Stop);
         assert_eq!(after, Some(PRESSED_MS + 1));
         let mut hold_back = HoldBack::default();
         let mut ms = 0;
         let next = loop {
             hold_back.begin();
             ms += 1;
-            match hold_back.step(ms % 100 < 50) {
+            match hold_back.step(&[ms % 100 < 50; JOINTS]) {
                 Next::Nothing => {}
                 next => break next,
             }

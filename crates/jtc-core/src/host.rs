@@ -146,7 +146,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let jogging = self.motion.set.jogging();
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
-                && !jogging;
+                && !jogging
+                && !self.motion.law.is_yielding();
         match command {
             // J-69: what the controller reacts to is not gone yet.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors

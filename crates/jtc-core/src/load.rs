@@ -46,6 +46,12 @@ impl Load {
         self.torque.into()
     }
 
+    /// As much of a torque (N·m) as a load that was not observed is taken for.
+    pub fn bounded(torque: f64, limits: &JointConfig) -> f64 {
+        let highest = HIGHEST * limits.torque_max;
+        torque.max(-highest).min(highest)
+    }
+
     /// It was found in another way: a load that was lowered has become this torque, N·m.
     pub fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };

@@ -66,16 +66,17 @@ impl Motion {
 
     /// A joint yields from the next tick on (J-68), or lowers its load (J-70). The ramp has its inertia.
     pub fn begin_yield(&mut self, joint: usize, lowers: bool, config: &Config) {
-        let (set, limit) = (self.set.point.position[joint], config.joints[joint].torque_max);
-        self.law.begin_yield(joint, lowers, set, self.ramp.inertia(joint), limit);
+        let set = self.set.point.position[joint];
+        self.law.begin_yield(joint, lowers, set, self.ramp.inertia(joint), &config.joints[joint]);
         self.limiter.forget(joint);
+        self.ramp.beside[joint] = true;
     }
 
-    /// Torque limits that the law is at, and position errors beyond half of what they may be.
-    pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], bool) {
+    /// Joints that are at their torque limits, and joints with position errors beyond half of what they may be.
+    pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
         let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
-        (self.limiter.saturated(), (0..JOINTS).any(|j| !self.law.yields(j) && lags(j)))
+        (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
     /// The arm is held at rest, and what it carries is known, or may be a `contact` and is none of it.
@@ -117,7 +118,7 @@ impl Motion {
 
     /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
-        if self.hold_back.is_active() && !clock.halting() {
+        if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law.torque, clock, config);
         } else {
             self.ramp.step(at, &self.law.torque, clock, config);
@@ -135,7 +136,8 @@ impl Motion {
         }
         self.set.commanded.put(&self.set.point);
         let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
-        let mut limited = self.limiter.step(inputs, &self.law, &mut self.set);
+        let held_back = self.hold_back.is_active();
+        let mut limited = self.limiter.step(inputs, &self.law, &mut self.set, held_back);
         if let Some(sag) = &limited.sag {
             self.law.sag(sag);
         }
@@ -148,6 +150,8 @@ impl Motion {
         for (j, position) in positions.iter().enumerate() {
             if ended[j] {
                 self.set.lead(j, *position);
+                self.set.catch[j].calm_down();
+                self.ramp.beside[j] = false;
             }
         }
         limited

@@ -114,6 +114,11 @@ impl PathClock {
         self.rate == 0.0 && self.target == 0.0
     }
 
+    /// Faster than it is wanted.
+    pub fn above_pace(&self) -> bool {
+        self.rate > self.target
+    }
+
     /// On the way to standstill.
     pub fn halting(&self) -> bool {
         self.target == 0.0 && self.rate != 0.0

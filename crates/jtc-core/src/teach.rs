@@ -46,6 +46,11 @@ impl Payload {
         self.observed_ms = 0;
     }
 
+    /// What is missing is known, N·m.
+    pub fn know(&mut self, missing: [f64; JOINTS]) {
+        (self.missing, self.observed_ms) = (missing, OBSERVED_MS);
+    }
+
     /// It has been observed for long enough to know what the arm carries, or that it is next to nothing.
     pub fn is_known(&self, config: &Config) -> bool {
         let little = |(missing, joint): (&f64, &JointConfig)| missing.abs() < LITTLE * joint.torque_max;

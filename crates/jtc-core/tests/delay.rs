@@ -17,7 +17,7 @@ const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
     // What a wrong delay makes of an exact motion is no push.
-    Config { delay_ticks: ticks, yield_torque_share: 1.0, ..Config::avena() }
+    Config { delay_ticks: ticks, torque_release: true, ..Config::avena() }
 }
 
 /// Ways of all joints (rad), there and back in `seconds` each.

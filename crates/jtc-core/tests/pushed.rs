@@ -227,7 +227,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
             println!("{about}: {way:.3} rad, {fell:.2} rad/s");
             assert_eq!(rig.state(), ControllerState::HoldPos, "{about}");
             assert!(fell < if friction == 1.0 { 0.6 } else { 1.4 }, "{about}: {fell} rad/s");
-            assert!(way < if share < 1.0 && friction == 1.0 { 0.1 } else { 1.6 }, "{about}: {way} rad");
+            assert!(way < if share < 1.0 && friction == 1.0 { 0.15 } else { 1.6 }, "{about}: {way} rad");
             assert!(fastest(&arm) < 0.02 || share > 1.05, "{about}: {} rad/s", fastest(&arm));
         }
     }

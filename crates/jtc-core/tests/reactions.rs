@@ -116,7 +116,8 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         last = t.torque;
         assert_eq!(rig.state(), ControllerState::HoldPos);
     }
-    assert!(last < -0.9 * most, "it still holds against the push: {last} N·m");
+    // As stiff as is stable with what the joint moves.
+    assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
 /// A joint that is let go of is held where it is, without a step of its torque; after the third time it yields until the host clears that.
@@ -135,13 +136,13 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             last = torque;
         }
         // Held, it pulls to where it is; while it yields the spring pulls back.
-        let yields = rig.controller.telemetry().joints[3].torque < -500.0;
+        let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     rig.run(400);
     let torque = rig.controller.telemetry().joints[3].torque;
-    assert!(torque > -100.0 && rig.errors() == 0, "{torque} N·m");
+    assert!(torque > -5.0 && rig.errors() == 0, "{torque} N·m");
 }
 
 /// What a held stop leaves to the host, and what ends it.

@@ -130,7 +130,7 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
 fn fastest_after_contact(config: Config, pose: [f64; 6], factor: f64, mass: f64) -> f64 {
     let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
     // What is leant against the arm is a load to it, and no push.
-    let mut rig = arm.holding(Config { yield_torque_share: 1.0, ..config });
+    let mut rig = arm.holding(Config { yield_torque_share: 0.8, ..config });
     let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
     let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };
     for k in 0..4000 {

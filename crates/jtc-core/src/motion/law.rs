@@ -5,7 +5,7 @@ use super::set_values::{Latched, SetValues};
 use super::torque::JointTorque;
 use super::transfer::Transfer;
 use crate::config::Config;
-use crate::limits::within;
+use crate::limits::{JointConfig, within};
 use crate::load::Load;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
@@ -140,11 +140,11 @@ impl ControlLaw {
     }
 
     /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m².
-    pub fn begin_yield(&mut self, joint: usize, lowers: bool, set: f64, inertia: f64, limit: f64) {
-        let torque = &mut self.torque[joint];
+    pub fn begin_yield(&mut self, joint: usize, lowers: bool, set: f64, inertia: f64, limits: &JointConfig) {
+        let (torque, limit) = (&mut self.torque[joint], limits.torque_max);
         if let Some(yields) = &mut self.yields[joint] {
             if lowers {
-                yields.lower();
+                yields.lower(0.0);
             }
             return;
         }
@@ -153,7 +153,8 @@ impl ControlLaw {
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
         // The integral of a joint that was pushed has not found a load.
-        let load = if lowers { load.torque(torque.pid.i) } else { load.known_torque() };
+        let load =
+            if lowers { Load::bounded(load.torque(torque.pid.i), limits) } else { load.known_torque() };
         let stays = self.yielded.count(joint);
         self.yields[joint] = Some(Yield::begin(lowers, stays, set, inertia, load));
     }
@@ -202,10 +203,17 @@ impl ControlLaw {
 
     /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25), unless it may be a `contact`.
     pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics, contact: bool) {
-        self.yields = [None; JOINTS];
-        if self.unwinds_ms > 0 || contact {
+        if contact {
+            // What the integral has may be the contact; what was found before it is a load.
+            let load = |j: usize| match &self.yields[j] {
+                Some(yields) => yields.load(),
+                None => self.loads[j].known_torque(),
+            };
+            self.payload.know(core::array::from_fn(load));
+        } else if self.unwinds_ms > 0 {
             self.payload.forget();
         }
+        self.yields = [None; JOINTS];
         self.payload.fit(dynamics, nodes.positions(), config);
     }
 
@@ -254,6 +262,7 @@ impl ControlLaw {
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts
         // now: the measured position is taken to where the commanded motion has brought it since.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
+        let lowering = self.yields.iter().flatten().filter(|yields| yields.lowers()).count() as u8;
         let zero = [0.0; JOINTS];
         let (qd, qdd) =
             if mode.moves() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
@@ -282,6 +291,7 @@ impl ControlLaw {
                     limits: limit,
                     range: config.position_range(j),
                     share: config.yield_torque_share,
+                    lowering,
                 });
             } else if mode != ControlMode::Teach {
                 let error = due[j] - q[j];

@@ -71,12 +71,24 @@ impl Limiter {
     /// One tick: the torque that the `law` has computed within its limits, and what is found of torque and set values. What braking with
     /// all the torque there is does to the torque, and while a motion is commanded to position error and acceleration, is excused
     /// (J-33). So is all but a torque that is no number of a joint that yields: its torque is bounded by construction.
-    pub fn step(&mut self, inputs: &LawInputs<'_>, law: &ControlLaw, set: &mut SetValues) -> Limited {
+    pub fn step(
+        &mut self,
+        inputs: &LawInputs<'_>,
+        law: &ControlLaw,
+        set: &mut SetValues,
+        held_back: bool,
+    ) -> Limited {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
         let mut sags = None;
         // Only while set values move: an arm that stands yields to a push (J-66).
-        let excused =
-            if braking && mode.moves() { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
+        let excused = if braking && mode.moves() {
+            joint_error::POSITION_ERROR | joint_error::ACCELERATION
+        } else if held_back {
+            // Path time that slows down has its own acceleration.
+            joint_error::ACCELERATION
+        } else {
+            0
+        };
         let (q, v) = (nodes.positions(), nodes.velocities());
         let due = *set.due(config);
         let joints: [(f64, Found); JOINTS] = core::array::from_fn(|j| {
@@ -99,7 +111,9 @@ impl Limiter {
             let strained = feedback.abs() > (1.0 + speed) * config.yield_torque_share * limits.torque_max;
             // What brakes a joint is no push against it; what presses one that stands is.
             let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            let counts = strained & settled & !brakes & !yields & (mode != ControlMode::Teach);
+            // On the approach the feedback has to accelerate the joint.
+            let approaches = mode == ControlMode::Approach && !set.jogging();
+            let counts = strained & settled & !brakes & !yields & !approaches & (mode != ControlMode::Teach);
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
             let set_errors = limits::check_set(point, error, limits, mode == ControlMode::Follow);

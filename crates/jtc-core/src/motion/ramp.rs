@@ -20,9 +20,11 @@ const RAMP_TORQUE: f64 = 0.95;
 pub(crate) struct PathRamp {
     /// Mass matrix with rotors.
     inertia: [[f64; JOINTS]; JOINTS],
+    /// Joints that yield: they do not move along the path, and no pace of it changes their torque.
+    pub beside: [bool; JOINTS],
 }
 
-remembered!(PathRamp { inertia });
+remembered!(PathRamp { inertia, beside });
 
 impl PathRamp {
     /// A ramp of path time begins: its bounds need the inertia of the arm.
@@ -82,14 +84,15 @@ impl PathRamp {
     ) -> SlopeBounds {
         const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut easy, mut full) = (FREE, FREE);
-        for j in 0..JOINTS {
+        for j in (0..JOINTS).filter(|j| !self.beside[*j]) {
             let limit = &config.joints[j];
             let acceleration = at.acceleration[j] * rate * rate;
             narrow(
                 &mut easy,
                 within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
-            let push: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
+            let push: f64 =
+                (0..JOINTS).filter(|k| !self.beside[*k]).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
             let torque = torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);

@@ -101,6 +101,11 @@ impl SetValues {
         }
     }
 
+    /// The jog is over, whatever still moves.
+    pub fn drop_jog(&mut self) {
+        self.jog = None;
+    }
+
     /// The arm is jogged, or has not come to rest since.
     pub fn jogging(&self) -> bool {
         self.jog.is_some()

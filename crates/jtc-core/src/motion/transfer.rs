@@ -99,7 +99,10 @@ impl Transfer {
         if let Some((continued, before)) = before {
             for j in 0..JOINTS {
                 let step = before[j] - continued.of(&torque[j]);
-                let falls = core::mem::take(&mut self.yields[j]) && step * before[j] > 0.0;
+                // One that falls already goes on falling when another joint begins to yield.
+                let falling = self.falls[j] && self.step_ms[j] < FALL_MS;
+                let yields = core::mem::take(&mut self.yields[j]) || falling;
+                let falls = yields && step * before[j] > 0.0;
                 self.begin_step(j, step, falls, config);
             }
         }

@@ -120,7 +120,10 @@ fn j25_what_is_missing_is_observed_while_the_arm_is_held_at_rest_and_firmly() {
     };
     assert!(observed(ControlMode::Hold, |_| ()));
     assert!(MODES.iter().all(|&mode| observed(mode, |_| ()) == (mode == ControlMode::Hold)));
-    assert!(!observed(ControlMode::Hold, |arm| arm.motion.law.begin_yield(2, false, POSE[2], 1.0, 120.0)));
+    assert!(!observed(ControlMode::Hold, |arm| {
+        let limits = arm.config.joints[2];
+        arm.motion.law.begin_yield(2, false, POSE[2], 1.0, &limits);
+    }));
     assert!(!observed(ControlMode::Hold, |arm| arm.motion.set.holding[3] = false));
 }
 

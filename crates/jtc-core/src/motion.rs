@@ -79,7 +79,8 @@ impl Motion {
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// The arm is held at rest, and what it carries is known, or may be a `contact` and is none of it.
+    /// The arm is held at rest, and what it carries is known. In a held stop, where a `contact` may be against it, nothing is found out and
+    /// nothing is waited for.
     pub fn may_be_taught(&self, config: &Config, contact: bool) -> bool {
         self.set.all_holding()
             && !self.law.is_yielding()
@@ -151,9 +152,9 @@ impl Motion {
             if ended[j] {
                 self.set.lead(j, *position);
                 self.set.catch[j].calm_down();
-                self.ramp.beside[j] = false;
             }
         }
+        self.ramp.beside = core::array::from_fn(|j| self.law.yields(j));
         limited
     }
 }

@@ -106,9 +106,10 @@ impl Limiter {
             let (within, overloaded) =
                 self.saturation[j].limit(computed, limits, config.torque_over_ms, excuses);
             let settled = set.catch[j].settled();
-            let feedback = law.feedback(j);
-            let speed = (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
-            let strained = feedback.abs() > (1.0 + speed) * config.yield_torque_share * limits.torque_max;
+            let (feedback, share) = (law.feedback(j), config.yield_torque_share * limits.torque_max);
+            // More for a fast motion.
+            let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
+            let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // What brakes a joint is no push against it; what presses one that stands is.
             let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
             // On the approach the feedback has to accelerate the joint.

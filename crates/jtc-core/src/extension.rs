@@ -166,6 +166,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
+            // A key that is held down through a held stop moves nothing when that is cleared.
+            if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
+                self.extensions.refuse_jogs();
+            }
             return Err(DataStatus::NotAllowed);
         }
         let mut wanted = [0.0; JOINTS];

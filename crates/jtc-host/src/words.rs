@@ -236,8 +236,10 @@ pub fn waiting_for(s: &Status) -> String {
 
 /// The command that leads on from here.
 pub fn next_step(s: &Status) -> &'static str {
-    if s.is_held_stop() {
-        "remove the cause, then `jtc clear`: the arm is held, and nothing moves until then"
+    if s.is_held_stop() && s.state == ControllerState::Teaching {
+        "`jtc teach off`, then `jtc clear`"
+    } else if s.is_held_stop() {
+        "remove the cause, wait until the arm stands, then `jtc clear`: it is held, and nothing is executed until then"
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
         "`jtc recover --arm FILE`, or `--defaults` for the arm that is built into the controller"
     } else if s.errors != 0 || s.state == ControllerState::Error {

@@ -79,6 +79,7 @@ const COMMANDS: &[(&str, &str)] = &[
     ("jtc traj pause", "robot.pause()"),
     ("jtc traj resume", "robot.resume()"),
     ("jtc traj stop", "robot.stop()"),
+    ("jtc clear", "robot.recover()"),
     ("jtc traj check", "robot.check(…)"),
     ("jtc status", "robot.status"),
     ("jtc doctor --baud RATE", "openjtc.connect(…, baud=…)"),

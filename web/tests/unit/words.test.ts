@@ -29,7 +29,9 @@ test('each state has a word, and says what leads on', () => {
     assert.ok(words.detail !== '');
   }
   assert.equal(stateWords(controller({ state: 'Init' }), undefined, ['friction']).step, 'which-arm');
-  const held = controller({ state: 'Teaching', error_codes: ['internal-joint-error'], causes: ['joint 3: torque over limit'] });
+  const held = controller({ state: 'Teaching', errors: ['joint error'], error_codes: ['internal-joint-error'], causes: ['joint 3: torque over limit'] });
+  assert.deepEqual([stateWords(held, undefined, []).word, stateWords(held, undefined, []).step], ['Teaching', 'teach-off']);
+  held.state = 'HoldPos';
   assert.equal(stateWords(held, undefined, []).step, 'acknowledge');
   assert.match(noJog(held), /Held stop/);
   assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);

@@ -61,8 +61,11 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
     // An error that has released the arm is the reason for whatever else went wrong, and nothing else may have.
     without_error(session.fresh_status().ok())?;
-    jogged?;
-    let now = rested?;
+    let now = match (jogged, rested) {
+        // A held stop is the reason for which a jog was refused.
+        (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
+        (jogged, rested) => jogged.and(rested)?,
+    };
     let value = json!({
         "from_rad": begin.positions(),
         "to_rad": now.positions(),

@@ -35,7 +35,8 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
         if s.errors == 0 {
             format!("cleared; state {}", s.state.name())
         } else {
-            format!("still there: {}\nnext: jtc recover", words::errors_line(&s))
+            let next = words::next_step(&s).replace('`', "");
+            format!("still there: {}\nnext: {next}", words::errors_line(&s))
         }
     });
     if s.errors == 0 { Ok(()) } else { Err(Failure::printed(ErrorKind::Device)) }

@@ -106,6 +106,11 @@ impl Diagnose for LinkError {
                         "a number is beyond its bounds (`jtc arm check FILE`), or a joint cannot hold this arm where it stands, with its \
                          payload: `jtc payload show`, `jtc payload clear`",
                     ),
+                    FrameType::ClearCurrentErrors | FrameType::ClearOccurredErrors
+                        if *code == DataStatus::NotAllowed =>
+                    {
+                        Some("the cause is still there, a joint still yields, or the arm still moves: free it, wait until it stands, then again")
+                    }
                     FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => Some(
                         "settings change without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
                     ),

@@ -129,8 +129,8 @@ impl Diagnose for MotionError {
             Self::HeldStop { .. } => (
                 ErrorKind::Fault,
                 "held-stop",
-                "remove what the arm met, or give its payload; then `jtc clear`. `jtc traj resume` goes on once each joint is back within \
-                 0.02 rad of the path, `jtc traj stop` gives it up",
+                "remove what the arm met, or give its payload; then `jtc clear`. `jtc traj resume` goes on if each joint still stands within \
+                 0.02 rad of the path; otherwise `jtc traj stop`, then `jtc traj run FILE --approach`",
             ),
             Self::LinkLost { .. } => (
                 ErrorKind::NoLink,

@@ -15,6 +15,12 @@ pub enum StateError {
         /// The status with the errors.
         status: Box<Status>,
     },
+    /// The arm is in a held stop (J-69): it is held, and nothing moves until the cause is cleared.
+    #[error("the arm is in a held stop: {}", words::held_stop(status))]
+    HeldStop {
+        /// The status with the causes.
+        status: Box<Status>,
+    },
     /// A state was not reached.
     #[error("{what} not reached within {waited_s:.1} s: {}", words::waiting_for(status))]
     Timeout {
@@ -77,6 +83,9 @@ impl Diagnose for StateError {
                 "device-error",
                 "`jtc recover` leads back to HoldPos, `jtc explain CODE` explains each error",
             ),
+            Self::HeldStop { status } => {
+                Diagnosis::new(ErrorKind::Fault, "held-stop", words::next_step(status))
+            }
             Self::Timeout { status, .. } => {
                 Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))
             }

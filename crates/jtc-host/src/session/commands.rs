@@ -230,11 +230,12 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// [`MotionError::RestRefused`], and nothing is sent, when what remains does not pass any more.
+    /// [`StateError::HeldStop`], and nothing is sent, while the cause of a held stop is not cleared.
     /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
     /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
-        let status = self.fresh_status()?;
+        let status = without_error(self.fresh_status()?)?;
         if status.trajectory != TrajectoryState::Pause {
             return Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into());
         }
@@ -312,7 +313,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it is not in HoldPos in this time;
+    /// [`StateError::Device`] when the controller reports errors, [`StateError::HeldStop`] while the cause of one is not cleared,
+    /// [`StateError::Timeout`] when it is not in HoldPos in this time;
     /// those of [`Session::next_status`].
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
@@ -326,7 +328,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it does not hold the arm in this time (it
+    /// [`StateError::Device`] when the controller reports errors, [`StateError::HeldStop`] while the cause of one is not cleared,
+    /// [`StateError::Timeout`] when it does not hold the arm in this time (it
     /// may still lack parameters); those of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
         self.wait_ready_until(timeout, || false)
@@ -348,6 +351,9 @@ impl<P: Port> Session<P> {
 }
 
 fn without_error(status: Status) -> Result<Status, Error> {
+    if status.is_held_stop() {
+        return Err(StateError::HeldStop { status: Box::new(status) }.into());
+    }
     if status.state == ControllerState::Error {
         return Err(StateError::Device { status: Box::new(status) }.into());
     }

@@ -83,7 +83,9 @@ impl<P: Port> Session<P> {
             }
             let before = *occurred.get_or_insert(errors_occurred(&status));
             let held = status.is_held_stop() || errors_occurred(&status) != before;
-            if status.trajectory == TrajectoryState::Pause && held {
+            let ended = status.trajectory.is_in(&[TrajectoryState::Stop, TrajectoryState::Finish]);
+            if status.trajectory == TrajectoryState::Pause && held || begun && ended && status.is_held_stop()
+            {
                 return Err(MotionError::HeldStop { point, before, status: Box::new(status) }.into());
             }
             match (status.trajectory.known(), status.state.known()) {

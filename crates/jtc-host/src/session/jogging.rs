@@ -20,7 +20,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::jog`].
+    /// [`StateError::HeldStop`] while the cause of one is not cleared; those of [`Session::jog`].
     pub fn settle_for_jog(&mut self) -> Result<(), Error> {
         self.settle_for_jog_until(|| false)
     }
@@ -35,6 +35,9 @@ impl<P: Port> Session<P> {
         loop {
             if ended() {
                 return Err(Error::Cancelled);
+            }
+            if let Some(status) = self.last().filter(|status| status.is_held_stop()) {
+                return Err(StateError::HeldStop { status: Box::new(*status) }.into());
             }
             match self.jog(&[0.0; JOINTS]) {
                 Err(Error::Link(LinkError::Refused {
@@ -74,7 +77,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller has released the arm, or holds it because of an error (J-69); those of the line.
+    /// [`StateError::Device`] when the controller has released the arm, [`StateError::HeldStop`] when it has stopped it; those of the line.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
         // Refused where nothing is jogged any more, which is just as well.
         match self.jog(&[0.0; JOINTS]) {
@@ -84,15 +87,19 @@ impl<P: Port> Session<P> {
         let (end, mut standstill) = (self.now() + REST, Standstill::after(Halt::Pause));
         loop {
             let status = self.next_status()?;
-            let device = || StateError::Device { status: Box::new(status) };
             if status.state == ControllerState::Error {
-                return Err(device().into());
+                return Err(StateError::Device { status: Box::new(status) }.into());
             }
             standstill.see(self.now(), &status);
-            if standstill.is_reached() {
-                return if status.is_held_stop() { Err(device().into()) } else { Ok(Some(status)) };
+            let late = self.now() > end;
+            if status.is_held_stop() && (late || standstill.is_reached()) {
+                // A load may sink for longer than that; the controller has it.
+                return Err(StateError::HeldStop { status: Box::new(status) }.into());
             }
-            if self.now() > end {
+            if standstill.is_reached() {
+                return Ok(Some(status));
+            }
+            if late {
                 return Ok(None);
             }
         }

@@ -18,7 +18,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent,
+    /// [`StateError::HeldStop`] where the cause of one is not cleared yet, [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent,
     /// [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns true; those of the line.
     pub fn ready_to_move(
         &mut self,
@@ -37,6 +37,9 @@ impl<P: Port> Session<P> {
             }
         }
         let mut status = unless_ended(status)?;
+        if status.is_held_stop() {
+            return Err(StateError::HeldStop { status: Box::new(status) }.into());
+        }
         if status.state != ControllerState::HoldPos {
             return Err(StateError::NotReady { status: Box::new(status) }.into());
         }

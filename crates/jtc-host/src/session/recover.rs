@@ -28,6 +28,8 @@ const BOOT: Duration = Duration::from_secs(1);
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Acts after which a controller that is still not in HoldPos is given up, and how often errors are cleared.
 const ACTS_MAX: u8 = 24;
+/// Times that a held stop is cleared: a joint that yields comes to rest meanwhile, or somebody has to free it.
+const HELD_CLEARS: u8 = 6;
 const CLEARS_MAX: u8 = 6;
 /// Effect of a command.
 const EFFECT: Duration = Duration::from_millis(500);
@@ -107,6 +109,8 @@ struct Recovery<'a, P, Ended, Report> {
     reset: u8,
     /// How often errors were cleared.
     clears: u8,
+    /// Times that a held stop was cleared.
+    held_clears: u8,
     /// Nodes were reset because they did not come up.
     reset_slow: bool,
     /// Since when a person is asked to release the emergency stop.
@@ -134,6 +138,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
             given,
             reset: 0,
             clears: 0,
+            held_clears: 0,
             reset_slow,
             asked: None,
             acts_left: ACTS_MAX,
@@ -162,7 +167,15 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                     (self.report)(&RecoverStep::HoldPos);
                     return Ok(status);
                 }
-                Some(ControllerState::HoldPos) => self.clear(0)?,
+                Some(ControllerState::HoldPos)
+                    if status.is_held_stop() && self.held_clears >= HELD_CLEARS =>
+                {
+                    return Err(StateError::HeldStop { status: Box::new(status) }.into());
+                }
+                Some(ControllerState::HoldPos) => {
+                    self.held_clears += 1;
+                    self.clear(0)?;
+                }
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,

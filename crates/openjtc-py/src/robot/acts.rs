@@ -6,7 +6,7 @@ use jtc_core::JOINTS;
 use jtc_host::error::Facts;
 use jtc_host::port::Standstill;
 use jtc_host::port::halt::{End, Halt};
-use jtc_host::{Error, LinkError, Port as _, PortError, words};
+use jtc_host::{Error, LinkError, Port as _, PortError, StateError, words};
 use jtc_wire::{ControllerState, TrajectoryState, fixed};
 
 use super::machine::Machine;
@@ -115,6 +115,8 @@ impl Machine {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
+            // A held stop is the reason for which a jog was refused.
+            Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }
         let still = || Failure::fault("still-moving", "the arm still moves", "press the emergency stop");

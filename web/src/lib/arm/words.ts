@@ -44,7 +44,12 @@ export function enabling(controller: Controller): number[] {
 
 /** The controller stopped the arm because of an error, and holds it under torque (J-69). */
 export function isHeldStop(controller: Controller): boolean {
-  return hasTorque(controller) && controller.error_codes.length > 0;
+  return hasTorque(controller) && controller.error_codes.join() === 'internal-joint-error';
+}
+
+/** The arm can be led by hand from here, also in a held stop. */
+export function canBeTaught(controller: Controller | null | undefined): boolean {
+  return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0;
 }
 
 /** Every joint that is there is held: what moves the arm can begin. */
@@ -103,6 +108,12 @@ const MOVES_RAD_S = 0.01;
 export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
   const causes = causesOf(controller);
   const base = { causes, next: '' };
+  if (isHeldStop(controller) && controller.state === 'Teaching') {
+    return {
+      ...base, tone: 'teach', word: 'Teaching', detail: `The arm can be led by hand. A held stop is not acknowledged: ${causes[0]?.words ?? ''}.`,
+      next: 'End teaching, then acknowledge.', step: 'teach-off',
+    };
+  }
   if (isHeldStop(controller)) {
     return {
       ...base, tone: 'error', word: 'Held stop', detail: `${causes[0]?.words ?? 'The controller stopped the arm'}. The arm is held.`,

@@ -131,7 +131,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     {
         controller.hash_arm();
         let errors = controller.errors.word();
-        let (in_error, torque) = (errors != 0, controller.state.has_torque());
+        // A held stop is no error that ends a log (J-69): what comes after it may be worse.
+        let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
         let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
         if self.writer.state != LogState::Recording && torque && !self.writer.powered {
             self.clear();

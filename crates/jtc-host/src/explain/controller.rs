@@ -63,14 +63,14 @@ entries! {
             "Run it slower, or smooth it.",
             "jtc traj check FILE";
         3 "joint-torque":
-            "The computed torque is over its limit.",
+            "The computed torque is over its limit, or something pushes the joint. In HoldPos it is a held stop: the arm is held.",
             "Too fast, too heavy a load, an obstacle, or an arm model that is not this arm.",
-            "Look for an obstacle; check the load and the arm model.",
+            "Look for an obstacle; check the load and the arm model. A held stop ends with `jtc clear`.",
             "jtc traj check FILE --arm ARM";
         4 "joint-position-error":
-            "Commanded and measured position are too far apart.",
+            "Commanded and measured position are too far apart. In HoldPos it is a held stop: the arm is held.",
             "Obstacle, gains too low, wrong friction or model, a drive that gives no torque.",
-            "Look for an obstacle; compare model and friction with the arm.",
+            "Look for an obstacle; compare model and friction with the arm. A held stop ends with `jtc clear`.",
             "jtc status";
         5 "joint-friction-table":
             "The friction table has no value for this speed and temperature.",

@@ -173,6 +173,26 @@ fn j69_a_latched_stop_outlasts_teaching_and_not_a_release() {
     }
 }
 
+/// Who acknowledges a held stop does not know that somebody else's key is still down.
+#[test]
+fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_cleared() {
+    let mut rig = bench(false);
+    let jog = floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    push(&mut rig, 0.097);
+    let mut held = |rig: &mut Rig, ms: usize| {
+        for _ in 0..ms / 50 {
+            assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NotAllowed);
+            rig.run(49);
+        }
+    };
+    held(&mut rig, 800);
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    held(&mut rig, 1_000);
+    // Let go, and pressed again.
+    rig.run(210);
+    assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
+}
+
 /// What braking excuses is for the arm that cannot follow its path, not for one that is pushed away from where the path stands.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {

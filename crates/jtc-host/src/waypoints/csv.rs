@@ -81,7 +81,7 @@ pub(super) fn column(name: &str) -> Option<(Column, f64)> {
         return Some((Column::Flange(ANGLES.start + i), unit));
     }
     let joint = name.strip_prefix('q')?.parse::<usize>().ok()?;
-    (1..=JOINTS).contains(&joint).then_some((Column::Joint(joint - 1), unit))
+    (1..=JOINTS).contains(&joint).then(|| (Column::Joint(joint - 1), unit))
 }
 
 /// Whether waypoint files have a column of this name.

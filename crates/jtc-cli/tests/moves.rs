@@ -61,7 +61,8 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "100"]).ends(0);
+        // Slowly: the payload that is given is not there.
+        sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
             refused["verdict"]["problems"].as_array().unwrap().iter().map(|p| p["kind"].clone()).collect();

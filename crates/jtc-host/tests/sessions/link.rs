@@ -257,8 +257,11 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         jtc_host::words::errors_line(&held)
     );
     assert!(jtc_host::words::next_step(&held).contains("jtc clear"));
-    let refused = s.resume().unwrap_err();
-    assert!(refused.to_string().contains('7'), "{refused}");
+    // Nothing that moves the arm is sent, and the reason is the cause.
+    assert_eq!(s.resume().unwrap_err().code(), "held-stop");
+    let error = s.ready_to_move(|_| (), || false).unwrap_err();
+    assert!(error.code() == "held-stop" && error.to_string().contains("joint 5"), "{error}");
+    assert_eq!(s.settle_for_jog().unwrap_err().code(), "held-stop");
     s.clear(true, 0).unwrap();
     let cleared = s.fresh_status().unwrap();
     assert!(!cleared.is_held_stop() && cleared.errors == 0);

@@ -256,9 +256,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.errors.raise_joints(&causes);
             } else {
                 // The path stands, and what still moves is let down (J-70).
-                for j in (0..JOINTS).filter(|j| moving[*j]) {
-                    self.motion.begin_yield(j, true, &self.config);
-                }
+                self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
                 self.hold_stop(&causes);
                 if jogged {
                     self.motion.set.drop_jog();

@@ -64,12 +64,17 @@ impl Motion {
         self.law.begin();
     }
 
-    /// A joint yields from the next tick on (J-68), or lowers its load (J-70). The ramp has its inertia.
-    pub fn begin_yield(&mut self, joint: usize, lowers: bool, config: &Config) {
-        let set = self.set.point.position[joint];
-        self.law.begin_yield(joint, lowers, set, self.ramp.inertia(joint), &config.joints[joint]);
-        self.limiter.forget(joint);
-        self.ramp.beside[joint] = true;
+    /// Joints that yield from the next tick on (J-68), and joints that lower their loads (J-70). The ramp has their inertia.
+    pub fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
+        let inertia = self.ramp.inertia();
+        for j in 0..JOINTS {
+            if yields[j] || lowers[j] {
+                let set = self.set.point.position[j];
+                self.law.begin_yield(j, lowers[j], set, inertia[j], &config.joints[j]);
+                self.limiter.forget(j);
+                self.ramp.beside[j] = true;
+            }
+        }
     }
 
     /// Joints that are at their torque limits, and joints with position errors beyond half of what they may be.

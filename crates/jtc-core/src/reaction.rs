@@ -88,9 +88,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
             }
-            for j in (0..JOINTS).filter(|j| yields[*j] || lowers[*j]) {
-                self.motion.begin_yield(j, lowers[j], &self.config);
-            }
+            self.motion.begin_yields(&yields, &lowers, &self.config);
         }
         release
     }

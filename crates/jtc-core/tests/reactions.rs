@@ -179,7 +179,7 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     let mut rig = bench(false);
     let jog = floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
     push(&mut rig, 0.097);
-    let mut held = |rig: &mut Rig, ms: usize| {
+    let held = |rig: &mut Rig, ms: usize| {
         for _ in 0..ms / 50 {
             assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NotAllowed);
             rig.run(49);

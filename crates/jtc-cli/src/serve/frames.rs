@@ -9,7 +9,7 @@ use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
 
 /// Silence that ends a frame (J-03).
-const GAP: Duration = Duration::from_millis(5);
+pub const GAP: Duration = Duration::from_millis(5);
 
 /// Bytes that came, and the pieces that are complete.
 #[derive(Default)]
@@ -103,7 +103,7 @@ impl Incoming {
     }
 
     /// Bytes of a frame are still to come.
-    fn mid_frame(&self) -> bool {
+    pub fn mid_frame(&self) -> bool {
         self.missing > 0 || !self.head.is_empty()
     }
 

@@ -140,6 +140,8 @@ impl ControlLaw {
     }
 
     /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m².
+    // Inlined, so that its index is known to be that of a joint.
+    #[inline(always)]
     pub fn begin_yield(&mut self, joint: usize, lowers: bool, set: f64, inertia: f64, limits: &JointConfig) {
         let (torque, limit) = (&mut self.torque[joint], limits.torque_max);
         if let Some(yields) = &mut self.yields[joint] {

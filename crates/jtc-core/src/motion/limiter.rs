@@ -63,6 +63,7 @@ impl Limiter {
     }
 
     /// What was counted of a joint is forgotten.
+    #[inline(always)]
     pub fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
         self.pushed[joint].forget();

@@ -35,9 +35,9 @@ impl PathRamp {
         }
     }
 
-    /// Inertia that a joint moved at the begin of the ramp with the others held, kg·m².
-    pub fn inertia(&self, joint: usize) -> f64 {
-        self.inertia[joint][joint]
+    /// Inertia that each joint moved at the begin of the ramp with the others held, kg·m².
+    pub fn inertia(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|j| self.inertia[j][j])
     }
 
     /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `torque` as for `slope_bounds`.
@@ -84,15 +84,19 @@ impl PathRamp {
     ) -> SlopeBounds {
         const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut easy, mut full) = (FREE, FREE);
-        for j in (0..JOINTS).filter(|j| !self.beside[*j]) {
+        for j in 0..JOINTS {
+            if self.beside[j] {
+                continue;
+            }
             let limit = &config.joints[j];
             let acceleration = at.acceleration[j] * rate * rate;
             narrow(
                 &mut easy,
                 within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
-            let push: f64 =
-                (0..JOINTS).filter(|k| !self.beside[*k]).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
+            let push: f64 = (0..JOINTS)
+                .map(|k| if self.beside[k] { 0.0 } else { self.inertia[j][k] * at.velocity[k] })
+                .sum();
             let torque = torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);

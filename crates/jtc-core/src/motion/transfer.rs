@@ -73,6 +73,7 @@ impl Transfer {
 
     /// The joint yields from the next tick on: no step but that of the model, and torque that is too much for it falls within
     /// [`FALL_MS`] (J-68).
+    #[inline(always)]
     pub fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
         self.yields[joint] = true;

@@ -7,7 +7,7 @@ use openjtc_emulator::flash::Bank2;
 use openjtc_emulator::observe::ResetCause;
 use openjtc_emulator::{Board, Port};
 
-use crate::frames::{Frames, Incoming};
+use crate::frames::{Frames, GAP, Incoming};
 use crate::log::DefmtLog;
 use crate::pty::{Pty, PtyError};
 
@@ -65,7 +65,7 @@ impl Live {
             speed,
             log,
             frames: Frames::default(),
-            incoming: Incoming::default(),
+            incoming: Incoming::new(Instant::now()),
             rest: Vec::new(),
             connected: false,
             ready: false,
@@ -131,14 +131,20 @@ impl Live {
                 return Ok(());
             }
             self.incoming.push(&buffer[..n]);
+            self.incoming.carries(Instant::now());
             self.board.write(self.port, &buffer[..n]);
         }
     }
 
-    /// See [`Incoming::stands_still`]; bytes that the line has not carried yet are not waited for.
+    /// Virtual time waits a little for the next bytes of a frame, which are still on their way through the operating system: the board itself
+    /// measures the gap. Bytes that the line has not carried yet are not waited for.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
-        Ok(self.board.pending(self.port) == 0
-            && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
+        if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
+            return Ok(false);
+        }
+        let Some(silence) = self.incoming.silence(Instant::now()) else { return Ok(false) };
+        self.pty.wait_input(GAP.saturating_sub(silence))?;
+        Ok(true)
     }
 
     /// The firmware's log, and what nobody wants to see: resets and faults.

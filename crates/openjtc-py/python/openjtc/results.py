@@ -243,7 +243,8 @@ class Check:
     def margin(self) -> dict[str, Any] | None:
         """The smallest torque margin: ``percent`` of the limit, ``joint`` (from 1), ``time_s``, ``torque_nm``, ``limit_nm``,
         ``temperature_c``; None without a model."""
-        return self._verdict["margin"]
+        margin: dict[str, Any] | None = self._verdict["margin"]
+        return margin
 
     @property
     def next(self) -> str:

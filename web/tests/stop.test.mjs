@@ -196,6 +196,7 @@ on('Pause touched twice is a pause', {}, async ({ agent, look }) => {
   await page.click('#tab-run');
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
   await page.getByText('Passed the check').waitFor();
+  await page.getByLabel('Speed, % of its own').selectOption({ label: '25 %' });
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();
   const box = await page.getByRole('button', { name: 'Pause' }).boundingBox();

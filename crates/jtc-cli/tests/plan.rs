@@ -55,7 +55,8 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
-/// The margin of a plan is kept, printed and warned of, by `plan` and `traj check` alike; what is no margin is refused with its range.
+/// `plan` keeps the margin and prints it, and both `plan` and `traj check` warn below 10 %. A margin out of its range is refused, and the
+/// range is named.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
     let dir = Dir::new();

@@ -289,7 +289,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-69: a held stop is latched, or a joint yields.
     pub(crate) fn stops_held(&self) -> bool {
-        self.errors.held_stop() || (0..JOINTS).any(|j| self.motion.law.yields(j))
+        self.errors.held_stop() || self.motion.law.any_yields()
     }
 
     /// J-53: joints are set absent.

@@ -13,7 +13,7 @@ const HIGHEST: f64 = 0.3;
 const APART: f64 = 0.1;
 /// Change of the integral, as a share of the torque limit, up to which the joint is held steadily.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the load is taken anew, s.
+/// Time of steady holding after which the integral is taken for the load, s.
 const STEADY_S: f64 = 10.0;
 
 /// The load of a joint.
@@ -31,7 +31,7 @@ pub(crate) struct Load {
 remembered!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// The load is to be found anew.
+    /// Forgets the load: the joint has to find it again.
     pub fn forget(&mut self) {
         *self = Self::default();
     }

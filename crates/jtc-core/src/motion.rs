@@ -72,7 +72,6 @@ impl Motion {
                 let set = self.set.point.position[j];
                 self.law.begin_yield(j, lowers[j], set, inertia[j], &config.joints[j]);
                 self.limiter.forget(j);
-                self.ramp.beside[j] = true;
             }
         }
     }
@@ -109,7 +108,7 @@ impl Motion {
     pub fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
-            set.jog_on(config, |at, clock| ramp.step(at, &law.torque, clock, config));
+            set.jog_on(config, |at, clock| ramp.step(at, law, clock, config));
         } else {
             set.hold(config);
         }
@@ -118,16 +117,16 @@ impl Motion {
     /// A tick of the approach, of which `at` are the full-speed values at the time of its clock. The law is given the acceleration of the
     /// clock's ramp, and leaves that of the approach itself to the feedback.
     pub fn approach(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
-        self.ramp.step(at, &self.law.torque, clock, config);
+        self.ramp.step(at, &self.law, clock, config);
         self.set.follow(&SetPoint { acceleration: [0.0; JOINTS], ..*at }, clock.rate, clock.slope);
     }
 
     /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
-            self.ramp.hold_back(at, &self.law.torque, clock, config);
+            self.ramp.hold_back(at, &self.law, clock, config);
         } else {
-            self.ramp.step(at, &self.law.torque, clock, config);
+            self.ramp.step(at, &self.law, clock, config);
         }
         self.set.follow(at, clock.rate, clock.slope);
     }
@@ -159,7 +158,6 @@ impl Motion {
                 self.set.catch[j].calm_down();
             }
         }
-        self.ramp.beside = core::array::from_fn(|j| self.law.yields(j));
         limited
     }
 }

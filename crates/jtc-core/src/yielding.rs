@@ -227,7 +227,7 @@ fn soft_end(joint: &Joint<'_>, most: f64) -> f64 {
     most * (below - above) / SOFT_END
 }
 
-/// How often each joint has yielded of late.
+/// How often each joint has yielded in the last seconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],

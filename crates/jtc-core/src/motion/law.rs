@@ -90,7 +90,7 @@ impl ControlLaw {
         *torque = Default::default();
         *payload = Payload::default();
         *transfer = Transfer::default();
-        *yields = [None; JOINTS];
+        forget_yields(yields);
         *yielded = Yielded::default();
         *loads = Default::default();
     }
@@ -114,7 +114,7 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// What the joints carry is to be found anew.
+    /// Forgets the loads: each joint has to find what it carries again.
     fn forget_loads(&mut self) {
         self.loads.iter_mut().for_each(Load::forget);
     }
@@ -166,6 +166,11 @@ impl ControlLaw {
         self.yields[joint].is_some()
     }
 
+    /// Whether any joint does.
+    pub fn any_yields(&self) -> bool {
+        self.yields.iter().any(Option::is_some)
+    }
+
     /// A joint yields, and is not calm yet.
     pub fn is_yielding(&self) -> bool {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
@@ -191,7 +196,7 @@ impl ControlLaw {
     pub fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
-            let Some(yields) = self.yields[j].filter(Yield::is_over) else { continue };
+            let Some(yields) = self.yields[j].as_ref().filter(|yields| yields.is_over()) else { continue };
             self.pid[j].take_over(&gains[j], yields.load());
             if yields.lowers() {
                 self.loads[j].set(yields.load());
@@ -215,7 +220,7 @@ impl ControlLaw {
         } else if self.unwinds_ms > 0 {
             self.payload.forget();
         }
-        self.yields = [None; JOINTS];
+        forget_yields(&mut self.yields);
         self.payload.fit(dynamics, nodes.positions(), config);
     }
 
@@ -307,7 +312,7 @@ impl ControlLaw {
         if mode != ControlMode::Teach {
             self.observe_load(set, config);
         }
-        if mode == ControlMode::Hold && self.yields == [None; JOINTS] && set.all_holding() {
+        if mode == ControlMode::Hold && !self.any_yields() && set.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();
@@ -345,6 +350,13 @@ impl ControlLaw {
                 torque.brake = within(-damping * excess[j], torque.sum(), joint.torque_max);
             }
         }
+    }
+}
+
+/// No joint yields. In place: an array of `None` would be made and copied with room for what it does not hold.
+fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
+    for yields in yields {
+        *yields = None;
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the arm can follow on a ramp of path time (J-33): slopes within its acceleration and torque limits.
 use jtc_dynamics::Dynamics;
 
-use super::torque::JointTorque;
+use super::law::ControlLaw;
 use crate::JOINTS;
 use crate::config::Config;
 use crate::deceleration::moves;
@@ -20,11 +20,9 @@ const RAMP_TORQUE: f64 = 0.95;
 pub(crate) struct PathRamp {
     /// Mass matrix with rotors.
     inertia: [[f64; JOINTS]; JOINTS],
-    /// Joints that yield: they do not move along the path, and no pace of it changes their torque.
-    pub beside: [bool; JOINTS],
 }
 
-remembered!(PathRamp { inertia, beside });
+remembered!(PathRamp { inertia });
 
 impl PathRamp {
     /// A ramp of path time begins: its bounds need the inertia of the arm.
@@ -40,19 +38,13 @@ impl PathRamp {
         core::array::from_fn(|j| self.inertia[j][j])
     }
 
-    /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `torque` as for `slope_bounds`.
-    pub fn step(
-        &self,
-        at: &SetPoint,
-        torque: &[JointTorque; JOINTS],
-        clock: &mut PathClock,
-        config: &Config,
-    ) {
+    /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.
+    pub fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
             return;
         }
-        let bounds = self.slope_bounds(at, torque, clock.rate, clock.slope, config);
+        let bounds = self.slope_bounds(at, law, clock.rate, clock.slope, config);
         let ramp_ms = f64::from(config.ramp_ms);
         if clock.halting() {
             clock.slow_down(ramp_ms, f64::from(config.stop_ms), &bounds);
@@ -62,22 +54,17 @@ impl PathRamp {
     }
 
     /// A tick of a clock that is held back by joints at their torque limits (J-75).
-    pub fn hold_back(
-        &self,
-        at: &SetPoint,
-        torque: &[JointTorque; JOINTS],
-        clock: &mut PathClock,
-        config: &Config,
-    ) {
-        clock.hold_back(self.slope_bounds(at, torque, clock.rate, clock.slope, config).full);
+    pub fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
+        clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 
     /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
-    /// has left is counted from the last `torque`, with all its parts: a joint that already falls behind has less.
+    /// has left is counted from the last torque of the `law`, with all its parts: a joint that already falls behind has less. Joints that
+    /// yield do not move along the path, and no pace of it changes their torque.
     fn slope_bounds(
         &self,
         at: &SetPoint,
-        torque: &[JointTorque; JOINTS],
+        law: &ControlLaw,
         rate: f64,
         slope: f64,
         config: &Config,
@@ -85,7 +72,7 @@ impl PathRamp {
         const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut easy, mut full) = (FREE, FREE);
         for j in 0..JOINTS {
-            if self.beside[j] {
+            if law.yields(j) {
                 continue;
             }
             let limit = &config.joints[j];
@@ -95,9 +82,9 @@ impl PathRamp {
                 within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
             let push: f64 = (0..JOINTS)
-                .map(|k| if self.beside[k] { 0.0 } else { self.inertia[j][k] * at.velocity[k] })
+                .map(|k| if law.yields(k) { 0.0 } else { self.inertia[j][k] * at.velocity[k] })
                 .sum();
-            let torque = torque[j].sum() - push * slope;
+            let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
             // No pace of the path helps a joint that does not move along it.
@@ -129,6 +116,7 @@ mod tests {
 
     use super::*;
     use crate::Parameters;
+    use crate::motion::JointTorque;
 
     /// Joints that stand, that move as slowly as counts as standing, and that move.
     fn velocities() -> impl Strategy<Value = [f64; JOINTS]> {
@@ -154,12 +142,13 @@ mod tests {
             let (nodes, dynamics) = (Nodes::new(&config), Dynamics::new(&Parameters::avena().model, config.gravity));
             let mut ramp = PathRamp::default();
             ramp.begin(&nodes, &config, &dynamics);
-            let torque = core::array::from_fn(|j| JointTorque {
+            let mut law = ControlLaw::default();
+            law.torque = core::array::from_fn(|j| JointTorque {
                 model: share[j] * config.joints[j].torque_max,
                 ..JointTorque::default()
             });
             let at = SetPoint { position: [0.0; JOINTS], velocity, acceleration };
-            let SlopeBounds { easy, full } = ramp.slope_bounds(&at, &torque, rate, slope, &config);
+            let SlopeBounds { easy, full } = ramp.slope_bounds(&at, &law, rate, slope, &config);
 
             // What the arm needs for one more of slope.
             let zero = [0.0; JOINTS];

@@ -93,7 +93,7 @@ settings! {
     Whole 53 "stop_ms" ["ms"] 20.0..=10000.0 No "longest pause or stop" (stop_ms: u16);
     Whole 54 "braking_ms_max" ["ms"] 20.0..=20000.0 No "longest braking with all the torque there is" (braking_ms_max: u16);
     Number 55 "yield_torque_share" [""] 0.0..=0.8 No "torque of a joint that yields to a slow push, as a share of the limit" (yield_torque_share);
-    Whole 56 "torque_over_ms" ["ms"] 0.0..=100.0 No "torque at its limit in any 100 ms that is no overload" (torque_over_ms: u16);
+    Whole 56 "torque_over_ms" ["ms"] 0.0..=100.0 No "time at the torque limit, within any 100 ms, that is not yet an overload" (torque_over_ms: u16);
     Whole 57 "catch_ms_max" ["ms"] 0.0..=10000.0 No "time for catching the load of a joint that was just enabled" (catch_ms_max: u16);
     Whole 58 "blend_ms" ["ms"] 1.0..=5000.0 No "time over which steps of torque are blended out" (blend_ms: u16);
     Number 59 "teach_velocity_max_rad_s" ["rad/s"] 0.01..=5.0 No "speed above which teaching brakes" (teach_velocity_max);

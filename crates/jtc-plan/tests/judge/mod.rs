@@ -178,7 +178,7 @@ impl Case {
         })
     }
 
-    /// What the margin leaves of each torque limit; a little of what gravity leaves where that is less.
+    /// Torque that a motion may use: the limit without its margin, but no less than standing takes and a small part of what that leaves.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {

@@ -75,6 +75,11 @@ pub enum StateError {
     },
 }
 
+/// Fails where the arm is in a held stop (J-69).
+pub(crate) fn without_held_stop(status: &Status) -> Result<(), StateError> {
+    if status.is_held_stop() { Err(StateError::HeldStop { status: Box::new(*status) }) } else { Ok(()) }
+}
+
 impl Diagnose for StateError {
     fn diagnosis(&self) -> Diagnosis {
         match self {

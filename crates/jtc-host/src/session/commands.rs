@@ -8,7 +8,7 @@ use jtc_wire::{
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
-use crate::error::{Error, LinkError, MotionError, StateError, accepted};
+use crate::error::{Error, LinkError, MotionError, StateError, accepted, without_held_stop};
 use crate::port::Port;
 use crate::words;
 
@@ -351,9 +351,7 @@ impl<P: Port> Session<P> {
 }
 
 fn without_error(status: Status) -> Result<Status, Error> {
-    if status.is_held_stop() {
-        return Err(StateError::HeldStop { status: Box::new(status) }.into());
-    }
+    without_held_stop(&status)?;
     if status.state == ControllerState::Error {
         return Err(StateError::Device { status: Box::new(status) }.into());
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Status, TrajectoryState};
 
 use super::Session;
-use crate::error::{Error, LinkError, StateError};
+use crate::error::{Error, LinkError, StateError, without_held_stop};
 use crate::port::halt::Halt;
 use crate::port::{Port, Standstill};
 
@@ -36,9 +36,7 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            if let Some(status) = self.last().filter(|status| status.is_held_stop()) {
-                return Err(StateError::HeldStop { status: Box::new(*status) }.into());
-            }
+            self.last().map_or(Ok(()), without_held_stop)?;
             match self.jog(&[0.0; JOINTS]) {
                 Err(Error::Link(LinkError::Refused {
                     code: DataStatus::NotAllowed,
@@ -92,9 +90,9 @@ impl<P: Port> Session<P> {
             }
             standstill.see(self.now(), &status);
             let late = self.now() > end;
-            if status.is_held_stop() && (late || standstill.is_reached()) {
+            if late || standstill.is_reached() {
                 // A load may sink for longer than that; the controller has it.
-                return Err(StateError::HeldStop { status: Box::new(status) }.into());
+                without_held_stop(&status)?;
             }
             if standstill.is_reached() {
                 return Ok(Some(status));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, Status};
 
 use super::Session;
-use crate::error::{Error, StateError};
+use crate::error::{Error, StateError, without_held_stop};
 use crate::port::Port;
 use crate::words;
 
@@ -37,9 +37,7 @@ impl<P: Port> Session<P> {
             }
         }
         let mut status = unless_ended(status)?;
-        if status.is_held_stop() {
-            return Err(StateError::HeldStop { status: Box::new(status) }.into());
-        }
+        without_held_stop(&status)?;
         if status.state != ControllerState::HoldPos {
             return Err(StateError::NotReady { status: Box::new(status) }.into());
         }

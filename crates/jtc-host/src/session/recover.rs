@@ -12,7 +12,7 @@ pub use source::ParameterSource;
 pub use step::RecoverStep;
 
 use super::Session;
-use crate::error::{Error, LinkError, StateError};
+use crate::error::{Error, LinkError, StateError, without_held_stop};
 use crate::port::Port;
 use crate::words;
 
@@ -167,12 +167,10 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                     (self.report)(&RecoverStep::HoldPos);
                     return Ok(status);
                 }
-                Some(ControllerState::HoldPos)
-                    if status.is_held_stop() && self.held_clears >= HELD_CLEARS =>
-                {
-                    return Err(StateError::HeldStop { status: Box::new(status) }.into());
-                }
                 Some(ControllerState::HoldPos) => {
+                    if self.held_clears >= HELD_CLEARS {
+                        without_held_stop(&status)?;
+                    }
                     self.held_clears += 1;
                     self.clear(0)?;
                 }

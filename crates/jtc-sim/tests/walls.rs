@@ -1,4 +1,7 @@
 //! Walls that the arm meets, and loads that it takes up and drops, against what mechanics says.
+#[path = "../../jtc-plan/tests/robots/mod.rs"]
+mod robots;
+
 use jtc_bus::Joint;
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, Link, Origin, Payload};
 use jtc_sim::{Arm, Gear, Side, SimArm, SimFriction, Wall};
@@ -16,12 +19,8 @@ fn bare(parts: SimArm) -> SimArm {
     }
 }
 
-/// An arm of joints by classic Denavit-Hartenberg parameters d, a (m), α (rad) with links of these masses (kg) and sizes (m).
-fn by_dh(rows: [[f64; 3]; JOINTS], masses: [f64; JOINTS], size: f64, rotors: [f64; JOINTS]) -> SimArm {
-    let mut model = ArmModel::default();
-    for (joint, [d, a, alpha]) in model.joints[1..].iter_mut().zip(rows) {
-        *joint = Origin { xyz: [a, 0.0, d], rpy: [alpha, 0.0, 0.0] };
-    }
+/// An arm of these joints with links of these masses (kg) and sizes (m).
+fn of_links(mut model: ArmModel, masses: [f64; JOINTS], size: f64, rotors: [f64; JOINTS]) -> SimArm {
     for (k, mass) in masses.into_iter().enumerate() {
         let middle = model.joints[k + 1].xyz.map(|x| 0.5 * x);
         let moment = 0.1 * mass * size * size;
@@ -35,29 +34,26 @@ fn by_dh(rows: [[f64; 3]; JOINTS], masses: [f64; JOINTS], size: f64, rotors: [f6
 /// rotors that the simulator knows.
 fn arms() -> [(&'static str, SimArm); 3] {
     use std::f64::consts::FRAC_PI_2;
-    let ur5 = [
-        [0.089159, 0.0, FRAC_PI_2],
-        [0.0, -0.425, 0.0],
-        [0.0, -0.39225, 0.0],
-        [0.10915, 0.0, FRAC_PI_2],
-        [0.09465, 0.0, -FRAC_PI_2],
-        [0.0823, 0.0, 0.0],
-    ];
-    let light = [
+    let light = robots::by_dh([
         [0.1, 0.0, FRAC_PI_2],
         [0.0, -0.35, 0.0],
         [0.0, -0.22, 0.0],
         [0.07, 0.0, FRAC_PI_2],
         [0.05, 0.0, -FRAC_PI_2],
         [0.05, 0.0, 0.0],
-    ];
+    ]);
     [
         ("default", SimArm::default()),
         (
             "UR5",
-            by_dh(ur5, [3.7, 8.393, 2.275, 1.219, 1.219, 0.1879], 0.12, [0.75, 0.75, 0.75, 0.14, 0.14, 0.14]),
+            of_links(
+                robots::ur5(),
+                [3.7, 8.393, 2.275, 1.219, 1.219, 0.1879],
+                0.12,
+                [0.75, 0.75, 0.75, 0.14, 0.14, 0.14],
+            ),
         ),
-        ("light", by_dh(light, [0.67, 1.19, 0.84, 0.56, 0.39, 0.29], 0.05, [0.02; JOINTS])),
+        ("light", of_links(light, [0.67, 1.19, 0.84, 0.56, 0.39, 0.29], 0.05, [0.02; JOINTS])),
     ]
 }
 

@@ -149,7 +149,7 @@ impl From<&Bound> for BoundObject {
     }
 }
 
-/// What a motion leaves of a torque limit, where that is the smallest share of it.
+/// The smallest share of a torque limit that a motion leaves unused, and where.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct MarginObject {
     /// What is left, % of the limit.

@@ -11,7 +11,7 @@ use super::Verdict;
 /// reaches the limit on its path.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// What is left of a torque limit, where that is the smallest share of it.
+/// The smallest share of a torque limit that a motion leaves unused, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
     /// What is left, % of the limit; negative where the torque is above it.

@@ -1383,7 +1383,7 @@ export interface components {
             /** @description Time of each row, s, 0 at the last one. */
             times_s: number[];
         };
-        /** @description What a motion leaves of a torque limit, where that is the smallest share of it. */
+        /** @description The smallest share of a torque limit that a motion leaves unused, and where. */
         MarginObject: {
             /**
              * Format: u-int8

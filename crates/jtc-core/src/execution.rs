@@ -1,12 +1,11 @@
 //! The execution of a trajectory (J-30 to J-36): from Execute to standstill, wherever that comes about.
 pub(crate) mod phase;
 
-use jtc_dynamics::sqrt;
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
 use crate::hold_back::{HoldBack, Next};
-use crate::motion;
+use crate::motion::{self, ControlMode, LawInputs};
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
@@ -15,7 +14,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Execute from Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        if !self.near(&first) {
+        // Joints that are enabled later are looked at again then.
+        if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.clock = PathClock::default();
@@ -35,21 +35,34 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Execute from Pause: at the paused point only.
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
         let paused = self.path_point();
-        if !self.near(&paused) {
-            return Err(DataStatus::StartPositionMismatch);
-        }
+        let there = self.motion.set.point.position == paused;
+        let approach = if self.near(&paused) { self.approach_to(&paused) } else { None };
+        let approach = approach.ok_or(DataStatus::StartPositionMismatch)?;
         self.braking_ms = None;
         self.motion.hold_back = HoldBack::default();
         self.phase = if self.clock.time == 0.0 || self.parameters.blend_left_ms() > 0 {
             Phase::BEGIN
-        } else if self.motion.set.point.position == paused {
+        } else if there {
             self.go_on();
             Phase::Running { leave: None }
         } else {
-            Phase::approach(self.motion.set.point.position)
+            approach
         };
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
+    }
+
+    /// How the arm gets from where it is held to the point of the path at which it begins or goes on; `None` where the torque limits leave too
+    /// little for an approach. Without a distance there is none to the first point.
+    fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
+        let from = self.motion.set.point.position;
+        if from == *point && self.clock.time == 0.0 {
+            return Some(Phase::AtStart);
+        }
+        let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
+        self.motion.ramp.begin(nodes, config, parameters.dynamics);
+        let inputs = LawInputs { mode: ControlMode::Approach, braking: false, nodes, config, parameters };
+        Some(Phase::approach(from, self.motion.approach_ms(point, &inputs)?))
     }
 
     /// From standstill on the path to the speed that is set.
@@ -142,26 +155,27 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
                     }
-                } else if self.near(&self.path_point()) {
-                    self.phase = Phase::approach(self.motion.set.point.position);
                 } else {
-                    self.set_trajectory(TrajectoryState::Stop);
+                    let to = self.path_point();
+                    match if self.near(&to) { self.approach_to(&to) } else { None } {
+                        Some(phase) => self.phase = phase,
+                        None => self.set_trajectory(TrajectoryState::Stop),
+                    }
                 }
             }
-            Phase::Approaching { from, mut clock, leave } => {
+            Phase::Approaching { from, length_ms, mut clock, leave } => {
                 if clock.time == 0.0 {
                     // The arm was held until now, without friction compensation.
                     self.motion.law.change_mode();
                 }
-                let length = self.approach_ms(&from);
-                clock.advance(length);
-                let at = motion::approach(&from, &self.path_point(), clock.time / length, length);
+                clock.advance(length_ms);
+                let at = motion::approach(&from, &self.path_point(), clock.time / length_ms, length_ms);
                 self.motion.approach(&at, &mut clock, &self.config);
-                let arrived = clock.time >= length;
+                let arrived = clock.time >= length_ms;
                 if let Some(trajectory) = leave.filter(|_| arrived || clock.standing()) {
                     self.set_trajectory(trajectory);
                 } else if !arrived {
-                    self.phase = Phase::Approaching { from, clock, leave };
+                    self.phase = Phase::Approaching { from, length_ms, clock, leave };
                 } else if self.clock.time == 0.0 {
                     self.phase = Phase::AtStart;
                 } else {
@@ -170,6 +184,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
             Phase::AtStart => {
+                self.motion.law.change_mode();
                 self.clock = PathClock::start(self.config.speed);
                 self.phase = Phase::Running { leave: None };
                 self.follow();
@@ -189,19 +204,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
         }
-    }
-
-    /// Time for the approach from where the arm is held, ms: that of a ramp, or as long as velocity and acceleration limits ask.
-    fn approach_ms(&self, from: &[f64; JOINTS]) -> f64 {
-        let to = self.path_point();
-        let mut length = f64::from(self.config.ramp_ms.max(1));
-        for (j, limits) in self.config.joints.iter().enumerate() {
-            // A minimum-jerk polynomial has 15/8 of its mean velocity, and 5.774 ways over the square of its time.
-            let way = (to[j] - from[j]).abs();
-            length = length.max(1_875.0 * way / limits.velocity_max);
-            length = length.max(1_000.0 * sqrt(5.774 * way / limits.acceleration_max));
-        }
-        length
     }
 
     /// Set values at the present path time.

@@ -12,6 +12,7 @@ use jtc_wire::{
 use crate::controller::Controller;
 use crate::defaults;
 use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::motion::{ControlMode, LawInputs};
 use crate::recorder::LogRequest;
 use crate::settings::{self, Live};
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
@@ -192,11 +193,29 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // There is nothing to end.
             return Ok(());
         }
-        if !set.jogging() {
-            self.motion.law.change_mode();
+        let jogging = set.jogging();
+        if wanted == [0.0; JOINTS] {
+            self.motion.set.end_jog();
+            return Ok(());
         }
-        self.motion.set.jog(&wanted);
-        Ok(())
+        let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
+        self.motion.ramp.begin(nodes, config, parameters.dynamics);
+        let inputs = LawInputs { mode: ControlMode::Approach, braking: false, nodes, config, parameters };
+        match self.motion.jog_room(&wanted, &inputs) {
+            Some(room) => {
+                if !jogging {
+                    self.motion.law.change_mode();
+                }
+                self.motion.set.jog(&room.velocity, &room.acceleration, config);
+                Ok(())
+            }
+            // It comes to rest where the limit is, and then nothing is left for it.
+            None if jogging => {
+                self.motion.set.end_jog();
+                Ok(())
+            }
+            None => Err(DataStatus::NotAllowed),
+        }
     }
 
     fn holds_at_rest(&self) -> bool {

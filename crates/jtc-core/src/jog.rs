@@ -14,17 +14,29 @@ use crate::{DT, JOINTS};
 pub(crate) const LASTS_MS: u16 = 200;
 /// Highest acceleration, as a share of the joint's limit.
 const ACCELERATION: f64 = 0.2;
-/// Time in which the acceleration gets there, s.
+/// Time in which that acceleration is reached, s.
 const RISE_S: f64 = 0.1;
+
+/// Highest acceleration of a joint where the torque limits leave enough for it, rad/s².
+pub(crate) fn hardest(limits: &JointConfig) -> f64 {
+    ACCELERATION * limits.acceleration_max
+}
 
 /// One joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct JointJog {
     /// Commanded velocity, rad/s.
     wanted: f64,
+    /// Highest acceleration, rad/s².
+    most: f64,
     /// Of the set values, rad/s and rad/s².
     velocity: f64,
     acceleration: f64,
+}
+
+/// How fast the acceleration of a joint changes, rad/s³.
+fn jerk(limits: &JointConfig) -> f64 {
+    hardest(limits) / RISE_S
 }
 
 /// All joints, from the first command until they rest.
@@ -37,7 +49,7 @@ pub(crate) struct Jog {
     clock: PathClock,
 }
 
-remembered!(JointJog { wanted, velocity, acceleration });
+remembered!(JointJog { wanted, most, velocity, acceleration });
 remembered!(Jog { joints, silent_ms, clock });
 
 impl Jog {
@@ -46,17 +58,31 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// New velocities, rad/s. Those that come on the way to rest count when the joints stand.
-    pub fn command(&mut self, wanted: &[f64; JOINTS]) {
+    /// New velocities, rad/s, and the highest accelerations, rad/s². Those that come on the way to rest count when the joints stand.
+    pub fn command(
+        &mut self,
+        wanted: &[f64; JOINTS],
+        acceleration: &[f64; JOINTS],
+        position: &[f64; JOINTS],
+        config: &Config,
+    ) {
         self.silent_ms = 0;
-        for (joint, wanted) in self.joints.iter_mut().zip(wanted) {
-            joint.wanted = *wanted;
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            joint.wanted = wanted[j];
+            // A joint that is too fast to stop in its range that softly stops as before.
+            let (softer, jerk) = (JointJog { most: acceleration[j], ..*joint }, jerk(&config.joints[j]));
+            let (low, high) = config.position_range(j);
+            let rest = position[j] + softer.stopping_way(jerk);
+            if softer.most > joint.most || (low <= rest && rest <= high) {
+                *joint = softer;
+            }
         }
     }
 
     /// The joints come to rest.
     pub fn end(&mut self) {
-        self.command(&[0.0; JOINTS]);
+        self.silent_ms = 0;
+        self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
     /// A tick begins. Returns whether all joints begin to come to rest with it.
@@ -124,15 +150,15 @@ impl JointJog {
         tick: f64,
         goes: bool,
     ) {
-        let most = ACCELERATION * limits.acceleration_max;
+        let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
         // As wanted, as long as the joint could still stop inside its range from there.
-        let onward = self.toward(wanted, most, limits.velocity_max, tick);
-        let way = self.way(&onward, tick) + onward.stopping_way(most);
+        let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
+        let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
         let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
-        let next = if onward_fits { onward } else { self.toward(0.0, most, limits.velocity_max, tick) };
+        let next = if onward_fits { onward } else { self.toward(0.0, jerk, limits.velocity_max, tick) };
         // Never out of the range; from outside only back into it.
         let reached = *position + self.way(&next, tick);
         let within = reached.max(low.min(*position)).min(high.max(*position));
@@ -145,18 +171,17 @@ impl JointJog {
         0.5 * (self.velocity + next.velocity) * tick
     }
 
-    /// So long (s) later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²), and never faster than
-    /// `fastest` (rad/s).
-    fn toward(&self, target: f64, most: f64, fastest: f64, tick: f64) -> Self {
+    /// So long (s) later, on the way to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster than `fastest` (rad/s).
+    fn toward(&self, target: f64, jerk: f64, fastest: f64, tick: f64) -> Self {
         if tick <= 0.0 {
             return *self;
         }
-        let round = most / RISE_S * tick;
+        let round = jerk * tick;
         let left = target - self.velocity;
         // The acceleration from which the rest of the way to that velocity just suffices to take it back.
         let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
-            flat.min(most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
+            flat.min(self.most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
         let arrives = next.abs() <= 1.5 * round && left.abs() <= (1.5 * round * tick).max(next.abs() * tick);
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
@@ -170,10 +195,9 @@ impl JointJog {
         }
     }
 
-    /// The way until it stands, rad, when it stops at once: the acceleration falls to `-most` as steadily as it may, stays there, and
-    /// rises to zero as steadily. A little more, for what the ticks make of it.
-    fn stopping_way(&self, most: f64) -> f64 {
-        let jerk = most / RISE_S;
+    /// The way until it stands, rad, when it stops at once: the acceleration falls to its highest, against the motion, with this `jerk`
+    /// (rad/s³), stays there, and rises to zero as steadily. A little more, for what the ticks make of it.
+    fn stopping_way(&self, jerk: f64) -> f64 {
         let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
         let (v, a) = if sign < 0.0 {
             (-self.velocity, -self.acceleration)
@@ -182,8 +206,9 @@ impl JointJog {
         };
         // From where its acceleration is zero: still to come while it gets faster, behind it while it brakes.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
-        let rest = if peak >= most * RISE_S {
-            0.5 * peak * (peak / most + RISE_S)
+        let rise = self.most / jerk;
+        let rest = if peak >= self.most * rise {
+            0.5 * peak * (peak / self.most + rise)
         } else {
             peak * sqrt(peak / jerk)
         };
@@ -204,6 +229,12 @@ mod tests {
         Config::avena()
     }
 
+    /// A command without a bound by torque.
+    fn command(jog: &mut Jog, wanted: &[f64; JOINTS], position: &[f64; JOINTS], config: &Config) {
+        let acceleration = core::array::from_fn(|j| hardest(&config.joints[j]));
+        jog.command(wanted, &acceleration, position, config);
+    }
+
     /// A tick that moves `position` on, of joints without inertia: their velocities and accelerations.
     fn tick(jog: &mut Jog, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
         let mut point = SetPoint::still(*position);
@@ -221,7 +252,11 @@ mod tests {
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
             commands in prop::collection::vec(
-                (prop_oneof![4 => prop::array::uniform6(-1.0..1.0f64), 1 => Just([0.0; JOINTS])], 1u32..400),
+                (
+                    prop_oneof![4 => prop::array::uniform6(-1.0..1.0f64), 1 => Just([0.0; JOINTS])],
+                    prop_oneof![Just(1.0), 0.02..1.0f64],
+                    1u32..400,
+                ),
                 1..20,
             ),
         ) {
@@ -232,9 +267,9 @@ mod tests {
                 position[j] = 0.5 * (low + high) + 0.5 * start[j] * (high - low);
             }
             let mut last = ([0.0; JOINTS], [0.0; JOINTS]);
-            let mut check = |jog: &mut Jog| {
-                let (before, was_ramping) = (position, jog.clock.ramping());
-                let (v, a) = tick(jog, &mut position, &config);
+            let mut check = |jog: &mut Jog, position: &mut [f64; JOINTS]| {
+                let (before, was_ramping) = (*position, jog.clock.ramping());
+                let (v, a) = tick(jog, position, &config);
                 let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
@@ -255,18 +290,20 @@ mod tests {
                 }
                 last = (v, a);
             };
-            for (share, ticks) in commands {
-                jog.command(&core::array::from_fn(|j| share[j] * config.joints[j].velocity_max));
+            for (share, soft, ticks) in commands {
+                let wanted = core::array::from_fn(|j| share[j] * config.joints[j].velocity_max);
+                let acceleration = core::array::from_fn(|j| soft * hardest(&config.joints[j]));
+                jog.command(&wanted, &acceleration, &position, &config);
                 for _ in 0..ticks {
-                    check(&mut jog);
+                    check(&mut jog, &mut position);
                 }
             }
             for _ in 0..LASTS_MS {
-                check(&mut jog);
+                check(&mut jog, &mut position);
             }
             let mut ticks = 0;
             while !jog.rests() {
-                check(&mut jog);
+                check(&mut jog, &mut position);
                 ticks += 1;
                 assert!(ticks <= 520, "{jog:?}");
             }
@@ -343,18 +380,18 @@ mod tests {
             };
             let (mut jog, mut position) = (Jog::begin(), [0.0; JOINTS]);
             position[joint] = if up { 0.9 * low + 0.1 * high } else { 0.1 * low + 0.9 * high };
-            jog.command(&at(before));
+            command(&mut jog, &at(before), &position, &config);
             for ms in 0..60 {
                 prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms before", 60 - ms);
             }
             for ends_ms in 1..1_300 {
-                jog.command(&at(1.0 - below));
+                command(&mut jog, &at(1.0 - below), &position, &config);
                 prop_assert_eq!(step(&mut jog, &mut position), Ok(()), "{} ms", ends_ms);
                 let (mut ended, mut there) = (jog, position);
                 match end {
                     End::Silence => {}
                     End::Stop => ended.end(),
-                    End::Rate(share) => ended.command(&at(share)),
+                    End::Rate(share) => command(&mut ended, &at(share), &there, &config),
                 }
                 for ms in 0..AFTER {
                     prop_assert_eq!(step(&mut ended, &mut there), Ok(()), "{} ms after {} ms", ms, ends_ms);
@@ -368,13 +405,13 @@ mod tests {
         let (config, mut jog, mut position) = (config(), Jog::begin(), [0.0; JOINTS]);
         let wanted = [0.5, -0.25, 1.5, -1.5, 0.01, 0.0];
         for _ in 0..800 {
-            jog.command(&wanted);
+            command(&mut jog, &wanted, &position, &config);
             tick(&mut jog, &mut position, &config);
         }
         assert_eq!(jog.joints.map(|joint| joint.velocity), wanted);
         assert_eq!(position[5], 0.0);
         for _ in 0..30_000 {
-            jog.command(&[1.0, -1.0, 1.5, -0.1, 0.5, 1.5]);
+            command(&mut jog, &[1.0, -1.0, 1.5, -0.1, 0.5, 1.5], &position, &config);
             tick(&mut jog, &mut position, &config);
         }
         for (j, up) in [true, false, true, false, true, true].into_iter().enumerate() {
@@ -391,7 +428,7 @@ mod tests {
         for (wanted, moves) in [(0.5, false), (-0.5, true)] {
             let (mut jog, mut position) = (Jog::begin(), [high + 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
             for _ in 0..100 {
-                jog.command(&[wanted, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                command(&mut jog, &[wanted, 0.0, 0.0, 0.0, 0.0, 0.0], &position, &config);
                 tick(&mut jog, &mut position, &config);
             }
             assert_eq!(position[0] < high + 0.1, moves);
@@ -405,7 +442,10 @@ mod tests {
         match end {
             End::Silence => {}
             End::Stop => jog.end(),
-            End::Rate(share) => jog.command(&[share * config.joints[0].velocity_max; JOINTS]),
+            End::Rate(share) => {
+                let wanted = [share * config.joints[0].velocity_max; JOINTS];
+                command(&mut jog, &wanted, &position, config);
+            }
         }
         let mut ticks = 0;
         while !jog.rests() && ticks < 2_000 {
@@ -422,7 +462,7 @@ mod tests {
             for share in [0.02, 0.3, 0.7, 1.0] {
                 let (mut jog, mut position) = (Jog::begin(), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
                 for _ in 0..1_500 {
-                    jog.command(&[share * fastest, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                    command(&mut jog, &[share * fastest, 0.0, 0.0, 0.0, 0.0, 0.0], &position, &config);
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
@@ -459,12 +499,12 @@ mod tests {
             let six = |[a, b]: [f64; 2]| [a, b, 0.0, 0.0, 0.0, 0.0];
             let slow = acceleration_max < 10.0;
             for _ in 0..if slow { 3_500 } else { 1_000 } {
-                jog.command(&six([1.0, 0.0]));
+                command(&mut jog, &six([1.0, 0.0]), &position, &config);
                 tick(&mut jog, &mut position, &config);
             }
             let (mut last, mut stands) = (f64::INFINITY, false);
             for ms in 0..2_500 {
-                jog.command(&six(if ms < ends_ms { [0.0; 2] } else { then }));
+                command(&mut jog, &six(if ms < ends_ms { [0.0; 2] } else { then }), &position, &config);
                 let (v, a) = tick(&mut jog, &mut position, &config);
                 stands |= v == [0.0; JOINTS];
                 if !stands {

@@ -6,6 +6,7 @@ mod commanded;
 mod law;
 mod limiter;
 mod ramp;
+mod room;
 mod set_values;
 mod torque;
 mod transfer;
@@ -114,11 +115,10 @@ impl Motion {
         }
     }
 
-    /// A tick of the approach, of which `at` are the full-speed values at the time of its clock. The law is given the acceleration of the
-    /// clock's ramp, and leaves that of the approach itself to the feedback.
+    /// A tick of the approach, of which `at` are the full-speed values at the time of its clock.
     pub fn approach(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         self.ramp.step(at, &self.law, clock, config);
-        self.set.follow(&SetPoint { acceleration: [0.0; JOINTS], ..*at }, clock.rate, clock.slope);
+        self.set.follow(at, clock.rate, clock.slope);
     }
 
     /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).

@@ -1,9 +1,11 @@
 //! On the way to the path, and on the way from it: what is remembered of a motion must not outlive its place.
+mod plant;
 mod rig;
 
-use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
+use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
-use rig::{Rig, floats, model_body, segment_body};
+use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
+use rig::{Rig, floats, model_body, raw, segment_body};
 
 /// A motion at 0.1 rad/s at most, at rest at both ends.
 fn points() -> Vec<RawPoint> {
@@ -152,6 +154,102 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
             assert_eq!(rig.errors(), 0);
         }
+    }
+}
+
+/// An arm of metal with a load that the controller knows, in random poses, beside the first point by as much as it may be: by 0.02 rad, and by
+/// 0.3 rad with a wide tolerance. No torque gets to its limit on the approach. Where Execute is refused, little is left.
+#[test]
+fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
+    let seed = 13;
+    println!("seed {seed}");
+    let mut random = Random(seed);
+    let (mut refused, mut most, mut longest) = (0, 0.0_f64, 0);
+    for trial in 0..500 {
+        let mass = [0.0, 2.0, 4.0][trial % 3];
+        let (pose, standing) = pose(&mut random, mass, 0.97);
+        let tolerance = [0.02, 0.3][trial % 2];
+        let payload = Payload { mass, ..Payload::NONE };
+        let config = Config { payload, start_tolerance_rad: tolerance, ..Config::avena() };
+        let ranges: [_; 6] = core::array::from_fn(|j| config.position_range(j));
+        let mut arm = Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), pose);
+        let mut rig = arm.holding(config);
+        arm.brakes = false;
+        arm.run(&mut rig, 500);
+        let mut rest = RawPoint::default();
+        for (j, (low, high)) in ranges.into_iter().enumerate() {
+            let aside = 0.95 * tolerance * random.between(-1.0, 1.0);
+            rest.position[j] = raw((arm.q[j] + aside).clamp(low, high), 3.141592);
+        }
+        rig.send(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest; 10]));
+        arm.run(&mut rig, 100);
+        let about =
+            format!("trial {trial}: {mass} kg, {tolerance} rad from {pose:.2?}, {standing:.2?} at rest");
+        rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
+        let (mut highest_torque, mut ticks) = (0.0_f64, 0);
+        arm.run(&mut rig, 5);
+        if rig.trajectory() == TrajectoryState::Stop {
+            refused += 1;
+            assert!(highest(&standing) > 0.75, "{about}: refused");
+            continue;
+        }
+        while rig.trajectory() == TrajectoryState::Execute {
+            arm.tick(&mut rig);
+            assert_eq!(rig.errors(), 0, "{about}");
+            highest_torque = highest_torque.max(highest(&shares(&rig.torque)));
+            ticks += 1;
+        }
+        assert_eq!(rig.trajectory(), TrajectoryState::Finish, "{about}");
+        assert!(highest_torque < 0.995, "{about}: {highest_torque} of a limit after {ticks} ms");
+        (most, longest) = (most.max(highest_torque), longest.max(ticks));
+    }
+    println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
+}
+
+/// A joint that stands at 98 % of its limit, and whose friction needs more than is left, does not set out: Execute is refused (8), as it is for an
+/// arm that stands elsewhere.
+#[test]
+fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
+    let holds = Parameters::avena().model;
+    let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
+    let standing = plant::standing(&holds, &pose)[1];
+    for (share, answer) in [(0.5, DataStatus::NoError), (0.98, DataStatus::StartPositionMismatch)] {
+        let mut config = Config::avena();
+        config.joints[1].torque_max = standing.abs() / share;
+        let mut rig = Rig::new(config);
+        rig.follow = false;
+        for (node, q) in rig.nodes.iter_mut().zip(pose) {
+            node.report.position = q;
+        }
+        rig.defaults();
+        rig.run(1_500);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+        let mut rest = RawPoint::default();
+        rest.position = pose.map(|q| raw(q, 3.141592));
+        // Upwards, against gravity.
+        rest.position[1] -= raw(0.015, 3.141592);
+        assert_eq!(
+            rig.ask(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest; 10])),
+            DataStatus::NoError
+        );
+        assert_eq!(rig.exec(ExecCommand::Execute), answer, "{share}");
+        rig.run(300);
+        let stays = rig.trajectory() == TrajectoryState::Stop;
+        assert_eq!(stays, answer != DataStatus::NoError, "{share}");
+    }
+}
+
+/// An arm that stands at the first point sets out at once.
+#[test]
+fn j34_without_a_distance_there_is_no_approach() {
+    for (aside, counts) in [(0, true), (1, false)] {
+        let mut rig = Rig::holding();
+        let mut path = points();
+        path.iter_mut().for_each(|point| point.position[0] = aside);
+        rig.execute(&path);
+        rig.until(100, |rig| rig.state() == ControllerState::Operate);
+        rig.run(100);
+        assert_eq!(rig.controller.telemetry().point > 0, counts, "{aside}");
     }
 }
 

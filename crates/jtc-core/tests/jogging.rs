@@ -1,9 +1,14 @@
 //! Jogs at the velocity limit, through the whole controller (J-58).
+mod plant;
 mod rig;
 
-use jtc_core::{Config, ControllerState};
+use jtc_core::{Config, ControllerState, Parameters, Payload};
 use jtc_wire::{DataStatus, FrameType, UrgentCommand};
+use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats};
+
+/// Random poses; 500 of them were tried.
+const TRIALS: usize = 500;
 
 /// What ends a jog while the joint still accelerates.
 #[derive(Clone, Copy, Debug)]
@@ -152,5 +157,118 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
         assert_eq!(rig.ask(FrameType::Jog, &body(0.02)), DataStatus::NoError);
         rig.run(100);
         assert!(rig.controller.telemetry().joints[0].set_velocity > 0.0);
+    }
+}
+
+/// An arm of metal with a load that the controller knows, in random poses, jogged at any rate: one joint at its limit, or all. No torque gets
+/// to its limit, and the arm stands in time. Where a jog is refused, little is left.
+#[test]
+fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
+    let seed = 11;
+    println!("seed {seed}");
+    let mut random = Random(seed);
+    let (mut refused, mut most) = (0, 0.0_f64);
+    for trial in 0..TRIALS {
+        let mass = [0.0, 2.0, 4.0][trial % 3];
+        let (pose, standing) = pose(&mut random, mass, 0.95);
+        let config = Config { payload: Payload { mass, ..Payload::NONE }, ..Config::avena() };
+        let limits = config.joints;
+        let mut arm = Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), pose);
+        let mut rig = arm.holding(config);
+        arm.brakes = false;
+        arm.run(&mut rig, 500);
+        let single = random.next() < 0.6;
+        let chosen = (random.between(0.0, 6.0) as usize).min(5);
+        let rates: [f32; 6] = core::array::from_fn(|j| {
+            let rate = limits[j].velocity_max * random.between(-1.0, 1.0);
+            match single {
+                true if j == chosen => (limits[j].velocity_max.copysign(rate)) as f32,
+                true => 0.0,
+                false => rate as f32,
+            }
+        });
+        let (ms, stops) = (random.between(200.0, 1_600.0) as usize, random.next() < 0.5);
+        let about = format!("trial {trial}: {mass} kg, {rates:.2?} for {ms} ms from {pose:.2?}");
+        let mut highest_torque = 0.0_f64;
+        let mut tick = |arm: &mut Plant, rig: &mut Rig| {
+            arm.tick(rig);
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
+            highest_torque = highest_torque.max(highest(&shares(&rig.torque)));
+        };
+        if rig.ask(FrameType::Jog, &floats(rates)) != DataStatus::NoError {
+            refused += 1;
+            assert!(highest(&standing) > 0.8, "{about}: refused at {standing:.2?}");
+            continue;
+        }
+        for k in 0..ms {
+            if k % 50 == 0 {
+                rig.send(FrameType::Jog, &floats(rates));
+            }
+            tick(&mut arm, &mut rig);
+        }
+        rig.send(FrameType::Jog, &floats([0.0; 6]));
+        if stops {
+            rig.urgent(0, UrgentCommand::Stop);
+        }
+        for k in 0..900 {
+            tick(&mut arm, &mut rig);
+            let set = rig.controller.telemetry().joints.map(|joint| joint.set_velocity);
+            assert!(k < 520 || set == [0.0; 6], "{about}: {set:?} after {k} ms");
+        }
+        assert!(highest_torque < 0.995, "{about}: {highest_torque} of a limit; {standing:.2?} at rest");
+        most = most.max(highest_torque);
+    }
+    println!("{refused} of {TRIALS} refused; at most {:.0} % of a torque limit", 100.0 * most);
+}
+
+/// Joint 2 takes nearly all of its limit to hold. It is not lifted, nor lowered to where it takes more, nor is joint 3 moved outwards; each of
+/// these is refused. It is lowered where that unloads it. With half of the limit left all is done as it is told.
+#[test]
+fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unloads_it_is_taken() {
+    let model = Parameters::avena().model;
+    let hold = |q: [f64; 6]| plant::standing(&model, &q)[1];
+    let moved =
+        |q: [f64; 6], j: usize, way: f64| core::array::from_fn(|k| if k == j { q[k] + way } else { q[k] });
+    // Stretched out above the horizontal, and bent below it: there joint 2 is unloaded when it is lowered.
+    let (above, below) = ([0.0, 1.2, 0.2, 0.0, 0.0, 0.0], [0.0, 1.4, -1.6, 0.0, 0.0, 0.0]);
+    let down = |q: [f64; 6]| -hold(q).signum();
+    assert!(hold(moved(above, 1, 0.1 * down(above))).abs() > hold(above).abs());
+    assert!(hold(moved(below, 1, 0.1 * down(below))).abs() < hold(below).abs());
+    let outwards = if hold(moved(above, 2, 0.1)).abs() > hold(above).abs() { 1.0 } else { -1.0 };
+    for (pose, share, joint, sign, moves) in [
+        (above, 0.999, 1, -down(above), false),
+        (above, 0.999, 1, down(above), false),
+        (above, 0.999, 2, outwards, false),
+        (below, 0.999, 1, -down(below), false),
+        (below, 0.999, 1, down(below), true),
+        (above, 0.5, 1, -down(above), true),
+        (above, 0.5, 2, outwards, true),
+    ] {
+        let mut config = Config { delay_ticks: 1, ..Config::avena() };
+        config.joints[1].torque_max = hold(pose).abs() / share;
+        let mut rig = Rig::new(config);
+        rig.follow = false;
+        for (node, q) in rig.nodes.iter_mut().zip(pose) {
+            node.report.position = q;
+        }
+        rig.defaults();
+        rig.run(1_500);
+        rig.follow = true;
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+        let mut rates = [0.0f32; 6];
+        rates[joint] = 0.3 * sign as f32;
+        let about = format!("{share} of the limit, joint {} at {}", joint + 1, rates[joint]);
+        let answer = if moves { DataStatus::NoError } else { DataStatus::NotAllowed };
+        assert_eq!(rig.ask(FrameType::Jog, &floats(rates)), answer, "{about}");
+        for tick in 0..1_000 {
+            if tick % 50 == 0 && moves {
+                rig.send(FrameType::Jog, &floats(rates));
+            }
+            rig.tick();
+        }
+        let speed = rig.controller.telemetry().joints[joint].set_velocity * sign;
+        assert_eq!(speed > 0.0, moves, "{about}: {speed}");
+        assert!(share > 0.9 || speed > 0.29, "{about}: {speed}");
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
     }
 }

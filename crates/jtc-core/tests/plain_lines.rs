@@ -52,7 +52,9 @@ fn places() -> Vec<(&'static str, Rig)> {
     places.push(("waiting for a drive", waiting));
     for ms in [1, 100, 199] {
         let mut blend = Rig::holding();
-        blend.execute(&path());
+        let mut beside = path();
+        beside.iter_mut().for_each(|point| point.position[1] += 100);
+        blend.execute(&beside);
         blend.until(400, |rig| rig.state() == ControllerState::Operate);
         blend.run(ms);
         assert_eq!(blend.controller.telemetry().point, 0);

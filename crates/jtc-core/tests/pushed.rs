@@ -3,24 +3,9 @@ mod plant;
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
-use jtc_dynamics::Dynamics;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
-use plant::{LuGre, POSES, Plant, heavier, loaded};
+use plant::{LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
-
-/// Reproducible pseudo-random numbers.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-}
 
 /// A motion from one position to another in `seconds`, of 100 points.
 fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
@@ -50,11 +35,6 @@ fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
 
 const LIMITS: fn(usize) -> f64 = |joint| Config::avena().joints[joint].torque_max;
 
-/// Torque that `model` needs to hold `q`, N·m.
-fn gravity(model: &jtc_dynamics::ArmModel, q: &[f64; 6]) -> [f64; 6] {
-    Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
-}
-
 /// An arm without brakes that a rig has held for a while.
 fn held(model: &jtc_dynamics::ArmModel, friction: [LuGre; 6], pose: [f64; 6]) -> (Plant, Rig) {
     let mut arm = Plant::new(model, friction, pose);
@@ -77,7 +57,7 @@ fn push_at_random(seed: u64, moving: bool) {
         let (pose, joint) = (POSES[trial % 4], trial % 6);
         let model = heavier(Parameters::avena().model, random.between(0.9, 1.1));
         let friction = LuGre::of_avena_times(random.between(0.8, 1.2));
-        let left = 0.95 * LIMITS(joint) - 1.1 * gravity(&model, &pose)[joint].abs();
+        let left = 0.95 * LIMITS(joint) - 1.1 * standing(&model, &pose)[joint].abs();
         let push = random.between(0.6, 1.0) * left * if random.next() < 0.5 { -1.0 } else { 1.0 };
         let ms = random.between(50.0, 1_000.0) as usize;
         let to: [f64; 6] = core::array::from_fn(|j| 0.8 * pose[j] + random.between(-0.6, 0.6));
@@ -148,7 +128,7 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
                 // A joint that the wall throws back is braked.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
-                    most = most.max((rig.torque[joint] - gravity(&model, &arm.q)[joint]) * sign);
+                    most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
             }
             let (met, noticed) = (met.expect(&about), noticed.expect(&about));
@@ -179,7 +159,7 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
         let hand = begun - f64::from(k) * 0.2e-3;
         arm.push[1] = 3_000.0 * (hand - arm.q[1]);
         arm.tick(&mut rig);
-        let against = (rig.torque[1] - gravity(&model, &arm.q)[1]).abs();
+        let against = (rig.torque[1] - standing(&model, &arm.q)[1]).abs();
         assert!(k < 300 || against < 0.3 * LIMITS(1) + 12.0, "{k} ms: {against} N·m");
         assert_eq!(rig.state(), ControllerState::HoldPos, "{k} ms");
     }
@@ -197,7 +177,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
     for pose in POSES {
         let needs = |mass: f64| {
-            let gravity = gravity(&model(mass), &pose);
+            let gravity = standing(&model(mass), &pose);
             (0..6).map(|j| (gravity[j] / LIMITS(j)).abs()).fold(0.0, f64::max)
         };
         for (share, friction) in
@@ -266,7 +246,7 @@ fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
     println!("seed 21");
     let mut random = Random(21);
     let config = Config::avena();
-    let dynamics = Dynamics::new(&Parameters::avena().model, config.gravity);
+    let dynamics = jtc_dynamics::Dynamics::new(&Parameters::avena().model, config.gravity);
     for (friction, mass, finish) in
         [(1.0, 1.0, 16), (1.2, 1.1, 12), (1.5, 1.0, 5), (1.0, 1.2, 12), (2.0, 1.0, 0)]
     {

@@ -9,9 +9,9 @@ use crate::{JOINTS, TrajectoryState};
 pub(crate) enum Phase {
     /// Waits until every joint is enabled, and for how long it has, ms.
     Waiting { elapsed_ms: u32 },
-    /// The approach: from where the arm is held to the first point, or to the one where the path was paused. Its time runs on a clock of
-    /// its own; `leave`: the state that follows at standstill.
-    Approaching { from: [f64; JOINTS], clock: PathClock, leave: Option<TrajectoryState> },
+    /// The approach: from where the arm is held to the first point, or to the one where the path was paused, in `length_ms`. Its time runs
+    /// on a clock of its own; `leave`: the state that follows at standstill.
+    Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
     AtStart,
     /// On the path; `leave`: the state that follows at standstill.
@@ -29,8 +29,9 @@ impl Remembered for Phase {
         to.put(kind, 2);
         match self {
             Self::Waiting { elapsed_ms } => elapsed_ms.write(to),
-            Self::Approaching { from, clock, leave } => {
+            Self::Approaching { from, length_ms, clock, leave } => {
                 from.write(to);
+                length_ms.write(to);
                 clock.write(to);
                 leave.write(to);
             }
@@ -44,8 +45,9 @@ impl Remembered for Phase {
             0 => Self::Waiting { elapsed_ms: Remembered::read(from) },
             1 => {
                 let start = Remembered::read(from);
+                let length_ms = Remembered::read(from);
                 let clock = Remembered::read(from);
-                Self::Approaching { from: start, clock, leave: Remembered::read(from) }
+                Self::Approaching { from: start, length_ms, clock, leave: Remembered::read(from) }
             }
             2 => Self::AtStart,
             _ => Self::Running { leave: Remembered::read(from) },
@@ -57,9 +59,9 @@ impl Phase {
     /// Nothing was waited for yet.
     pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
-    /// Sets out from where the arm is held.
-    pub fn approach(from: [f64; JOINTS]) -> Self {
-        Self::Approaching { from, clock: PathClock::start(1.0), leave: None }
+    /// Sets out from where the arm is held, for so long.
+    pub fn approach(from: [f64; JOINTS], length_ms: f64) -> Self {
+        Self::Approaching { from, length_ms, clock: PathClock::start(1.0), leave: None }
     }
 
     /// The control mode.

@@ -10,6 +10,13 @@ fn braking(state: ControllerState, trajectory: TrajectoryState) -> Controller<[R
     controller
 }
 
+/// Sets out from `position` (rad), where the arm is held.
+fn begin_approach(controller: &mut Controller<[RawPoint; 4]>, position: [f64; JOINTS]) {
+    controller.motion.set.begin_at(&position);
+    let point = controller.path_point();
+    controller.phase = controller.approach_to(&point).expect("an approach");
+}
+
 /// What braking excuses (J-43) it does not excuse for longer than the arm moves.
 #[test]
 fn j33_braking_ends_where_the_arm_stands() {
@@ -128,7 +135,8 @@ fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     let leave = Some(TrajectoryState::Stop);
     assert_eq!(Phase::Running { leave }.leave(), leave);
     assert_eq!(
-        Phase::Approaching { from: [0.0; JOINTS], clock: PathClock::start(1.0), leave }.leave(),
+        Phase::Approaching { from: [0.0; JOINTS], length_ms: 200.0, clock: PathClock::start(1.0), leave }
+            .leave(),
         leave
     );
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
@@ -178,7 +186,7 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
         let mut clock = PathClock::start(1.0);
         clock.time = before;
-        controller.phase = Phase::Approaching { from: [0.0; JOINTS], clock, leave: None };
+        controller.phase = Phase::Approaching { from: [0.0; JOINTS], length_ms: length, clock, leave: None };
         controller.walk();
         assert_eq!(controller.phase == Phase::AtStart, arrives, "{before} ms");
     }
@@ -193,7 +201,7 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
         {
             let mut controller = halting_at(0.0);
             (controller.clock, controller.braking_ms) = (PathClock::default(), None);
-            controller.phase = Phase::approach([way, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            begin_approach(&mut controller, [way, 0.0, 0.0, 0.0, 0.0, 0.0]);
             for _ in 0..after_ms {
                 controller.walk();
             }
@@ -225,7 +233,7 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
 #[test]
 fn j33_a_stop_before_the_approach_moves_nothing() {
     let mut controller = halting_at(0.0);
-    controller.phase = Phase::approach([0.01; JOINTS]);
+    begin_approach(&mut controller, [0.01; JOINTS]);
     let before = controller.motion.set.point.position;
     controller.leave_path(ExecCommand::Stop);
     assert_eq!(
@@ -243,7 +251,13 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
         let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
         controller.config.joints[3].velocity_max = velocity_max;
         controller.config.joints[3].acceleration_max = acceleration_max;
-        let length = controller.approach_ms(&[0.0, 0.0, 0.0, way, 0.0, 0.0]) / 1_000.0;
+        let Some(Phase::Approaching { length_ms, .. }) =
+            controller.approach_to(&[0.0, 0.0, 0.0, way, 0.0, 0.0])
+        else {
+            assert_eq!(way, 0.0, "there is a way");
+            continue;
+        };
+        let length = length_ms / 1_000.0;
         // Its velocity and its acceleration, seen at a thousand places.
         let at = |u: f64| way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
         let step = 1e-3;

@@ -186,10 +186,15 @@ impl ControlLaw {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
 
+    /// Torque that the joint carries and the model lacks, N·m.
+    pub fn load(&self, joint: usize) -> f64 {
+        self.loads[joint].torque(self.torque[joint].pid.i)
+    }
+
     /// Torque by which the control law corrects that of the model and of the load, N·m: what a push has against it.
     pub fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
-        pid.p + pid.d + (pid.i - self.loads[joint].torque(pid.i))
+        pid.p + pid.d + (pid.i - self.load(joint))
     }
 
     /// Ends the yield of joints that are calm. Returns them: they are held where they are.
@@ -362,7 +367,10 @@ fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
 
 /// Torques that compensate friction at the commanded velocities, N·m, and joint errors: a velocity that the table has not (J-42).
 #[inline]
-fn compensation(inputs: &LawInputs<'_>, velocity: &[f64; JOINTS]) -> ([f64; JOINTS], [u16; JOINTS]) {
+pub(super) fn compensation(
+    inputs: &LawInputs<'_>,
+    velocity: &[f64; JOINTS],
+) -> ([f64; JOINTS], [u16; JOINTS]) {
     let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
     let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
     let celsius = |j: usize| friction::celsius(nodes.node(j).report.temperature);

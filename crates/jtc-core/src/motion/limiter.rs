@@ -113,9 +113,7 @@ impl Limiter {
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // What brakes a joint is no push against it; what presses one that stands is.
             let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // On the approach the feedback has to accelerate the joint.
-            let approaches = mode == ControlMode::Approach && !set.jogging();
-            let counts = strained & settled & !brakes & !yields & !approaches & (mode != ControlMode::Teach);
+            let counts = strained & settled & !brakes & !yields & (mode != ControlMode::Teach);
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
             let set_errors = limits::check_set(point, error, limits, mode == ControlMode::Follow);

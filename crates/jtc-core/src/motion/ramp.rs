@@ -38,6 +38,11 @@ impl PathRamp {
         core::array::from_fn(|j| self.inertia[j][j])
     }
 
+    /// Inertia that joint `j` feels when joint `k` accelerates, kg·m².
+    pub fn coupling(&self, j: usize, k: usize) -> f64 {
+        self.inertia[j][k]
+    }
+
     /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.
     pub fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {

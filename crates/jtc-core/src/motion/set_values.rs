@@ -75,9 +75,10 @@ impl SetValues {
         self.commanded.position(config.delay_ticks)
     }
 
-    /// Joint velocities to move at from now on, rad/s.
-    pub fn jog(&mut self, wanted: &[f64; JOINTS]) {
-        self.jog.get_or_insert_with(Jog::begin).command(wanted);
+    /// Joint velocities to move at from now on, rad/s, and the highest accelerations, rad/s².
+    pub fn jog(&mut self, wanted: &[f64; JOINTS], acceleration: &[f64; JOINTS], config: &Config) {
+        let jog = self.jog.get_or_insert_with(Jog::begin);
+        jog.command(wanted, acceleration, &self.point.position, config);
     }
 
     /// A tick of a jog begins. Returns whether it begins to come to rest with it.

@@ -76,6 +76,22 @@ impl LuGre {
     }
 }
 
+/// Reproducible pseudo-random numbers.
+pub struct Random(pub u64);
+
+impl Random {
+    /// Evenly distributed from 0 to 1.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Evenly distributed from `low` to `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
 /// Poses of the arm, rad: bent, and stretched out, where 4 kg are more than joint 2 can hold, and two more.
 pub const POSES: [[f64; 6]; 4] = [
     [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
@@ -83,6 +99,38 @@ pub const POSES: [[f64; 6]; 4] = [
     [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
     [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
 ];
+
+/// The share of its torque limit.
+pub fn shares(torque: &[f64; 6]) -> [f64; 6] {
+    let limits = Config::avena().joints.map(|joint| joint.torque_max);
+    core::array::from_fn(|j| torque[j].abs() / limits[j])
+}
+
+/// The highest of all joints.
+pub fn highest(shares: &[f64; 6]) -> f64 {
+    shares.iter().fold(0.0, |most, share| share.max(most))
+}
+
+/// A pose inside the ranges, rad, in which standing with a payload at the flange (kg) takes less than `most` of each limit, and what it takes.
+pub fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
+    let config = Config::avena();
+    let model = loaded(Parameters::avena().model, mass);
+    loop {
+        let pose = core::array::from_fn(|j| {
+            let (low, high) = config.position_range(j);
+            random.between(low + 0.05, high - 0.05)
+        });
+        let standing = shares(&standing(&model, &pose));
+        if highest(&standing) < most {
+            return (pose, standing);
+        }
+    }
+}
+
+/// Torque that `model` needs to hold `q`, N·m.
+pub fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
+    Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
+}
 
 /// The arm as it really is.
 pub struct Plant {

@@ -114,6 +114,10 @@ impl Diagnose for LinkError {
                     FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => Some(
                         "settings change without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
                     ),
+                    FrameType::Jog if *code == DataStatus::NotAllowed && *state == ControllerState::HoldPos => Some(
+                        "`jtc traj stop` ends a paused trajectory, `jtc clear` a held stop. Where neither is there, gravity leaves nothing of a \
+                         joint's torque limit for this direction: jog it the other way, or take payload off",
+                    ),
                     _ => None,
                 };
                 Diagnosis::new(ErrorKind::Device, "refused", next.unwrap_or_else(|| after_refusal(*code, *state)))
@@ -174,7 +178,8 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &
              are set absent"
         }
         (DataStatus::StartPositionMismatch, _) => {
-            "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
+            "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first. Where it is, a torque limit leaves too \
+             little for the rest of the way: begin in another pose, or take payload off"
         }
         _ => "`jtc explain` explains each code",
     }

@@ -30,7 +30,7 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.force(ControllerState::HoldPos);
-    bench.controller.motion.set.jog(&[0.1; JOINTS]);
+    bench.controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &Config::avena());
     assert_eq!(bench.at_once(Command::Disable), DataStatus::NotAllowed);
 }
 
@@ -124,7 +124,7 @@ fn j58_parameters_and_resets_wait_for_the_end_of_a_jog() {
     let mut bench = Bench::new();
     bench.force(ControllerState::HoldPos);
     bench.controller.motion.set.hold_for_test();
-    bench.controller.motion.set.jog(&[0.1; JOINTS]);
+    bench.controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &Config::avena());
     for command in [
         Command::FrictionPolynomialUseDefault,
         Command::FrictionTableUseDefault,

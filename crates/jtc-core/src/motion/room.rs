@@ -1,0 +1,156 @@
+//! The room that the torque limits leave for a motion from where the arm is held: how soon it can be at the first point of a path (J-34), and
+//! how hard and how fast it can be jogged (J-58). Gravity and the load found are taken at both ends of the motion, friction at its top speed.
+use jtc_dynamics::sqrt;
+
+use super::Motion;
+use super::law::{LawInputs, compensation};
+use crate::{JOINTS, jog};
+
+/// Highest share of a torque limit that an approach asks for; the feedback of a fast one takes up to a fifth.
+const APPROACH_TORQUE: f64 = 0.8;
+/// Share of what is left of a torque limit that a jog uses, and an approach where standing alone takes nearly all of the limit.
+const SHARE_OF_REST: f64 = 0.5;
+/// Longest time that torque limits may add to an approach, ms.
+const LONGER_MS: f64 = 2_000.0;
+/// Top speed of a minimum-jerk polynomial, in ways over its time, and its highest acceleration, in ways over the square of its time.
+const TOP_SPEED: f64 = 1.875;
+const TOP_ACCELERATION: f64 = 5.774;
+
+/// Time in which a jogged joint can come to rest with its share of what is left, s.
+const REST_S: f64 = 0.3;
+/// Speed below which friction may count for less than when the joint slides, rad/s: a jog that leaves nothing of a limit at the wanted speed may
+/// be possible at this one.
+const CREEP: f64 = 0.02;
+/// Highest speed that counts as none, rad/s.
+const NO_SPEED: f64 = 1e-3;
+/// Share of a torque limit that counts as left at least for a motion that unloads the joint.
+const UNLOADING: f64 = 0.01;
+/// Lowest share of a jog's acceleration.
+const LEAST_ACCELERATION: f64 = 0.02;
+
+/// How a jog is limited by what is left of the torque limits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JogRoom {
+    /// Velocities, rad/s: those that are wanted, or a share of them.
+    pub velocity: [f64; JOINTS],
+    /// Highest accelerations, rad/s².
+    pub acceleration: [f64; JOINTS],
+}
+
+impl Motion {
+    /// Time for the approach from where the arm is held to `to` (rad), ms: that of a ramp, or as long as velocity, acceleration and torque limits
+    /// ask; `None` where torque limits ask for more than 2 s beyond the others. For the inertia of a ramp that begins here.
+    pub fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
+        let config = inputs.config;
+        let from = &self.set.point.position;
+        let way: [f64; JOINTS] = core::array::from_fn(|j| to[j] - from[j]);
+        let mut shortest = f64::from(config.ramp_ms.max(1));
+        for (way, limits) in way.iter().zip(&config.joints) {
+            shortest = shortest.max(1_000.0 * TOP_SPEED * way.abs() / limits.velocity_max);
+            shortest = shortest.max(1_000.0 * sqrt(TOP_ACCELERATION * way.abs() / limits.acceleration_max));
+        }
+        let standing = [from, to].map(|q| self.standing(q, inputs));
+        // Long enough, if friction is that of an approach which takes `ms`.
+        let enough = |ms: f64| {
+            let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
+            let times = (0..JOINTS).map(|j| {
+                let limit = config.joints[j].torque_max;
+                let held = standing.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()));
+                let most = (APPROACH_TORQUE * limit).max(held + SHARE_OF_REST * (limit - held));
+                let left = most - highest(&standing, &friction, j);
+                let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * way[k]).sum();
+                if left > 0.0 { 1_000.0 * sqrt(TOP_ACCELERATION * push.abs() / left) } else { f64::INFINITY }
+            });
+            times.fold(shortest, f64::max)
+        };
+        let longest = shortest + LONGER_MS;
+        // A slower approach has less friction: where the friction of the fastest leaves too little, that of the slowest decides.
+        let time = enough(shortest);
+        if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
+    }
+
+    /// What is left for a jog at the `wanted` velocities (rad/s); `None` where nothing is left of a torque limit, and the jog needs more of it.
+    /// For the inertia of a ramp that begins here.
+    pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
+        let config = inputs.config;
+        let fastest = wanted.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let share = self.jog_speed(wanted, inputs);
+        let creeping = if share * fastest < CREEP && fastest > CREEP {
+            let slow = CREEP / fastest;
+            slow * self.jog_speed(&wanted.map(|v| slow * v), inputs)
+        } else {
+            0.0
+        };
+        let share = share.max(creeping);
+        if share < 1.0 && share * fastest <= NO_SPEED {
+            return None;
+        }
+        let velocity = wanted.map(|v| share * v);
+        let hardest = |j: usize| jog::hardest(&config.joints[j]);
+        // What already moves may have to slow down.
+        let moves = |j: usize| wanted[j] != 0.0 || self.set.point.velocity[j] != 0.0;
+        let needed = |j: usize| {
+            (0..JOINTS).filter(|&k| moves(k)).map(|k| self.ramp.coupling(j, k).abs() * hardest(k)).sum()
+        };
+        let share = self.least_share(&velocity, needed, inputs).max(LEAST_ACCELERATION);
+        Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
+    }
+
+    /// Share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of what is left there.
+    fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
+        let needed = |j: usize| {
+            (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
+        };
+        self.least_share(wanted, needed, inputs)
+    }
+
+    /// The share (0..1) of what is `needed` of each joint (N·m) that fits into its share of what a jog at `velocity` (rad/s) leaves of its limit.
+    fn least_share(
+        &self,
+        velocity: &[f64; JOINTS],
+        needed: impl Fn(usize) -> f64,
+        inputs: &LawInputs<'_>,
+    ) -> f64 {
+        let left = self.jog_leaves(velocity, inputs);
+        (0..JOINTS).fold(1.0, |share: f64, j| {
+            let needed = needed(j);
+            if needed > 0.0 { share.min((SHARE_OF_REST * left[j] / needed).max(0.0)) } else { share }
+        })
+    }
+
+    /// What a jog at `velocity` (rad/s) leaves of each torque limit, here and where the joint would come to rest, N·m.
+    fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
+        let config = inputs.config;
+        let here = &self.set.point.position;
+        // It goes on as long as a command lasts, and then comes to rest.
+        let ahead_s = f64::from(jog::LASTS_MS) / 1_000.0 + 0.5 * REST_S;
+        let rest = core::array::from_fn(|j| {
+            let (low, high) = config.position_range(j);
+            (here[j] + velocity[j] * ahead_s).max(low.min(here[j])).min(high.max(here[j]))
+        });
+        let standing = [here, &rest].map(|q| self.standing(q, inputs));
+        let friction = compensation(inputs, velocity).0;
+        core::array::from_fn(|j| {
+            let limit = config.joints[j].torque_max;
+            let left = limit - highest(&standing, &friction, j);
+            let [held, held_there] = standing.map(|torque| torque[j]);
+            // What lifts the joint takes more torque at first, also to where it then takes less to hold.
+            let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
+            let unloads = held_there.abs() < held.abs() && held * push < 0.0;
+            if unloads { left.max(UNLOADING * limit) } else { left }
+        })
+    }
+
+    /// Torques that hold the arm at `q` (rad): gravity, and the loads that were found.
+    fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
+        let gravity = inputs.parameters.dynamics.gravity_torque(q);
+        core::array::from_fn(|j| gravity[j] + self.law.load(j))
+    }
+}
+
+/// The highest torque of a joint that stands or moves steadily at the ends of a motion, N·m.
+fn highest(standing: &[[f64; JOINTS]; 2], friction: &[f64; JOINTS], j: usize) -> f64 {
+    standing
+        .iter()
+        .fold(0.0, |most: f64, torque| most.max(torque[j].abs()).max((torque[j] + friction[j]).abs()))
+}

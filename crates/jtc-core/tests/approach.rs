@@ -224,8 +224,7 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
         rig.defaults();
         rig.run(1_500);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
-        let mut rest = RawPoint::default();
-        rest.position = pose.map(|q| raw(q, 3.141592));
+        let mut rest = RawPoint { position: pose.map(|q| raw(q, 3.141592)), ..RawPoint::default() };
         // Upwards, against gravity.
         rest.position[1] -= raw(0.015, 3.141592);
         assert_eq!(

@@ -124,7 +124,7 @@ fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     };
     let (ideal, without, with) = (error(1.0, 1.0), error(1.0 / 1.3, 1.0), error(1.0 / 1.3, 1.3));
     for j in 0..6 {
-        assert!((with[j] / ideal[j] - 1.0).abs() < 0.02, "joint {}: {} for {}", j + 1, with[j], ideal[j]);
+        assert!((with[j] / ideal[j] - 1.0).abs() < 0.03, "joint {}: {} for {}", j + 1, with[j], ideal[j]);
     }
     let worst = |all: &[f64; 6]| all.iter().fold(0.0, |most: f64, x| most.max(*x));
     assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");

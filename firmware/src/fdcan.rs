@@ -49,7 +49,7 @@ impl ReceivedFrames {
 }
 
 /// Error counters of the controller, for the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counters {
     /// Transmit error counter.
     pub transmit: u8,

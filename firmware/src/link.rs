@@ -203,7 +203,8 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
     }
 }
 
-/// Logs what changed, at most once a second.
+/// Logs what changed, at most once a second. One number in each line: interrupts are masked while a line is written, and the tick has to begin
+/// in time.
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],
@@ -228,19 +229,25 @@ impl Report {
         }
         self.next = now + Duration::from_secs(1);
         let errors = [links[0].uart.errors(), links[1].uart.errors()];
-        if errors != self.line_errors {
-            self.line_errors = errors;
-            defmt::warn!("line errors: RS422 {=u32}, USB {=u32}", errors[0], errors[1]);
+        let last = core::mem::replace(&mut self.line_errors, errors);
+        if errors[0] != last[0] {
+            defmt::warn!("line errors, RS422: {=u32}", errors[0]);
+        }
+        if errors[1] != last[1] {
+            defmt::warn!("line errors, USB: {=u32}", errors[1]);
         }
         let lost = [links[0].lost, links[1].lost];
-        if lost != self.lost {
-            self.lost = lost;
-            defmt::warn!("bytes lost, more than can be executed: RS422 {=u64}, USB {=u64}", lost[0], lost[1]);
+        let last = core::mem::replace(&mut self.lost, lost);
+        if lost[0] != last[0] {
+            defmt::warn!("bytes lost, more than can be executed, RS422: {=u64}", lost[0]);
+        }
+        if lost[1] != last[1] {
+            defmt::warn!("bytes lost, more than can be executed, USB: {=u64}", lost[1]);
         }
         let tick = critical_section::with(|cs| summary::LAST.borrow(cs).get());
-        if tick != self.tick {
-            self.tick = tick;
-            defmt::info!("{}", tick);
+        let last = core::mem::replace(&mut self.tick, tick);
+        if tick != last {
+            tick.log(&last);
         }
     }
 }

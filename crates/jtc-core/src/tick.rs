@@ -4,7 +4,7 @@ use jtc_wire::{RawPoint, Response};
 
 use crate::controller::Controller;
 use crate::io::{Inputs, Outputs};
-use crate::motion::{ControlMode, Found, LawInputs};
+use crate::motion::{ControlMode, LawInputs};
 use crate::{ControllerState, JOINTS};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -78,7 +78,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
-                self.motion.release(&self.nodes);
+                // All else was released when the state began.
+                self.motion.set.release(&self.nodes);
                 self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])
             }
@@ -141,10 +142,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let braking = self.brake();
         let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
         let limited = self.motion.control(&LawInputs { mode, braking, nodes, config, parameters });
-        if !limited.found.iter().any(Found::is_any) {
-            return (limited.torque, too_fast);
-        }
-        let errors = self.react(mode, &limited.found);
+        let Some(found) = &limited.found else { return (limited.torque, too_fast) };
+        let errors = self.react(mode, found);
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
@@ -175,7 +174,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Puts the oldest record into a status; returns the line that it is for.
     fn prepare_status(&mut self) -> Option<usize> {
         let record = self.records.pop();
-        self.status_frame = self.status(record.map_or(Response::NONE, |(_, record)| record)).emit();
+        let status = self.status(record.map_or(Response::NONE, |(_, record)| record));
+        status.emit_to(&mut self.status_frame);
         record.map(|(line, _)| line)
     }
 }

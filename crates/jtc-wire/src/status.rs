@@ -172,9 +172,8 @@ fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 }
 
 impl JointStatus {
-    fn emit(&self) -> [u8; field::JOINT_LEN] {
+    fn emit(&self, b: &mut [u8; field::JOINT_LEN]) {
         use field::joint::*;
-        let mut b = [0; field::JOINT_LEN];
         b[FSM] = self.state.code();
         b[MC_CURRENT] = self.mc_current;
         b[MC_OCCURRED] = self.mc_occurred;
@@ -186,7 +185,6 @@ impl JointStatus {
         b[VELOCITY].copy_from_slice(&self.velocity.to_be_bytes());
         b[TORQUE].copy_from_slice(&self.torque.to_be_bytes());
         b[TEMPERATURE] = self.temperature;
-        b
     }
 
     fn parse(b: &[u8; field::JOINT_LEN]) -> Self {
@@ -210,8 +208,14 @@ impl JointStatus {
 impl Status {
     /// The 175-byte frame with CRC (a missing gripper is emitted as zeros).
     pub fn emit(&self) -> [u8; STATUS_LEN] {
+        let mut frame = [0; STATUS_LEN];
+        self.emit_to(&mut frame);
+        frame
+    }
+
+    /// The same, in place of what is in `b`.
+    pub fn emit_to(&self, b: &mut [u8; STATUS_LEN]) {
         use field::*;
-        let mut b = [0; STATUS_LEN];
         b[frame_field::HEADER] = HEADER;
         b[frame_field::TYPE] = FrameType::JtcStatus as u8;
         b[frame_field::LENGTH].copy_from_slice(&(STATUS_LEN as u16).to_be_bytes());
@@ -230,8 +234,8 @@ impl Status {
         b[CAN_ERROR] = self.can_error;
         b[CAN_CURRENT].copy_from_slice(&self.can_current.to_be_bytes());
         b[CAN_OCCURRED].copy_from_slice(&self.can_occurred.to_be_bytes());
-        for (to, joint) in b[JOINTS..GRIPPER.start].chunks_exact_mut(JOINT_LEN).zip(&self.joints) {
-            to.copy_from_slice(&joint.emit());
+        for (to, joint) in b[JOINTS..GRIPPER.start].as_chunks_mut().0.iter_mut().zip(&self.joints) {
+            joint.emit(to);
         }
         let g = self.gripper.unwrap_or_default();
         b[GRIPPER][..6].copy_from_slice(&[
@@ -242,9 +246,9 @@ impl Status {
             g.errors,
             g.warnings,
         ]);
+        b[GRIPPER][6..].fill(0);
         let crc = crc16(&b[..CRC.start]);
         b[CRC].copy_from_slice(&crc.to_be_bytes());
-        b
     }
 
     /// From a whole frame of 165, 173 or 175 bytes; `None` when type, length or CRC is wrong.

@@ -51,6 +51,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.overtake(line, command, count);
             }
         }
+        if inputs.host.is_empty() {
+            // Most ticks; the loop has much to prepare.
+            return 0;
+        }
         let mut done = 0;
         for event in inputs.host.iter().take(EVENTS_MAX) {
             match self.serve(event) {

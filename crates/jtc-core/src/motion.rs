@@ -47,8 +47,7 @@ pub(crate) struct Motion {
 remembered!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Torque off: nothing is held, no torque is remembered. Without torque that is so in every tick: each part is made new in
-    /// its place, not all of them on the stack and copied.
+    /// Torque off: nothing is held, no torque is remembered. Each part is made new in its place, not all of them on the stack and copied.
     pub fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
@@ -134,28 +133,34 @@ impl Motion {
     /// A tick of the control law and of its limits: torques to command, and what was found on the way.
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();
-        for (j, position) in positions.iter().enumerate() {
-            if let Some(set) = self.law.drag(j, *position) {
-                self.set.lead(j, set);
+        let yields = self.law.any_yields();
+        if yields {
+            for (j, position) in positions.iter().enumerate() {
+                if let Some(set) = self.law.drag(j, *position) {
+                    self.set.lead(j, set);
+                }
             }
         }
         self.set.commanded.put(&self.set.point);
         let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
         let held_back = self.hold_back.is_active();
-        let mut limited = self.limiter.step(inputs, &self.law, &mut self.set, held_back);
+        let mut limited = Limited::default();
+        self.limiter.step(inputs, &self.law, &mut self.set, held_back, &mut limited);
         if let Some(sag) = &limited.sag {
             self.law.sag(sag);
         }
-        for (j, found) in limited.found.iter_mut().enumerate() {
-            if inputs.nodes.node(j).enabled() {
-                found.errors |= missing[j];
+        if missing.iter().fold(0, |all, errors| all | errors) != 0 {
+            for (j, found) in limited.found.get_or_insert_default().iter_mut().enumerate() {
+                found.errors |= if inputs.nodes.node(j).enabled() { missing[j] } else { 0 };
             }
         }
-        let ended = self.law.end_of_yields(inputs.parameters.pid);
-        for (j, position) in positions.iter().enumerate() {
-            if ended[j] {
-                self.set.lead(j, *position);
-                self.set.catch[j].calm_down();
+        if yields {
+            let ended = self.law.end_of_yields(inputs.parameters.pid);
+            for (j, position) in positions.iter().enumerate() {
+                if ended[j] {
+                    self.set.lead(j, *position);
+                    self.set.catch[j].calm_down();
+                }
             }
         }
         limited

@@ -18,12 +18,17 @@ impl OverSpeed {
     /// [`Config::overspeed_ms`]. Only measurements that came in this tick count: an answer that is missing or was not
     /// accepted neither adds to the time nor ends it. Joints that are not enabled have no torque to be taken away.
     pub fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
-        let mut errors = [0; JOINTS];
-        for j in 0..JOINTS {
-            let node = nodes.node(j);
+        // What the joint answered, not what is used in place of missing answers. Written so that NaN is too fast.
+        let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;
-            // What the joint answered, not what is used in place of missing answers. Written so that NaN is too fast.
-            let within = node.report.velocity.abs() <= threshold;
+            nodes.node(j).report.velocity.abs() <= threshold
+        };
+        let mut errors = [0; JOINTS];
+        if (0..JOINTS).fold(true, |all, j| all & within(j) & (self.ticks[j] == 0)) {
+            return errors;
+        }
+        for j in 0..JOINTS {
+            let (node, within) = (nodes.node(j), within(j));
             let ticks = self.ticks[j];
             self.ticks[j] = if !node.enabled() {
                 0

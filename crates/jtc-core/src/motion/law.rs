@@ -9,7 +9,7 @@ use crate::limits::{JointConfig, within};
 use crate::load::Load;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
-use crate::pid::Pid;
+use crate::pid::{Pid, PidTorque};
 use crate::remembered::remembered;
 use crate::teach::Payload;
 use crate::yielding::{DAMPING_RATE, Joint, Yield, Yielded};
@@ -274,7 +274,12 @@ impl ControlLaw {
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts
         // now: the measured position is taken to where the commanded motion has brought it since.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
-        let lowering = self.yields.iter().flatten().filter(|yields| yields.lowers()).count() as u8;
+        let any_yields = self.any_yields();
+        let lowering = if any_yields {
+            self.yields.iter().flatten().filter(|yields| yields.lowers()).count() as u8
+        } else {
+            0
+        };
         let zero = [0.0; JOINTS];
         let (qd, qdd) =
             if mode.moves() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
@@ -288,36 +293,34 @@ impl ControlLaw {
             if mode.moves() { compensation(inputs, &qd) } else { ([0.0; JOINTS], [0; JOINTS]) };
         for j in 0..JOINTS {
             let limit = &config.joints[j];
-            let mut torque = JointTorque {
-                model: model[j] + limit.rotor_inertia * qdd[j],
-                payload: payload[j],
-                friction: friction[j],
-                ..JointTorque::default()
-            };
-            if let Some(yields) = &mut self.yields[j] {
-                torque.pid = yields.step(&Joint {
+            let model = model[j] + limit.rotor_inertia * qdd[j];
+            let pid = if any_yields && let Some(yields) = &mut self.yields[j] {
+                yields.step(&Joint {
                     position: q[j],
                     velocity: v[j],
                     fresh: nodes.node(j).fresh(),
-                    model: torque.model,
+                    model,
                     limits: limit,
                     range: config.position_range(j),
                     share: config.yield_torque_share,
                     lowering,
-                });
+                })
             } else if mode != ControlMode::Teach {
                 let error = due[j] - q[j];
                 let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
-                torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step);
-            }
-            self.torque[j] = torque;
+                self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step)
+            } else {
+                PidTorque::default()
+            };
+            let (payload, friction) = (payload[j], friction[j]);
+            self.torque[j] = JointTorque { model, pid, friction, payload, brake: 0.0, blend: 0.0 };
         }
         self.transfer.blend(before, &mut self.torque, nodes, config);
         if mode != ControlMode::Teach {
             self.observe_load(set, config);
         }
-        if mode == ControlMode::Hold && !self.any_yields() && set.all_holding() {
+        if mode == ControlMode::Hold && !any_yields && set.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();

@@ -47,11 +47,12 @@ impl Found {
 }
 
 /// What is left of a torque within the limits, per joint.
+#[derive(Default)]
 pub(crate) struct Limited {
     /// To command, N·m.
     pub torque: [f64; JOINTS],
-    /// What was found on the way.
-    pub found: [Found; JOINTS],
+    /// What was found on the way; `None` where there is nothing to react to.
+    pub found: Option<[Found; JOINTS]>,
     /// By how much the set positions of joints have sagged whose loads are being caught, rad; `None` where none is.
     pub sag: Option<[f64; JOINTS]>,
 }
@@ -78,9 +79,9 @@ impl Limiter {
         law: &ControlLaw,
         set: &mut SetValues,
         held_back: bool,
-    ) -> Limited {
+        limited: &mut Limited,
+    ) {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        let mut sags = None;
         // Only while set values move: an arm that stands yields to a push (J-66).
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
@@ -92,12 +93,14 @@ impl Limiter {
         };
         let (q, v) = (nodes.positions(), nodes.velocities());
         let due = *set.due(config);
-        let joints: [(f64, Found); JOINTS] = core::array::from_fn(|j| {
+        let (holds, taught) = (mode == ControlMode::Hold, mode == ControlMode::Teach);
+        let any_yields = law.any_yields();
+        for j in 0..JOINTS {
             let limits = &config.joints[j];
             let error = due[j] - q[j];
             let computed = law.torque[j].sum();
-            let yields = law.yields(j);
-            let holds = mode == ControlMode::Hold && !yields;
+            let yields = any_yields && law.yields(j);
+            let holds = holds && !yields;
             let catching = set.catch[j].step(v[j]) && holds;
             let unstable = holds && set.catch[j].swing_grows();
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
@@ -112,20 +115,23 @@ impl Limiter {
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // What brakes a joint is no push against it; what presses one that stands is.
-            let brakes = stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            let counts = strained & settled & !brakes & !yields & (mode != ControlMode::Teach);
+            let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
+            let counts = strained && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS);
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
             let set_errors = limits::check_set(point, error, limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
                 let sag = set.sag(j, computed - within, parameters.pid[j].kp, error, limits);
-                sags.get_or_insert([0.0; JOINTS])[j] = sag;
+                limited.sag.get_or_insert([0.0; JOINTS])[j] = sag;
             }
-            let looked_at = mode != ControlMode::Teach && set.holding[j] && !yields;
+            let looked_at = !taught && !yields && set.holding[j];
             let errors = if looked_at { set_errors & !excused } else { 0 }
                 | if computed.is_nan() { joint_error::TORQUE } else { 0 };
-            (within, Found { errors, overloaded, pushed, strained, settled, unstable })
-        });
-        Limited { torque: joints.map(|(torque, _)| torque), found: joints.map(|(_, found)| found), sag: sags }
+            limited.torque[j] = within;
+            let found = Found { errors, overloaded, pushed, strained, settled, unstable };
+            if found.is_any() {
+                limited.found.get_or_insert_default()[j] = found;
+            }
+        }
     }
 }

@@ -76,6 +76,7 @@ impl PathRamp {
     ) -> SlopeBounds {
         const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut easy, mut full) = (FREE, FREE);
+        let along: [f64; JOINTS] = core::array::from_fn(|j| if law.yields(j) { 0.0 } else { at.velocity[j] });
         for j in 0..JOINTS {
             if law.yields(j) {
                 continue;
@@ -86,9 +87,7 @@ impl PathRamp {
                 &mut easy,
                 within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
-            let push: f64 = (0..JOINTS)
-                .map(|k| if law.yields(k) { 0.0 } else { self.inertia[j][k] * at.velocity[k] })
-                .sum();
+            let push: f64 = self.inertia[j].iter().zip(&along).map(|(inertia, along)| inertia * along).sum();
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);

@@ -12,14 +12,18 @@ impl Nodes {
     pub(super) fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
         // While every node boots, no node acknowledges.
-        let any_booted = self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
+        let any_booted = || self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
         if on_the_bus {
             self.unacknowledged = 0;
-        } else if self.sent_move && any_booted {
+        } else if self.sent_move && any_booted() {
             self.unacknowledged = self.unacknowledged.saturating_add(1);
         }
         for (n, node) in self.nodes.iter_mut().enumerate() {
             let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
+            if answered && usable {
+                (node.boot_left, node.silent, node.missed) = (0, 0, 0);
+                continue;
+            }
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
             // No node can have answered, and the bus is not given up yet: the joint is predicted all the same (J-63).

@@ -55,7 +55,7 @@ impl Arm {
         };
         let limited =
             self.motion.control(&LawInputs { mode, braking, nodes, config: &self.config, parameters });
-        (limited.torque, limited.found)
+        (limited.torque, limited.found.unwrap_or_default())
     }
 }
 

@@ -6,28 +6,33 @@
 //! are halved until the hull is within or the curve itself is seen outside (`curve`).
 //!
 //! Positions come in steps of 96 µrad, and what that rounding does to the derivative is no fault of the path: the way of
-//! each interval is judged less one such step.
+//! each interval is judged less one such step. What it does to the positions themselves, and the way of a joint that begins outside its
+//! limits, is in `range`.
 mod curve;
+mod range;
 mod screen;
 #[cfg(test)]
 mod tests;
 
-use jtc_wire::{POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
+use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
-use crate::JOINTS;
 use crate::config::Config;
 use crate::friction;
-use crate::interpolation::SetPoint;
+use crate::interpolation::{SetPoint, interpolate};
 use crate::parameters::TableOf;
+use crate::remembered::{BitSink, BitSource, Remembered, remembered};
+use crate::{JOINTS, joint_error};
 use curve::{Leaves, bound_crossed, leaves};
+pub use range::PathRange;
 pub(crate) use screen::SpeedRange;
 use screen::{Screen, Steps};
 
 /// Speed at the first and the last point that counts as standing, rad/s.
 pub const REST_SPEED: f64 = 0.02;
-/// rad and rad/s of one step of the wire.
+/// rad, rad/s and rad/s² of one step of the wire.
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
+const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
 /// Halvings of curves in one interval, all joints together. A curve is followed until its hull is within about a thousandth of
 /// its own height; six joints at their limits in the same interval share them, and then the hull decides.
 const HALVINGS: u8 = 16;
@@ -51,6 +56,32 @@ pub enum Quantity {
     FrictionTemperature,
 }
 
+impl Quantity {
+    /// All of them, in the order of their numbers in a snapshot.
+    const ALL: [Self; 7] = [
+        Self::Position,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::PositionSpeed,
+        Self::Rest,
+        Self::FrictionVelocity,
+        Self::FrictionTemperature,
+    ];
+}
+
+impl Remembered for Quantity {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        to.put(*self as u32, 3);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        Self::ALL.get(from.take(3) as usize).copied().unwrap_or_else(|| {
+            from.damage();
+            Self::Position
+        })
+    }
+}
+
 /// Where a trajectory is outside its bounds first (J-36).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
@@ -68,10 +99,12 @@ pub struct Violation {
     pub limit: f64,
 }
 
+remembered!(Violation { point, fraction, joint, quantity, value, limit });
+
 /// What one joint has to keep to.
 #[derive(Clone, Copy, Debug)]
 struct JointBounds {
-    position: (f64, f64),
+    position: PathRange,
     speed: f64,
     acceleration: f64,
     /// Velocities inside the friction table; without end where none is used.
@@ -88,14 +121,37 @@ pub struct TrajectoryCheck {
     points: u32,
     last: RawPoint,
     last_steps: Steps,
-    speeds: [SpeedRange; JOINTS],
+    passed: Passed,
+}
+
+/// What is known of the points that were checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Passed {
+    /// Velocities.
+    pub speeds: [SpeedRange; JOINTS],
+    /// Joints that began outside their limits and are not inside yet.
+    coming_in: [bool; JOINTS],
+}
+
+remembered!(Passed { speeds, coming_in });
+
+impl Violation {
+    /// The error of the joint that it would be in motion (J-43), as a bit of [`crate::joint_error`].
+    pub fn joint_error(&self) -> u16 {
+        match self.quantity {
+            Quantity::Position => joint_error::POSITION,
+            Quantity::Velocity | Quantity::PositionSpeed | Quantity::Rest => joint_error::VELOCITY,
+            Quantity::Acceleration => joint_error::ACCELERATION,
+            Quantity::FrictionVelocity | Quantity::FrictionTemperature => joint_error::FRICTION_TABLE,
+        }
+    }
 }
 
 impl TrajectoryCheck {
     /// Begins the check of a trajectory whose points are `step_ms` apart, with the friction `tables` if these are in use.
     pub fn new(config: &Config, step_ms: u16, tables: Option<&[TableOf<f32>; JOINTS]>) -> Self {
         let bounds = core::array::from_fn(|j| JointBounds {
-            position: config.position_range(j),
+            position: PathRange::of(config, j, step_ms),
             speed: config.joints[j].velocity_max,
             acceleration: config.joints[j].acceleration_max,
             friction: tables.map_or((f64::NEG_INFINITY, f64::INFINITY), |t| friction::velocities(&t[j])),
@@ -108,13 +164,13 @@ impl TrajectoryCheck {
             points: 0,
             last: RawPoint::default(),
             last_steps: Steps::default(),
-            speeds: [SpeedRange::default(); JOINTS],
+            passed: Passed::default(),
         }
     }
 
-    /// Goes on behind `points` points that have passed: the last of them, and their speeds.
-    pub(crate) fn behind(mut self, points: u32, last: RawPoint, speeds: [SpeedRange; JOINTS]) -> Self {
-        (self.points, self.last, self.last_steps, self.speeds) = (points, last, (&last).into(), speeds);
+    /// Goes on behind `points` points that have passed: the last of them, and what is known of them.
+    pub(crate) fn behind(mut self, points: u32, last: RawPoint, passed: Passed) -> Self {
+        (self.points, self.last, self.last_steps, self.passed) = (points, last, (&last).into(), passed);
         self
     }
 
@@ -128,8 +184,14 @@ impl TrajectoryCheck {
         } else {
             self.judge(point)
         };
-        for (range, velocities) in self.speeds.iter_mut().zip(self.screen.velocities(&steps)) {
+        for (range, velocities) in self.passed.speeds.iter_mut().zip(self.screen.velocities(&steps)) {
             range.add(velocities, self.points);
+        }
+        if self.points == 0 {
+            self.passed.coming_in = self.outside(point);
+        } else if self.passed.coming_in != [false; JOINTS] {
+            let outside = self.outside(point);
+            self.passed.coming_in = core::array::from_fn(|j| self.passed.coming_in[j] & outside[j]);
         }
         (self.last, self.last_steps) = (*point, steps);
         self.points = self.points.saturating_add(1);
@@ -141,9 +203,15 @@ impl TrajectoryCheck {
         at_rest(&self.last, self.points.saturating_sub(1))
     }
 
-    /// Speeds of the points taken so far.
-    pub(crate) fn speeds(&self) -> [SpeedRange; JOINTS] {
-        self.speeds
+    /// What is known of the points taken so far.
+    pub(crate) fn passed(&self) -> Passed {
+        self.passed
+    }
+
+    /// Joints that are outside their position limits at a point, tolerance or not.
+    fn outside(&self, point: &RawPoint) -> [bool; JOINTS] {
+        let positions = point.position_rad();
+        core::array::from_fn(|j| !self.bounds[j].position.limits_contain(positions[j]))
     }
 
     /// The first point.
@@ -154,15 +222,24 @@ impl TrajectoryCheck {
 
     /// A point by itself.
     fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
-        let at = SetPoint::from(point);
+        let (at, before) = (SetPoint::from(point), self.last.position_rad());
         for (j, bounds) in self.bounds.iter().enumerate() {
             let (q, v, a) = (at.position[j], at.velocity[j], at.acceleration[j]);
+            let range = &bounds.position;
+            let (low, high) = match self.points {
+                0 => range.of_first(),
+                _ if self.passed.coming_in[j] => range.of_next(before[j]),
+                _ => range.tolerated(),
+            };
+            if bound_crossed(q, low, high).is_some() {
+                let (point, quantity, limit) = (self.points, Quantity::Position, range.limit_at(q));
+                return Err(Violation { point, fraction: 0.0, joint: j, quantity, value: q, limit });
+            }
             let outside = |quantity, value, (low, high)| {
                 bound_crossed(value, low, high).map_or(Ok(()), |limit| {
                     Err(Violation { point: self.points, fraction: 0.0, joint: j, quantity, value, limit })
                 })
             };
-            outside(Quantity::Position, q, bounds.position)?;
             outside(Quantity::Velocity, v, (-bounds.speed, bounds.speed))?;
             outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
             outside(Quantity::FrictionVelocity, v, bounds.friction)?;
@@ -197,8 +274,11 @@ impl TrajectoryCheck {
                 p1 - v1 / 5.0,
                 p1,
             ];
-            let (low, high) = bounds.position;
-            outside(Quantity::Position, leaves(position, low, high, &mut halvings))?;
+            let (range, coming_in) = (&bounds.position, self.passed.coming_in[j]);
+            let (low, high) = if coming_in { range.between(p0) } else { range.tolerated() };
+            let found = leaves(position, low, high, &mut halvings);
+            let limit = |found: Leaves| Leaves { bound: range.limit_at(found.value), ..found };
+            outside(Quantity::Position, found.map(limit))?;
             // Velocities in rad per interval until here, from here in rad/s.
             let velocity = [v0, v0 + a0 / 3.0, v1 - a1 / 3.0, v1].map(|v| v / h);
             let found = leaves(velocity, -bounds.speed, bounds.speed, &mut halvings);
@@ -217,6 +297,17 @@ impl TrajectoryCheck {
             ];
             let found = leaves(speed, -bounds.speed, bounds.speed, &mut halvings);
             outside(Quantity::PositionSpeed, found)?;
+            if coming_in && !range.contains(p0) {
+                let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
+                let found = leaves(speed, low, high, &mut halvings);
+                // The place where it turns outwards, or the point before where it is inside there.
+                let place = |Leaves { at, .. }: Leaves| {
+                    let value = interpolate(&a, &b, h, at).position[j];
+                    let value = if range.contains(value) { p0 } else { value };
+                    Leaves { at, value, bound: range.limit_at(p0) }
+                };
+                outside(Quantity::Position, found.map(place))?;
+            }
         }
         Ok(())
     }

@@ -119,11 +119,16 @@ impl Config {
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
-        if self.joint_config_bits & config::WORKING_AREA == 0 {
-            (low, high)
-        } else {
+        if self.keeps_to_working_area() {
             (low.max(-WORKING_AREA), high.min(WORKING_AREA))
+        } else {
+            (low, high)
         }
+    }
+
+    /// The drives are configured to keep to their working area.
+    pub(crate) const fn keeps_to_working_area(&self) -> bool {
+        self.joint_config_bits & config::WORKING_AREA != 0
     }
 }
 
@@ -256,7 +261,7 @@ impl Config {
             j += 1;
             let joint = j;
             // Written so that NaN is refused.
-            if self.joint_config_bits & config::WORKING_AREA != 0 {
+            if self.keeps_to_working_area() {
                 if !(limits.position_min >= -WORKING_AREA) {
                     return Err(ConfigError::Position {
                         joint,

@@ -46,7 +46,7 @@ mod tick;
 mod yielding;
 
 pub use bounds::{OutOfBounds, ParameterBounds};
-pub use check::{TrajectoryCheck, Violation};
+pub use check::{PathRange, TrajectoryCheck, Violation};
 pub use config::{Config, ConfigError, WORKING_AREA};
 pub use controller::Controller;
 pub use extension::{Identity, firmware_hash};

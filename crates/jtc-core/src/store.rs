@@ -1,7 +1,7 @@
 //! The trajectory store: which segments are accepted (J-30), and the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
-use crate::check::SpeedRange;
+use crate::check::{Passed, SpeedRange};
 use crate::interpolation::{SetPoint, Step};
 use crate::remembered::remembered;
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
@@ -26,8 +26,8 @@ pub(crate) struct Store<M> {
     /// A Stop came during this upload, whose host survives no refused segment: it is completed and not executed.
     stopped: bool,
     step: Step,
-    /// Velocities of the accepted segments.
-    speeds: [SpeedRange; JOINTS],
+    /// What the check knows of the accepted segments.
+    passed: Passed,
     /// Points in memory, also of a trajectory that was given up, and their hash.
     held: usize,
     hash: u32,
@@ -44,7 +44,7 @@ pub(crate) struct StoreState {
     dropped: bool,
     stopped: bool,
     step_ms: u16,
-    speeds: [SpeedRange; JOINTS],
+    passed: Passed,
     held: usize,
     hash: u32,
 }
@@ -65,7 +65,7 @@ remembered!(StoreState {
     dropped,
     stopped,
     step_ms,
-    speeds,
+    passed,
     held,
     hash
 });
@@ -90,7 +90,6 @@ fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub fn new(points: M) -> Self {
-        let speeds = [SpeedRange::default(); JOINTS];
         Self {
             points,
             received: 0,
@@ -101,7 +100,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             dropped: false,
             stopped: false,
             step: Step::new(1),
-            speeds,
+            passed: Passed::default(),
             held: 0,
             hash: HASH_BEGIN,
         }
@@ -212,9 +211,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.hash = hash_points(self.hash, slots);
     }
 
-    /// All points of the segment are copied; `speeds` are those of all points so far.
-    pub fn commit(&mut self, segment: &Segment<'_>, speeds: [SpeedRange; JOINTS]) {
-        self.speeds = speeds;
+    /// All points of the segment are copied; `passed` is what the check knows of all points so far.
+    pub fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
+        self.passed = passed;
         self.received = (self.received + segment.len()).min(self.capacity());
         self.next_segment = segment.segment + 1;
         self.held = self.received;
@@ -242,7 +241,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             dropped,
             stopped,
             ref step,
-            speeds,
+            passed,
             held,
             hash,
         } = *self;
@@ -256,7 +255,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             dropped,
             stopped,
             step_ms,
-            speeds,
+            passed,
             held,
             hash,
         }
@@ -273,14 +272,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             dropped,
             stopped,
             step_ms,
-            speeds,
+            passed,
             held,
             hash,
         } = *state;
         (self.plain, self.dropped, self.stopped) = (plain, dropped, stopped);
         (self.received, self.next_segment, self.segments) =
             (received.min(self.capacity()), next_segment, segments);
-        (self.number, self.step, self.speeds) = (number, Step::new(step_ms), speeds);
+        (self.number, self.step, self.passed) = (number, Step::new(step_ms), passed);
         (self.held, self.hash) = (held.min(self.capacity()), hash);
     }
 
@@ -291,15 +290,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// How many points there are, the last of them, and their speeds; `None` without points.
-    pub fn tail(&self) -> Option<(u32, RawPoint, [SpeedRange; JOINTS])> {
+    /// How many points there are, the last of them, and what the check knows of them; `None` without points.
+    pub fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
-        Some((self.received as u32, last, self.speeds))
+        Some((self.received as u32, last, self.passed))
     }
 
     /// Speeds of the points.
     pub fn speeds(&self) -> &[SpeedRange; JOINTS] {
-        &self.speeds
+        &self.passed.speeds
+    }
+
+    /// ms between points.
+    pub fn step_ms(&self) -> u16 {
+        self.step.ms
     }
 
     /// Positions of point 0, rad.

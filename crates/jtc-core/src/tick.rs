@@ -2,10 +2,12 @@
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
+use crate::check::PathRange;
 use crate::controller::Controller;
+use crate::interpolation::ROUNDING;
 use crate::io::{Inputs, Outputs};
-use crate::motion::{ControlMode, LawInputs};
-use crate::{ControllerState, JOINTS};
+use crate::motion::{ControlMode, Found, LawInputs};
+use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// One millisecond, with a bounded amount of work whatever the inputs.
@@ -142,9 +144,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let braking = self.brake();
         let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
         let limited = self.motion.control(&LawInputs { mode, braking, nodes, config, parameters });
-        let Some(found) = &limited.found else { return (limited.torque, too_fast) };
-        let errors = self.react(mode, found);
+        let Some(mut found) = limited.found else { return (limited.torque, too_fast) };
+        self.tolerate_positions(&mut found);
+        let errors = self.react(mode, &found);
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
+    }
+
+    /// Positions of the path outside the limits that the check of the trajectory has passed (J-36) are no error in motion (J-43).
+    #[cold]
+    fn tolerate_positions(&self, found: &mut [Found; JOINTS]) {
+        let Some(first) = self.store.first() else { return };
+        let outside = |found: &Found| found.errors & joint_error::POSITION != 0;
+        for (j, found) in found.iter_mut().enumerate().filter(|(_, found)| outside(found)) {
+            let (low, high) = PathRange::of(&self.config, j, self.store.step_ms()).of_path(first[j]);
+            let position = self.motion.set.point.position[j];
+            if position >= low - ROUNDING && position <= high + ROUNDING {
+                found.errors &= !joint_error::POSITION;
+            }
+        }
     }
 
     /// Raises what the limits have `found`; returns the torque to command, which is none with an error latched (J-21).

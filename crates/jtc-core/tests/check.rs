@@ -300,3 +300,115 @@ fn j36_the_existing_trajectories_keep_their_verdicts() {
         }
     }
 }
+
+/// A path of joint 2 from `from` to `to`, from rest to rest in 1.5 s, with points 10 ms apart.
+fn quintic(from: f64, to: f64) -> Vec<RawPoint> {
+    (0..=150)
+        .map(|k| {
+            let (u, way, seconds) = (f64::from(k) / 150.0, to - from, 1.5);
+            let q = from + way * u.powi(3) * (10.0 + u * (6.0 * u - 15.0));
+            let v = way * 30.0 * u.powi(2) * (1.0 - u).powi(2) / seconds;
+            let a = way * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (seconds * seconds);
+            point(1, q, v, a)
+        })
+        .collect()
+}
+
+/// A rig whose joint 2 stands at `at`; its limits are -0.55 and 1.15 rad.
+fn standing(at: f64) -> Rig {
+    let mut config = Config::avena();
+    (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
+    (config.joints[1].torque_max, config.joints[1].position_error_max) = (1e6, 10.0);
+    let mut rig = Rig::new(config);
+    rig.follow = false;
+    rig.nodes[1].report.position = at;
+    rig.defaults();
+    rig.run(700);
+    rig.follow = true;
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    rig
+}
+
+/// Executes the path to its end. Returns the furthest set positions of joint 2.
+fn executed(rig: &mut Rig, points: &[RawPoint]) -> (f64, f64) {
+    for (n, part) in points.chunks(60).enumerate() {
+        let body = segment_body(3, n as u16, points.len().div_ceil(60) as u16, 10, part);
+        assert_eq!(
+            rig.ask(FrameType::Trajectory, &body),
+            DataStatus::NoError,
+            "{:?}",
+            rig.controller.violation()
+        );
+    }
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
+    rig.until(5_000, |rig| {
+        let set = rig.controller.telemetry().joints[1].set_position;
+        ends = (ends.0.min(set), ends.1.max(set));
+        rig.trajectory() != TrajectoryState::Execute
+    });
+    let status = rig.status();
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Finish, 0));
+    assert_eq!((status.occurred, status.joints[1].internal_occurred), (0, 0));
+    ends
+}
+
+/// The grid of the wire has no point on the limits: the nearest ones are 1.150041 and -0.550044 rad, outside.
+#[test]
+fn j36_j43_a_path_that_ends_on_a_limit_is_executed() {
+    for limit in [1.15, -0.55] {
+        let mut rig = standing(limit - 0.4 * f64::signum(limit));
+        let points = quintic(limit - 0.4 * f64::signum(limit), limit);
+        let last = points.last().unwrap().position_rad()[1];
+        assert!((last - limit) * limit > 0.0 && (last - limit).abs() < 96e-6, "{last}");
+        let ends = executed(&mut rig, &points);
+        let reached = if limit > 0.0 { ends.1 } else { ends.0 };
+        assert!(
+            (last - limit).abs() <= (reached - limit).abs() && (reached - limit).abs() < 96e-6,
+            "{ends:?}"
+        );
+        assert_eq!(rig.controller.telemetry().joints[1].set_position, last);
+        // And away from there again.
+        executed(&mut rig, &quintic(limit, limit - 0.3 * f64::signum(limit)));
+    }
+}
+
+/// An arm without brakes falls to its end stop, and its host moves it away from there.
+#[test]
+fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
+    for plain in [true, false] {
+        for (from, to) in [(1.1695, 0.8), (1.1695, 1.15), (1.162, 1.156), (-0.5695, 0.0), (-0.56, -0.56)] {
+            let mut rig = standing(from);
+            rig.plain = plain;
+            let points = quintic(from, to);
+            let (low, high) = executed(&mut rig, &points);
+            // Where it stands, by a step of the wire.
+            let (lowest, highest) = (from.min(to) - 97e-6, from.max(to) + 97e-6);
+            assert!(low >= lowest && high <= highest, "{from} to {to}: {low}..{high}");
+        }
+    }
+    // Neither further out nor from further out.
+    for (from, to) in [(1.165, 1.169), (-0.555, -0.56), (1.175, 0.8), (-0.575, 0.0)] {
+        let mut rig = standing(from);
+        let body = segment_body(3, 0, 1, 10, &quintic(from, to));
+        assert_eq!(rig.ask(FrameType::Trajectory, &body), DataStatus::IncorrectValue);
+        let violation = rig.controller.violation().copied().expect("kept");
+        let limit = if from > 0.0 { 1.15 } else { -0.55 };
+        assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, limit));
+    }
+}
+
+/// What the check has not passed is found in motion: a limit that is moved in while the path is loaded.
+#[test]
+fn j43_beyond_what_is_tolerated_a_position_ends_the_motion() {
+    let mut points = quintic(0.8, 1.15);
+    // Two steps further than what is tolerated, where the check does not look again.
+    let mut rig = standing(0.8);
+    assert_eq!(rig.ask(FrameType::Trajectory, &segment_body(3, 0, 1, 10, &points)), DataStatus::NoError);
+    points.iter_mut().skip(140).for_each(|point| point.position[1] += 2);
+    rig.controller.put_points(0, &points);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(5_000, |rig| rig.trajectory() != TrajectoryState::Execute);
+    assert_eq!(rig.trajectory(), TrajectoryState::Pause);
+    assert_eq!(rig.status().joints[1].internal_occurred, jtc_core::joint_error::POSITION);
+}

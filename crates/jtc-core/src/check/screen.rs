@@ -54,8 +54,8 @@ impl Screen {
             core::array::from_fn(|j| bounds.get(j).map_or(f32::NAN, |b| value(b, step) as f32))
         };
         Self {
-            position_low: each(|b, _| b.position.0 / POSITION_STEP + SLACK),
-            position_high: each(|b, _| b.position.1 / POSITION_STEP - SLACK),
+            position_low: each(|b, _| b.position.tolerated().0 / POSITION_STEP + SLACK),
+            position_high: each(|b, _| b.position.tolerated().1 / POSITION_STEP - SLACK),
             speed: each(|b, step| {
                 let slowest = b.speed.min(b.friction.1).min(-b.friction.0);
                 slowest * step / POSITION_STEP * (1.0 - SLACK_SHARE) - SLACK
@@ -131,21 +131,27 @@ impl SpeedRange {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check::PathRange;
+    use crate::config::Config;
 
     /// Or what rounding does would let something pass that the exact check refuses.
     #[test]
     fn j36_the_screen_keeps_a_distance_to_each_limit_that_is_more_than_its_rounding() {
+        let mut config = Config::avena();
+        (config.joints[3].position_min, config.joints[3].position_max) = (-2.5, 2.0);
         for (speed, friction) in
             [(1.5, (-9.0, 9.0)), (3.0, (-0.7, 9.0)), (3.0, (-9.0, 0.7)), (0.01, (-9.0, 9.0))]
         {
             for step in [0.001, 0.01, 0.1, 1.0, 10.0] {
-                let bounds = JointBounds { position: (-3.0, 2.0), speed, acceleration: 8.0, friction };
+                let position = PathRange::of(&config, 3, 0);
+                let bounds = JointBounds { position, speed, acceleration: 8.0, friction };
                 let screen = Screen::new(&[bounds; JOINTS], step);
                 let slowest = if speed > 1.5 { 0.7 } else { speed };
                 // Eight roundings, and a tenth of a step for what they do to positions.
                 let share = 1.0 - 8.0 * f64::from(f32::EPSILON);
                 let [low, high] = [screen.position_low[0], screen.position_high[0]].map(f64::from);
-                assert!(low >= -3.0 / POSITION_STEP + 0.09 && high <= 2.0 / POSITION_STEP - 0.09);
+                // With the one step that is tolerated.
+                assert!(low >= -2.5 / POSITION_STEP - 0.91 && high <= 2.0 / POSITION_STEP + 0.91);
                 let way = f64::from(screen.speed[5]) * POSITION_STEP;
                 assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");
                 // But it is no other limit.

@@ -1,4 +1,7 @@
 //! The check against what the controller computes between points, sampled densely.
+extern crate std;
+use std::vec::Vec;
+
 use jtc_wire::{ACCELERATION_SCALE, RAW_FULL_SCALE};
 use proptest::prelude::*;
 
@@ -24,10 +27,17 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
+/// What rounding may do to a position: a step of it, and in the middle of the quintic what a step of the velocity in both points does.
+fn tolerance(step_ms: u16) -> f64 {
+    let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
+    let (a, b) = (moving(1.0), moving(-1.0));
+    3.141592 / 32767.0 + interpolate(&a, &b, f64::from(step_ms) / 1000.0, 0.5).position[0]
+}
+
 /// The verdict on `b` and on what lies between `a`, the point before it, and `b`.
 fn between(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> Result<(), Violation> {
     let check = TrajectoryCheck::new(config, step_ms, None);
-    check.behind(1, *a, [SpeedRange::default(); JOINTS]).take(b)
+    check.behind(1, *a, Passed::default()).take(b)
 }
 
 /// Extremes of joint `j` between two points, by sampling: position, velocity, and speed of the position whose way is one step
@@ -53,7 +63,7 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
 /// hull of the positions keeps inside (rad, below and above), that of the velocities with the bump of the way that they leave
 /// unexplained less one step (rad/s), and the acceleration of `b` (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
-    let (limit, h) = (&config.joints[0], f64::from(step_ms) / 1000.0);
+    let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
     let [a, b] = [a, b].map(|point| {
         let at = SetPoint::from(point);
         (at.position[0], at.velocity[0], at.acceleration[0])
@@ -65,8 +75,8 @@ fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let bump = 30.0 / 16.0 * ((b.0 - a.0 - explained).abs() - POSITION_STEP).max(0.0) / h;
     let (around, fastest) = (around[0].max(around[1]), fastest[0].max(fastest[1]));
     [
-        a.0.min(b.0) - around - limit.position_min,
-        limit.position_max - a.0.max(b.0) - around,
+        a.0.min(b.0) - around - limit.position_min + more,
+        limit.position_max + more - a.0.max(b.0) - around,
         limit.velocity_max - fastest - bump,
         limit.acceleration_max - b.2.abs(),
     ]
@@ -101,9 +111,12 @@ proptest! {
     fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
         let config = config();
         let ([low, high], velocity, speed) = sampled(0, step, &a, &b);
-        let verdict = between(&config, step, &a, &b);
+        let (verdict, more) = (between(&config, step, &a, &b), tolerance(step));
+        // From outside a joint may come inside: `j36_..._inwards_...`.
+        let before = a.position_rad()[0];
+        prop_assume!((-0.7 - more..=1.3 + more).contains(&before));
         let over = |margin: f64| {
-            low < -0.7 + margin || high > 1.3 - margin || velocity > 1.5 - margin || speed > 1.5 - margin
+            low < -0.7 - more + margin || high > 1.3 + more - margin || velocity > 1.5 - margin || speed > 1.5 - margin
                 || b.acceleration_rad_s2()[0].abs() > 8.0
         };
         if over(0.0) {
@@ -118,7 +131,7 @@ proptest! {
     #[test]
     fn j36_the_screen_passes_nothing_that_the_judge_refuses((step, a, b) in pair()) {
         let mut check = TrajectoryCheck::new(&config(), step, None);
-        check = check.behind(1, a, [SpeedRange::default(); JOINTS]);
+        check = check.behind(1, a, Passed::default());
         let passed = check.screen.passes(&Steps::from(&a), &Steps::from(&b));
         // The screen looks at the point before as well, the judge only at what follows it.
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
@@ -209,10 +222,10 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
             .map(|v| check.take(&point(3, 0.0, v, 0.0)))
             .into_iter()
             .collect::<Result<(), _>>()?;
-        Ok(check.speeds())
+        Ok(check.passed())
     };
     let inside = with(high - 0.001).expect("inside");
-    assert_eq!(inside_tables(&inside, &tables), Ok(()));
+    assert_eq!(inside_tables(&inside.speeds, &tables), Ok(()));
     let refused = with(high + 0.001).map_err(|v: Violation| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
     // Loaded without a table: the same when it is asked later.
@@ -220,14 +233,16 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     for v in [0.0, -0.4, low - 0.001, low - 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
     }
-    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+    let later =
+        inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
     // It is the first of the fastest points that is named, in both directions.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
     }
-    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+    let later =
+        inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, high)));
 }
 
@@ -247,7 +262,7 @@ fn j36_a_table_that_is_loaded_later_has_to_hold_what_lies_between_the_points() {
                     // Whether such a motion keeps its other limits does not matter here.
                     let _ = check.take(&p);
                 }
-                inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.limit))
+                inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.limit))
             };
             assert_eq!(later(a), Err((1, if v > 0.0 { high } else { low })), "{step} ms");
             assert_eq!(later(0.4 * a), Ok(()), "{step} ms");
@@ -292,9 +307,9 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     let moving = |q: f64| point(5, q, 0.2, 0.0);
     let check = TrajectoryCheck::new(&config(), 10, Some(&tables));
     // The screen takes velocities of both signs and passes nothing here: the exact check decides.
-    let mut check = check.behind(1, moving(0.0), [SpeedRange::default(); JOINTS]);
+    let mut check = check.behind(1, moving(0.0), Passed::default());
     assert_eq!(check.take(&moving(0.002)), Ok(()));
-    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.joint, v.value));
+    let later = inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.joint, v.value));
     assert_eq!(later, Err((5, 0.0)));
 }
 
@@ -315,4 +330,207 @@ fn j36_where_the_halvings_are_used_up_the_hull_decides() {
         None,
         "the top itself is a control point of both halves"
     );
+}
+
+/// The verdict on a whole trajectory.
+fn verdict(config: &Config, step_ms: u16, points: &[RawPoint]) -> Result<(), Violation> {
+    let mut check = TrajectoryCheck::new(config, step_ms, None);
+    points.iter().try_for_each(|point| check.take(point))?;
+    check.end()
+}
+
+/// A quintic of joint `j` from rest to rest in `steps` steps.
+fn quintic(j: usize, from: f64, to: f64, step_ms: u16, steps: u32) -> Vec<RawPoint> {
+    let seconds = f64::from(steps) * f64::from(step_ms) / 1000.0;
+    (0..=steps)
+        .map(|k| {
+            let (u, w) = (f64::from(k) / f64::from(steps), 1.0 - f64::from(k) / f64::from(steps));
+            let q = from + (to - from) * u * u * u * (10.0 + u * (6.0 * u - 15.0));
+            let v = (to - from) * 30.0 * u * u * w * w / seconds;
+            let a = (to - from) * 60.0 * u * w * (1.0 - 2.0 * u) / (seconds * seconds);
+            point(j, q, v, a)
+        })
+        .collect()
+}
+
+/// Steps, long enough for a way of up to 0.5 rad within the limits.
+fn steps() -> impl Strategy<Value = (u16, u32)> {
+    let step = prop::sample::select(&[1u16, 2, 7, 10, 40, 100, 300, 1000][..]);
+    (step, 1.0..4.0f64).prop_map(|(step, seconds)| (step, (seconds * 1000.0 / f64::from(step)).ceil() as u32))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    /// A path that keeps to its limits before it is rounded to the wire, and is on one of them for a while or at its end, is no fault.
+    #[test]
+    fn j36_a_path_that_ends_on_a_limit_passes(
+        (step, count) in steps(), limit in -2.0..2.0f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
+    ) {
+        let (mut config, sign) = (config(), if up { 1.0 } else { -1.0 });
+        let there = if up { &mut config.joints[joint].position_max } else { &mut config.joints[joint].position_min };
+        *there = limit;
+        let other = if up { &mut config.joints[joint].position_min } else { &mut config.joints[joint].position_max };
+        *other = limit - 3.0 * sign;
+        let mut points = quintic(joint, limit - sign * way, limit, step, count);
+        prop_assert_eq!(verdict(&config, step, &points), Ok(()));
+        let mut back = points.clone();
+        back.reverse();
+        back.iter_mut().for_each(|point| point.velocity[joint] = -point.velocity[joint]);
+        points.extend(back);
+        prop_assert_eq!(verdict(&config, step, &points), Ok(()));
+    }
+
+    /// A joint outside its limits is moved back in, or left where it is, at any speed that its limits allow.
+    #[test]
+    fn j36_a_path_that_begins_outside_and_goes_inwards_passes(
+        (step, count) in steps(), out in 0.0..0.02f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
+    ) {
+        let from = if up { 1.3 + out } else { -0.7 - out };
+        let to = if up { from - way } else { from + way };
+        let points = quintic(joint, from, to, step, count);
+        prop_assert_eq!(verdict(&config(), step, &points), Ok(()), "{} to {}, step {} {}", from, to, step, count);
+    }
+
+    /// It comes no further out in any interval, wherever that is, and by more than rounding may.
+    #[test]
+    fn j36_a_path_that_begins_outside_comes_no_further_out(
+        (step, count) in steps(), out in 0.002..0.02f64, more in 0.0003..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
+        first in 0.0..0.9f64,
+    ) {
+        let from = if up { 1.3 + out } else { -0.7 - out };
+        let away = |way: f64| if up { from + way } else { from - way };
+        // Some of the way in, and out again.
+        let inner = -first * out;
+        let mut points = quintic(joint, from, away(inner), step, count);
+        points.extend(quintic(joint, away(inner), away(inner + more), step, count).into_iter().skip(1));
+        let violation = verdict(&config(), step, &points).unwrap_err();
+        let limit = if up { 1.3 } else { -0.7 };
+        prop_assert_eq!((violation.joint, violation.quantity, violation.limit), (joint, Quantity::Position, limit));
+        prop_assert!(violation.point >= count - 1, "{:?}", violation);
+        prop_assert!((violation.value - limit).abs() > 1e-4 && (violation.value > limit) == up, "{:?}", violation);
+    }
+}
+
+#[test]
+fn j36_the_tolerance_of_a_position_ends_with_its_step() {
+    for step in [1, 10, 100, 1000] {
+        for (limit, sign) in [(1.3, 1.0), (-0.7, -1.0)] {
+            let last = ((limit + sign * tolerance(step)) / POSITION_STEP).trunc();
+            let at = |raw: f64| {
+                let points: Vec<_> = [0.0, 0.0, 0.5]
+                    .iter()
+                    .map(|back| point(2, (raw - sign * back) * POSITION_STEP, 0.0, 0.0))
+                    .collect();
+                verdict(&config(), step, &[points[0], points[1], points[2]])
+            };
+            // Points that stand there from the begin on are outside by less than the start tolerance.
+            assert_eq!(at(last), Ok(()), "{step} ms");
+            let from_inside = |raw: f64| {
+                between(&config(), step, &point(2, limit, 0.0, 0.0), &point(2, raw * POSITION_STEP, 0.0, 0.0))
+            };
+            assert_eq!(from_inside(last), Ok(()), "{step} ms");
+            let refused = from_inside(last + sign).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+            assert_eq!(refused, Err((1, 2, Quantity::Position, limit)), "{step} ms");
+        }
+    }
+    // A step, and at a second between points a third of one of the velocity more: 96 µrad and 60 µrad.
+    assert!((tolerance(1) - 96e-6).abs() < 1e-6 && (tolerance(1000) - 156e-6).abs() < 1e-6);
+}
+
+#[test]
+fn j36_the_tolerance_ends_with_the_working_area_of_the_drives() {
+    let mut config = config();
+    for joint in &mut config.joints {
+        (joint.position_min, joint.position_max) = (-2.9905, 2.9905);
+    }
+    // Of the wire's positions 2.99048 is the last one inside, and 2.99058 is outside by less than a step.
+    for (raw, inside) in [(31_191, true), (31_192, false)] {
+        for sign in [1, -1] {
+            for keeps in [true, false] {
+                config.joint_config_bits = if keeps { 1 } else { 0 };
+                let at = |raw: i16| RawPoint { position: [0, 0, 0, sign * raw, 0, 0], ..RawPoint::default() };
+                let passes = between(&config, 10, &at(31_191), &at(raw)).is_ok();
+                assert_eq!(passes, inside || !keeps, "{sign} {raw} {keeps}");
+            }
+        }
+    }
+}
+
+#[test]
+fn j36_a_path_begins_outside_by_the_start_tolerance_at_most() {
+    let mut config = config();
+    for start in [0.02, 0.005] {
+        config.start_tolerance_rad = start;
+        for (limit, sign) in [(1.3, 1.0), (-0.7, -1.0)] {
+            let begins = |out: f64| {
+                let from = limit + sign * out;
+                verdict(&config, 10, &quintic(1, from, limit - sign * 0.3, 10, 200))
+            };
+            assert_eq!((begins(start), begins(0.5 * start)), (Ok(()), Ok(())));
+            let refused = begins(start + 0.0005).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+            assert_eq!(refused, Err((0, 1, Quantity::Position, limit)));
+        }
+    }
+}
+
+#[test]
+fn j36_a_path_that_has_come_inside_stays_there() {
+    let config = config();
+    // In by 10 mrad, out again to where it began.
+    let mut points = quintic(4, 1.31, 1.29, 10, 150);
+    points.extend(quintic(4, 1.29, 1.31, 10, 150).into_iter().skip(1));
+    let violation = verdict(&config, 10, &points).unwrap_err();
+    assert!(violation.point > 150 && violation.quantity == Quantity::Position, "{violation:?}");
+    assert!((violation.value - 1.3001).abs() < 2e-4, "{violation:?}");
+    // It may come to the limit as any path may.
+    let mut points = quintic(4, 1.31, 1.29, 10, 150);
+    points.extend(quintic(4, 1.29, 1.3, 10, 150).into_iter().skip(1));
+    assert_eq!(verdict(&config, 10, &points), Ok(()));
+    // Another joint that never was outside has nothing of it.
+    let mut points = quintic(4, 1.31, 1.29, 10, 150);
+    points.last_mut().unwrap().position[3] = (1.301 / POSITION_STEP) as i16;
+    let violation = verdict(&config, 10, &points).unwrap_err();
+    assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
+}
+
+/// Both points are outside, each further in than the one before: what lies between them counts as well.
+#[test]
+fn j36_between_two_points_a_path_comes_no_further_out_either() {
+    let after = |step, a: RawPoint, b: RawPoint| {
+        let mut check = TrajectoryCheck::new(&config(), step, None);
+        // That it does not begin at rest does not matter here.
+        let _ = check.take(&a);
+        check.take(&b)
+    };
+    for (v0, v1) in [(0.4, -0.4), (-0.4, 0.4)] {
+        // Half a second: by 62 mrad out of the way in the middle.
+        let (a, b) = (point(1, 1.315, v0, 0.0), point(1, 1.31, v1, 0.0));
+        let violation = after(500, a, b).unwrap_err();
+        assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));
+        assert!(violation.value > 1.3 && violation.fraction > 0.0, "{violation:?}");
+    }
+    // Outside at both ends, and meanwhile inside: that is out again.
+    let (a, b) = (point(1, 1.302, -0.05, 0.0), point(1, 1.301, 0.05, 0.0));
+    assert!(after(400, a, b).is_err());
+    let (a, b) = (point(1, 1.302, -0.005, 0.0), point(1, 1.301, 0.0, 0.0));
+    assert_eq!(after(400, a, b), Ok(()));
+}
+
+/// Segments are checked one after the other: what the first one has left is known from its last point.
+#[test]
+fn j36_a_path_from_outside_goes_on_in_the_next_segment() {
+    let config = config();
+    let points = quintic(2, -0.715, -0.5, 10, 150);
+    for cut in [1, 2, 20, 40, 100] {
+        let (front, rear) = points.split_at(cut);
+        let mut check = TrajectoryCheck::new(&config, 10, None);
+        front.iter().for_each(|point| check.take(point).unwrap());
+        let next = TrajectoryCheck::new(&config, 10, None);
+        let mut next = next.behind(cut as u32, front[cut - 1], check.passed());
+        rear.iter().for_each(|point| next.take(point).unwrap());
+        let outer = point(2, -0.716, 0.0, 0.0);
+        let next = TrajectoryCheck::new(&config, 10, None);
+        assert!(next.behind(cut as u32, front[cut - 1], check.passed()).take(&outer).is_err(), "{cut}");
+    }
 }

@@ -150,7 +150,7 @@ fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
     let segment = Segment::parse(&body).expect("four points");
     controller.store.begin(&segment, false, false);
     controller.store.copy(&segment, 0, 4);
-    controller.store.commit(&segment, *controller.store.speeds());
+    controller.store.commit(&segment, Default::default());
     controller.clock.time = time;
     controller.clock.halt();
     controller

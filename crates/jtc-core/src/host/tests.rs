@@ -168,7 +168,7 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
         let mut fast = TrajectoryCheck::new(&controller.config, 10, None);
         let point = RawPoint { velocity: [0, 0, 0, i16::MAX, 0, 0], ..RawPoint::default() };
         assert!(fast.take(&point).is_err(), "it is beyond every limit");
-        controller.store.commit(&segment, fast.speeds());
+        controller.store.commit(&segment, fast.passed());
         let verdict = controller.check_friction();
         assert_eq!(verdict, if refused { Err(DataStatus::IncorrectValue) } else { Ok(()) }, "{table} {new}");
         assert_eq!(controller.violation.map(|v| v.joint), refused.then_some(3), "{table} {new}");

@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
         self.check = match self.store.tail() {
-            Some((points, last, speeds)) if segment.segment > 0 => check.behind(points, last, speeds),
+            Some((points, last, passed)) if segment.segment > 0 => check.behind(points, last, passed),
             _ => check,
         };
         self.violation = None;
@@ -126,7 +126,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if to < segment.len() {
             return SliceOutcome::Unfinished(SliceProgress::PointCopy(to));
         }
-        self.store.commit(segment, self.check.speeds());
+        self.store.commit(segment, self.check.passed());
         if self.store.complete() {
             self.set_trajectory(TrajectoryState::Stop);
         }

@@ -52,7 +52,7 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     let segment = Segment::parse(&points).expect("four points at standstill");
     controller.store.begin(&segment, false, false);
     controller.store.copy(&segment, 0, 4);
-    controller.store.commit(&segment, *controller.store.speeds());
+    controller.store.commit(&segment, Default::default());
     controller.set_trajectory(TrajectoryState::Stop);
     controller.enter(state);
     let bytes = [&[0; 4], &body[..], &[0; 2]].concat();

@@ -75,6 +75,11 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
+    /// Errors of joints that a refused trajectory would have in motion (J-36): they have occurred, and nothing is latched.
+    pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
+        self.hold_joints(bits, false);
+    }
+
     /// A held stop is latched: nothing moves until the host clears it.
     pub fn held_stop(&self) -> bool {
         any(&self.held)

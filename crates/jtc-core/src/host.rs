@@ -332,9 +332,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
                 if self.store.stopped() =>
             {
+                self.check_verdict()?;
                 Err(DataStatus::NotAllowed)
             }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
+                self.check_verdict()?;
                 self.check_friction()?;
                 self.start_path()?;
                 self.uploads.iter_mut().for_each(LineUpload::executed);
@@ -357,6 +359,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             _ if dropped || taught => Ok(()),
             _ => Err(DataStatus::NotAllowed),
         }
+    }
+
+    /// J-36: what was found in a trajectory that was taken all the same is the reason to refuse it now, and is shown as what has occurred.
+    fn check_verdict(&mut self) -> Result<(), DataStatus> {
+        let Some(violation) = self.store.refused() else { return Ok(()) };
+        let error = |j: usize| if j == violation.joint { violation.joint_error() } else { 0 };
+        self.errors.occur_joints(&core::array::from_fn(error));
+        self.violation = Some(violation);
+        Err(DataStatus::IncorrectValue)
     }
 
     /// J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was

@@ -1,7 +1,7 @@
 //! The trajectory store: which segments are accepted (J-30), and the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
-use crate::check::{Passed, SpeedRange};
+use crate::check::{Passed, SpeedRange, Violation};
 use crate::interpolation::{SetPoint, Step};
 use crate::remembered::remembered;
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
@@ -25,6 +25,8 @@ pub(crate) struct Store<M> {
     dropped: bool,
     /// A Stop came during this upload, whose host survives no refused segment: it is completed and not executed.
     stopped: bool,
+    /// What the check has found in an upload whose host survives no refused segment: it is completed and not executed.
+    refused: Option<Violation>,
     step: Step,
     /// What the check knows of the accepted segments.
     passed: Passed,
@@ -43,6 +45,7 @@ pub(crate) struct StoreState {
     plain: bool,
     dropped: bool,
     stopped: bool,
+    refused: Option<Violation>,
     step_ms: u16,
     passed: Passed,
     held: usize,
@@ -64,6 +67,7 @@ remembered!(StoreState {
     plain,
     dropped,
     stopped,
+    refused,
     step_ms,
     passed,
     held,
@@ -99,6 +103,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             plain: false,
             dropped: false,
             stopped: false,
+            refused: None,
             step: Step::new(1),
             passed: Passed::default(),
             held: 0,
@@ -143,6 +148,21 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     /// A Stop came during the upload of this trajectory: it is not executed (J-30).
     pub fn stopped(&self) -> bool {
         self.stopped
+    }
+
+    /// The upload was begun on a plain line, whose host survives no refused segment (J-51).
+    pub fn plain(&self) -> bool {
+        self.plain
+    }
+
+    /// Keeps what the check has found in the upload that has been begun.
+    pub fn refuse(&mut self, violation: Violation) {
+        self.refused.get_or_insert(violation);
+    }
+
+    /// What the check has found in this trajectory: it is not executed (J-36).
+    pub fn refused(&self) -> Option<Violation> {
+        self.refused
     }
 
     /// Segment 0 of an upload was refused because of a Stop: the other segments of the upload are refused, too.
@@ -195,7 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         if segment.segment == 0 {
             self.clear();
             (self.held, self.hash) = (0, HASH_BEGIN);
-            (self.plain, self.dropped, self.stopped) = (plain, false, stopped);
+            (self.plain, self.dropped, self.stopped, self.refused) = (plain, false, stopped, None);
             self.segments = segment.segments;
             self.number = segment.trajectory;
             self.step = Step::new(segment.step_time);
@@ -240,6 +260,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             plain,
             dropped,
             stopped,
+            refused,
             ref step,
             passed,
             held,
@@ -254,6 +275,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             plain,
             dropped,
             stopped,
+            refused,
             step_ms,
             passed,
             held,
@@ -271,12 +293,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
             plain,
             dropped,
             stopped,
+            refused,
             step_ms,
             passed,
             held,
             hash,
         } = *state;
-        (self.plain, self.dropped, self.stopped) = (plain, dropped, stopped);
+        (self.plain, self.dropped, self.stopped, self.refused) = (plain, dropped, stopped, refused);
         (self.received, self.next_segment, self.segments) =
             (received.min(self.capacity()), next_segment, segments);
         (self.number, self.step, self.passed) = (number, Step::new(step_ms), passed);

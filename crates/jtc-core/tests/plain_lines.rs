@@ -1,9 +1,9 @@
 //! Plain lines, on which no extension request came: hosts that know the protocol of existing devices only (J-30, J-51).
 mod rig;
 
-use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay};
-use jtc_core::{Config, ControllerState, TrajectoryState};
-use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
+use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
+use jtc_core::{Config, ControllerState, TrajectoryState, joint_error};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, Status, UrgentCommand};
 use rig::{Rig, point, rest, segment_body};
 
 const SEGMENT: FrameType = FrameType::Trajectory;
@@ -299,4 +299,163 @@ fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
             assert_eq!(rig.exec(ExecCommand::Execute), data, "{plain} {again}");
         }
     }
+}
+
+/// Points that break J-36, with the error that the joint with index 3 would have in motion.
+fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
+    let (still, at) = (rest(0), |q, v, a| point(3, q, v, a));
+    let long = |bad: RawPoint, place: usize| {
+        let mut points = vec![still; 900];
+        points[place] = bad;
+        points
+    };
+    vec![
+        ("beyond a limit", long(at(3.1, 0.0, 0.0), 450), joint_error::POSITION),
+        ("a jump in the first segment", long(at(0.5, 0.0, 0.0), 10), joint_error::VELOCITY),
+        ("too fast", long(at(0.0, 1.9, 0.0), 899), joint_error::VELOCITY),
+        ("too fast at the begin", long(at(0.0, 0.03, 0.0), 0), joint_error::VELOCITY),
+        ("not at rest at the end", long(at(0.0, 0.03, 0.0), 899), joint_error::VELOCITY),
+        ("too steep", long(at(0.0, 0.0, 12.5), 300), joint_error::ACCELERATION),
+    ]
+}
+
+/// Uploads in this many segments. Returns the answers.
+fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStatus> {
+    let parts: Vec<_> = points.chunks(points.len().div_ceil(segments)).collect();
+    assert_eq!(parts.len(), segments);
+    (0u16..)
+        .zip(&parts)
+        .map(|(n, part)| rig.ask(SEGMENT, &segment_body(9, n, segments as u16, 10, part)))
+        .collect()
+}
+
+/// Existing hosts wait for ever for a segment that is refused, whatever is wrong with it.
+#[test]
+fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
+    for (name, points, error) in broken() {
+        for segments in [1, 2, 3, 9] {
+            let case = format!("{name}, {segments} segments");
+            let mut config = Config::avena();
+            config.joints[3].acceleration_max = 8.0;
+            let mut rig = Rig::holding_with(config);
+            rig.plain = true;
+            // A good one before it is not executed in its place.
+            rig.upload(&[rest(0); 60], 10);
+            assert_eq!(uploaded(&mut rig, &points, segments), vec![DataStatus::NoError; segments], "{case}");
+            assert_eq!(
+                (rig.state(), rig.trajectory()),
+                (ControllerState::HoldPos, TrajectoryState::Stop),
+                "{case}"
+            );
+            let before = rig.status();
+            assert_eq!((before.errors, before.occurred), (0, 0), "{case}: nothing is executed yet");
+            for again in 0..3 {
+                assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue, "{case}");
+                rig.run(50);
+                let status = rig.status();
+                assert_eq!((status.state, status.trajectory), (before.state, before.trajectory), "{case}");
+                let joints = status.joints.map(|joint| (joint.internal, joint.internal_occurred));
+                assert_eq!(joints, [(0, 0), (0, 0), (0, 0), (0, error), (0, 0), (0, 0)], "{case}");
+                let internal = jtc_core::error::INTERNAL | jtc_core::error::INTERNAL_JOINTS;
+                assert_eq!((status.errors, status.occurred), (0, internal), "{case}");
+                assert!(rig.last.safety_output, "{case}: nothing has failed");
+                if again == 1 {
+                    assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
+                    assert_eq!(rig.status().joints[3].internal_occurred, 0);
+                }
+            }
+            assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
+            // A Stop is answered as of any trajectory that is not executed, and the next upload is free.
+            assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
+            assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
+            assert_eq!(rig.controller.violation(), None);
+            assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError, "{case}");
+            rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
+        }
+    }
+}
+
+/// What segment 0 has found holds for the upload, and its verdict for whoever executes it.
+#[test]
+fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
+    let (_, points, error) = broken().remove(0);
+    let parts: Vec<_> = points.chunks(300).collect();
+    let body = |n: u16| segment_body(9, n, 3, 10, parts[usize::from(n)]);
+    for plain in [true, false] {
+        for later in [true, false] {
+            let mut rig = Rig::holding();
+            rig.plain = plain;
+            assert_eq!(rig.ask(SEGMENT, &body(0)), DataStatus::NoError);
+            rig.plain = later;
+            let data = if plain { DataStatus::NoError } else { DataStatus::IncorrectValue };
+            assert_eq!(rig.ask(SEGMENT, &body(1)), data, "{plain} {later}");
+            if !plain {
+                assert_eq!(rig.trajectory(), TrajectoryState::Null);
+                continue;
+            }
+            assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
+            // On either line, and for a client that knows all numbers: 6 is the one for content.
+            for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
+                rig.plain = plain;
+                rig.statuses.clear();
+                rig.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
+                rig.run(50);
+                let data: Vec<_> = rig.records().iter().map(|record| record.data).collect();
+                assert_eq!(data, [DataStatus::IncorrectValue], "line {line}, plain {plain}");
+                assert_eq!(rig.trajectory(), TrajectoryState::Stop);
+            }
+            assert_eq!(rig.status().joints[3].internal_occurred, error);
+        }
+    }
+}
+
+/// Frames that are no trajectory are refused on a plain line, too: counts, order, step time.
+#[test]
+fn j30_j36_only_content_is_taken_on_a_plain_line() {
+    use DataStatus::{
+        IncorrectSegmentOrder, IncorrectStepTime, IncorrectValue, TooManyPoints, TooManySegments,
+    };
+    let mut rig = Rig::holding();
+    rig.plain = true;
+    for (segment, segments, step, points, data) in [
+        (1, 3, 10, 3, IncorrectSegmentOrder),
+        (0, 3, 0, 3, IncorrectStepTime),
+        (0, 101, 10, 3, TooManySegments),
+        (0, 1, 10, 1_501, TooManyPoints),
+        (0, 1, 10, 0, IncorrectValue),
+    ] {
+        let body = segment_body(9, segment, segments, step, &vec![rest(0); points]);
+        assert_eq!(rig.ask(SEGMENT, &body), data);
+        assert_eq!(rig.trajectory(), TrajectoryState::Null);
+    }
+}
+
+/// The verdict is in the snapshots of the flight recorder: a replay refuses the Execute, too.
+#[test]
+fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
+    let (_, points, error) = broken().remove(0);
+    let memory: [Vec<Block>; 2] = [vec![[0; 256]; 90], vec![[0; 256]; 6]];
+    let mut rig = Rig::new(Config::avena());
+    rig.recorder = Some(Recorder::new(memory, false));
+    rig.defaults();
+    rig.run(700);
+    rig.plain = true;
+    uploaded(&mut rig, &points, 3);
+    rig.run(2 * SNAPSHOT_MS as usize);
+    let executed = rig.controller.telemetry().tick;
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
+    rig.run(100);
+    let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
+    // The points are not in the log; the verdict is.
+    let other = Rig::holding().controller;
+    let mut last = None;
+    let mut replay = Replay::new(Log::new(&blocks), other, None);
+    for step in &mut replay {
+        assert_ne!(step.outcome, Outcome::Differs, "tick {}", step.telemetry.tick);
+        assert_ne!(step.telemetry.state, ControllerState::Operate);
+        last = Some((step.outcome, step.telemetry.tick));
+    }
+    assert!(last.is_some_and(|(outcome, tick)| outcome == Outcome::Same && tick > executed + 50), "{last:?}");
+    let status = Status::parse(replay.controller().status_frame()).expect("a status");
+    assert_eq!(status.joints[3].internal_occurred, error);
 }

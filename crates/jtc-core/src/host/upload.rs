@@ -73,7 +73,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Err(status) => SliceOutcome::Refused(status),
                 Ok(()) => {
                     self.begin_check(segment);
-                    self.check_points(segment, 0, received.plain, stopped)
+                    match self.store.refused().filter(|_| !first) {
+                        // One is enough, and the first one is kept.
+                        Some(violation) => self.take_refused(segment, violation, stopped),
+                        None => self.check_points(segment, 0, received.plain, stopped),
+                    }
                 }
             },
         }
@@ -98,19 +102,34 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         stopped: bool,
     ) -> SliceOutcome {
         let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
-        for point in segment.points_from(from).take(slice) {
-            if let Err(violation) = self.check.take(&point) {
-                return self.refuse_path(violation);
-            }
-        }
-        if from + slice < segment.len() {
+        let mut points = segment.points_from(from).take(slice);
+        let mut verdict = points.try_for_each(|point| self.check.take(&point));
+        if verdict.is_ok() && from + slice < segment.len() {
             return SliceOutcome::Unfinished(SliceProgress::PointCheck(from + slice));
         }
-        if segment.segment + 1 == segment.segments
-            && let Err(violation) = self.check.end()
-        {
-            return self.refuse_path(violation);
+        if segment.segment + 1 == segment.segments {
+            verdict = verdict.and_then(|()| self.check.end());
         }
+        let plain = if segment.segment == 0 { plain } else { self.store.plain() };
+        match verdict {
+            Ok(()) => self.begin_copy(segment, plain, stopped),
+            Err(violation) if plain => self.take_refused(segment, violation, stopped),
+            Err(violation) => {
+                self.violation = Some(violation);
+                SliceOutcome::Refused(DataStatus::IncorrectValue)
+            }
+        }
+    }
+
+    /// The trajectory breaks J-36, and its host, on a plain line, survives no refused segment: it is taken, and is not executed.
+    fn take_refused(&mut self, segment: &Segment<'_>, violation: Violation, stopped: bool) -> SliceOutcome {
+        let outcome = self.begin_copy(segment, true, stopped);
+        self.violation = Some(violation);
+        self.store.refuse(violation);
+        outcome
+    }
+
+    fn begin_copy(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) -> SliceOutcome {
         self.store.begin(segment, plain, stopped);
         if segment.segment == 0 {
             self.set_trajectory(TrajectoryState::Null);
@@ -131,10 +150,5 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.set_trajectory(TrajectoryState::Stop);
         }
         SliceOutcome::Done
-    }
-
-    fn refuse_path(&mut self, violation: Violation) -> SliceOutcome {
-        self.violation = Some(violation);
-        SliceOutcome::Refused(DataStatus::IncorrectValue)
     }
 }

@@ -41,6 +41,12 @@ impl PathRange {
         }
     }
 
+    /// The nearest position inside the limits.
+    pub fn nearest_inside(&self, position: f64) -> f64 {
+        let (low, high) = self.limits;
+        position.max(low).min(high)
+    }
+
     /// The limits with their tolerance: the range of a joint that is inside.
     pub fn tolerated(&self) -> (f64, f64) {
         self.tolerated
@@ -63,9 +69,11 @@ impl PathRange {
         (self.tolerated.0 - self.start, self.tolerated.1 + self.start)
     }
 
-    /// Range of a whole path whose first point is at `first`.
+    /// Range of a whole path whose first point is at `first`; as from inside where a path cannot begin there.
     pub fn of_path(&self, first: f64) -> (f64, f64) {
-        if self.limits_contain(first) { self.tolerated } else { self.between(first) }
+        let (low, high) = self.of_first();
+        let comes_in = !self.limits_contain(first) && first >= low && first <= high;
+        if comes_in { self.between(first) } else { self.tolerated }
     }
 
     /// Range of the point that follows one at `before`, of a joint that is coming inside.

@@ -17,8 +17,8 @@ mod verdict;
 
 use jtc_core::check::{Quantity, REST_SPEED};
 use jtc_core::{
-    Config, Friction, JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX, SetPoint, TrajectoryCheck,
-    Violation, interpolate, position_speed,
+    Config, Friction, JOINTS, POINTS_MAX, PathRange, SEGMENT_POINTS_MAX, SEGMENTS_MAX, SetPoint,
+    TrajectoryCheck, Violation, interpolate, position_speed,
 };
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::Joint;
@@ -51,6 +51,22 @@ pub struct Checker<'a> {
     pub start: Option<[f64; JOINTS]>,
     /// Segments that it will be sent in.
     pub upload: UploadOptions,
+}
+
+/// Positions that the path may have (J-36).
+struct Positions {
+    ranges: [PathRange; JOINTS],
+    /// Those of its first point.
+    first: [f64; JOINTS],
+}
+
+impl Positions {
+    /// The limit that `position` of joint `j` is beyond.
+    fn limit_beyond(&self, j: usize, position: f64) -> Option<f64> {
+        let range = &self.ranges[j];
+        let (low, high) = range.of_path(self.first[j]);
+        (!(low..=high).contains(&position)).then(|| range.limit_at(position))
+    }
 }
 
 /// Least significant bit of positions and velocities on the wire.
@@ -197,8 +213,11 @@ impl<'a> Checker<'a> {
 
     fn path(&self, step_ms: u16, points: &[SetPoint], dynamics: Option<&Dynamics>, verdict: &mut Verdict) {
         let h = f64::from(step_ms) * 1e-3;
+        let ranges = std::array::from_fn(|j| PathRange::of(self.config, j, step_ms));
+        let first = points.first().map_or([0.0; JOINTS], |point| point.position);
+        let places = Positions { ranges, first };
         for (i, a) in points.iter().enumerate() {
-            self.moment(a, i, 0.0, dynamics, verdict);
+            self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
             // Also where a point lies in the middle of a step of one or two milliseconds.
@@ -208,7 +227,7 @@ impl<'a> Checker<'a> {
                     figures.speed(speed);
                 }
                 if !senseless && k < step_ms {
-                    self.moment(&interpolate(a, b, h, u), i, f64::from(k), dynamics, verdict);
+                    self.moment(&interpolate(a, b, h, u), i, f64::from(k), &places, dynamics, verdict);
                 }
             }
         }
@@ -244,18 +263,27 @@ impl<'a> Checker<'a> {
     }
 
     /// Limits at one millisecond.
-    fn moment(&self, s: &SetPoint, i: usize, ms: f64, dynamics: Option<&Dynamics>, verdict: &mut Verdict) {
+    fn moment(
+        &self,
+        s: &SetPoint,
+        i: usize,
+        ms: f64,
+        places: &Positions,
+        dynamics: Option<&Dynamics>,
+        verdict: &mut Verdict,
+    ) {
         let torque = dynamics.map(|d| d.inverse(&s.position, &s.velocity, &s.acceleration));
         for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
             let j = joint.index();
             let (q, v, a) = (s.position[j], s.velocity[j], s.acceleration[j]);
+            if let Some(limit) = places.limit_beyond(j, q) {
+                verdict.add(ProblemKind::Position, Some(joint), i, ms, q, limit);
+            }
             let mut over = |kind, value: f64, min: f64, max: f64| {
                 if !(min..=max).contains(&value) {
                     verdict.add(kind, Some(joint), i, ms, value, if value < min { min } else { max });
                 }
             };
-            let (low, high) = self.config.position_range(j);
-            over(ProblemKind::Position, q, low, high);
             over(ProblemKind::Velocity, v, -limit.velocity_max, limit.velocity_max);
             over(ProblemKind::Acceleration, a, -limit.acceleration_max, limit.acceleration_max);
             let mut whole = None;

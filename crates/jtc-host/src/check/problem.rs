@@ -112,6 +112,10 @@ impl Seen {
                     100.0 * HOLD_SHARE
                 )
             }
+            Position => {
+                let excess = three_digits((value - limit).abs());
+                format!("{words}: {value:+.4} {unit} ({excess} {unit} over the limit {limit}) {place}")
+            }
             NotAtRest => format!("{words}: {value:+.4} {unit} {place}"),
             VelocityMismatch | AccelerationMismatch => format!(
                 "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is given"
@@ -120,4 +124,12 @@ impl Seen {
         };
         joint + &what
     }
+}
+
+/// A number with three significant digits.
+fn three_digits(value: f64) -> String {
+    let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
+    // A tenth of a micro-unit is less than any grid that a frame has.
+    let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
+    format!("{value:.decimals$}")
 }

@@ -226,6 +226,77 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
+/// An arm whose joint 2 has limits that lie between two positions of the wire: the nearest ones are 1.150041 and -0.550044 rad, outside.
+fn between_steps() -> Config {
+    let mut config = Config::avena();
+    (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
+    config
+}
+
+/// A motion of joint 2.
+fn of_joint_2(from: f64, to: f64) -> Trajectory {
+    gentle(&[0.0, from, 0.0, 0.0, 0.0, 0.0], &[0.0, to, 0.0, 0.0, 0.0, 0.0], 2.25)
+}
+
+#[test]
+fn j36_a_path_that_ends_on_a_limit_passes() {
+    let config = between_steps();
+    for (from, limit) in [(0.5, 1.15), (0.3, -0.55)] {
+        for t in [of_joint_2(from, limit), of_joint_2(limit, from)] {
+            let verdict = Checker::new(&config).check(&t);
+            assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
+        }
+        // A step further is outside.
+        let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
+        let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
+        assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
+    }
+    // Planned as well: the motion is there, and stays what it is.
+    let planned = plan::joint_move(&[0.0; 6], &[0.0, 1.15, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
+    assert_eq!(planned.points.last().unwrap().position[1], 1.15);
+}
+
+#[test]
+fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
+    let config = between_steps();
+    // Positions 11 997, -5 739, 12 100 and 15 000 of the wire; rounding of the velocities adds some µrad.
+    for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
+    {
+        let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));
+        let limit = if end > 0.0 { 1.15 } else { -0.55 };
+        for text in [verdict.to_string(), verdict.problems[0].to_string()] {
+            let (before, _) = text.split_once(&format!(" rad over the limit {limit})")).expect("it is named");
+            let digits = before.rsplit('(').next().unwrap();
+            let significant = digits.trim_start_matches(['0', '.']);
+            let number: f64 = digits.parse().unwrap();
+            assert!((number - excess).abs() < 1e-5 + 5e-3 * excess && significant.len() == 3, "{text}");
+        }
+    }
+}
+
+/// As the controller: where the arm stands outside, by up to the start tolerance, a path leads back inside.
+#[test]
+fn j36_j58_a_path_from_outside_the_limits_inwards_passes() {
+    let config = between_steps();
+    let verdict = |from: f64, to: f64| {
+        let start = Some([0.0, from, 0.0, 0.0, 0.0, 0.0]);
+        Checker { start, ..Checker::new(&config) }.check(&of_joint_2(from, to))
+    };
+    for (from, to) in [(1.1699, 0.5), (1.1699, 1.15), (1.16, 1.155), (-0.5699, 0.3), (-0.56, -0.56)] {
+        assert!(verdict(from, to).problems.is_empty(), "{from} to {to}: {}", verdict(from, to));
+    }
+    for (from, to) in
+        [(1.155, 1.157), (-0.56, -0.57), (1.172, 0.5), (-0.572, 0.3), (1.1, 1.155), (-0.4, -0.56)]
+    {
+        let verdict = verdict(from, to);
+        let problem = verdict.refusals().next().expect("refused");
+        let limit = if from > 0.0 { 1.15 } else { -0.55 };
+        let found = (problem.kind, problem.joint, problem.limit);
+        assert_eq!(found, (ProblemKind::Position, Joint::from_number(2), limit), "{from} to {to}");
+        assert!((problem.value - limit).abs() > 1e-4, "{from} to {to}: {verdict}");
+    }
+}
+
 #[test]
 fn j36_the_friction_table_bounds_the_speed() {
     let table = jtc_core::Parameters::avena_friction_table();

@@ -47,9 +47,10 @@ impl Planner<'_> {
     ) -> Result<Planned, PlanError> {
         let kinematics = Kinematics::new(model, &Limits::of(self.config).position);
         if line {
-            let start = RoutePoint { target: Target::Joints(*from), leg: LegKind::Line };
+            let first = self.nearest_inside(from);
+            let start = RoutePoint { target: Target::Joints(first), leg: LegKind::Line };
             let points = [start, RoutePoint { target: *target, leg: LegKind::Line }];
-            let route = Route::new(&kinematics, &points, from, (0.0, 0.0))?;
+            let route = Route::new(&kinematics, &points, &first, (0.0, 0.0))?;
             return self.along_route(&route, &[], Some(*from));
         }
         let to = match target {

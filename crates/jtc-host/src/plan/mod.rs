@@ -32,7 +32,7 @@ mod start;
 mod tests;
 mod way;
 
-use jtc_core::{Config, Friction, JOINTS};
+use jtc_core::{Config, Friction, JOINTS, PathRange};
 use jtc_dynamics::ArmModel;
 use jtc_plan::{ArmDynamics, Limits, Motion};
 pub use jtc_plan::{Waypoint, furthest_joint, kinematics};
@@ -144,7 +144,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer.
+    /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer. Where a joint stands
+    /// outside its limits by up to the start tolerance, the motion begins at the nearest place inside (J-58).
     ///
     /// # Errors
     ///
@@ -152,8 +153,18 @@ impl<'a> Planner<'a> {
     /// check finds what no speed mends.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
-        let motion = self.within(|limits| jtc_plan::point_to_point(from, to, limits, arm.as_ref()))?;
-        self.checked(&motion, from, Some(*from), false)
+        let first = self.nearest_inside(from);
+        let motion = self.within(|limits| jtc_plan::point_to_point(&first, to, limits, arm.as_ref()))?;
+        self.checked(&motion, &first, Some(*from), false)
+    }
+
+    /// The nearest place inside the limits from which the controller executes a motion of an arm that stands at `place`: joints that are
+    /// further outside than the start tolerance remain there.
+    fn nearest_inside(&self, place: &[f64; JOINTS]) -> [f64; JOINTS] {
+        std::array::from_fn(|j| {
+            let inside = PathRange::of(self.config, j, 0).nearest_inside(place[j]);
+            if (place[j] - inside).abs() <= self.config.start_tolerance_rad { inside } else { place[j] }
+        })
     }
 
     /// Through waypoints, from rest to rest: straight legs in joint space, with corners rounded within the blend. Times that are given

@@ -2,11 +2,12 @@
 
 use host_kit::{Diagnose, ErrorKind};
 use jtc_core::{POINTS_MAX, SetPoint};
+use jtc_plan::kinematics::Target;
 use proptest::prelude::*;
 
 use super::*;
 use crate::Arm;
-use crate::check::HOLD_SHARE;
+use crate::check::{CheckOptions, HOLD_SHARE};
 
 fn pose() -> impl Strategy<Value = [f64; JOINTS]> {
     prop::array::uniform6(-1.5..1.5f64)
@@ -67,6 +68,56 @@ fn a_target_outside_the_limits_is_refused() {
         let error = joint_move(&[0.0; 6], &[0.0; 6], &config, speed).unwrap_err();
         assert_eq!(error.diagnosis().kind, ErrorKind::Usage, "{speed}: {error}");
     }
+}
+
+/// An arm without brakes falls to an end stop, outside of its limits: a motion leads away from there.
+#[test]
+fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
+    let arm = Arm::avena();
+    let config = arm.config();
+    let (limit, to) = (config.joints[1].position_max, [0.05, 1.45, -1.4, 0.0, 0.6, 0.0]);
+    let planner = Planner { model: Some(&arm.model), ..Planner::new(&config) };
+    for (out, planned) in [(0.0001, true), (0.0199, true), (0.0201, false)] {
+        for sign in [1.0, -1.0] {
+            let at = |q: f64| [0.0, q, -1.5, 0.0, 0.5, 0.0].map(|q| sign * q);
+            let (here, to) = (at(limit + out), to.map(|q| sign * q));
+            let target = |line| planner.to_target(&arm.model, &here, &Target::Joints(to), line);
+            for (what, found) in
+                [("move", planner.to(&here, &to)), ("target", target(false)), ("line", target(true))]
+            {
+                let case = format!("{what}, {out} rad outside at {sign}");
+                if !planned {
+                    let error = found.unwrap_err();
+                    assert_eq!(error.waypoint(), Some(1), "{case}: {error}");
+                    continue;
+                }
+                let found = found.unwrap_or_else(|error| panic!("{case}: {error}"));
+                assert!(found.verdict.is_ok(), "{case}: {}", found.verdict);
+                let first = found.trajectory.points[0].position;
+                assert_eq!(first, at(limit), "{case}");
+                let end = found.trajectory.points.last().unwrap().position;
+                assert!(end.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-6), "{case}: {end:?}");
+            }
+        }
+    }
+}
+
+/// The same for the approach to a trajectory.
+#[test]
+fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
+    let arm = Arm::avena();
+    let t = joint_move(&[0.0, 1.0, 0.0, 0.0, 0.0, 0.0], &[0.3, 0.5, 0.0, 0.0, 0.0, 0.0], &arm.config(), 50.0)
+        .unwrap();
+    let here = [0.0, 1.585, 0.0, 0.0, 0.0, 0.0];
+    let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
+    let course = RunCourse { trajectory: &t, then: None, approach_pct: Some(25.0) };
+    let start = course.start(&arm, &here, &options).expect("an approach");
+    assert!(start.is_approach);
+    let points = &start.checked.trajectory().points;
+    assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(points.last().unwrap().position, t.points[0].position);
+    // Beyond the start tolerance only a jog leads back.
+    assert!(course.start(&arm, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0], &options).is_err());
 }
 
 /// A motion that is too fast for its torque is planned slower.

@@ -202,3 +202,36 @@ fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
         assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Stop, 0));
     }
 }
+
+/// An existing proxy that is told to go beyond a limit waits for ever for a segment that is refused, and forwards no other word.
+#[test]
+fn j36_an_existing_host_outlives_a_trajectory_that_breaks_a_limit() {
+    for baud in [Some(115_200), None] {
+        let mut operator = moving(baud);
+        operator.ask(&host::exec(ExecCommand::Stop)).expect("it stops");
+        operator
+            .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
+            .expect("it stops");
+        operator.run(2_100);
+        let there = operator.world.telemetry().joints.map(|joint| joint.position);
+        let mut beyond = there;
+        beyond[1] = 1.8;
+        for per_segment in [400, 50] {
+            let points = host::there_and_back(&there, &beyond, 2.0, 1, 10);
+            for frame in host::trajectory(&points, 10, per_segment) {
+                assert_eq!(operator.response(&frame).expect("a record").data, DataStatus::NoError);
+            }
+            assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop);
+            let execute = host::exec(ExecCommand::Execute);
+            assert_eq!(operator.response(&execute).expect("a record").data, DataStatus::IncorrectValue);
+        }
+        let points = host::there_and_back(&there, &there, 0.1, 2, 10);
+        for frame in [host::trajectory(&points, 10, 400).concat(), host::exec(ExecCommand::Execute)] {
+            assert_eq!(operator.response(&frame).expect("a record").data, DataStatus::NoError);
+        }
+        operator
+            .wait("Finish", 2_000, |world| world.telemetry().trajectory == TrajectoryState::Finish)
+            .expect("it moves");
+        assert_eq!(operator.world.telemetry().errors, 0);
+    }
+}

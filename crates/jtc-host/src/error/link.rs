@@ -152,6 +152,13 @@ fn after_refused_execution(
              `jtc traj run FILE --approach`",
         );
     }
+    let loaded = state == ControllerState::HoldPos && trajectory.is_in(&[Stop, Finish]);
+    if loaded && code == DataStatus::IncorrectValue {
+        return Some(
+            "the trajectory in the controller breaks a limit, or a bearing is outside the temperatures of the friction table: `jtc status` \
+             shows the joint and what has occurred. Check the file: `jtc traj check FILE`",
+        );
+    }
     // Execution from there is refused for another reason, and resume is not sent.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then_some(

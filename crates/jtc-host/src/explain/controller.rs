@@ -48,7 +48,7 @@ entries! {
     }
     Joint {
         0 "joint-position":
-            "The commanded position is over its limit.",
+            "The commanded position is over its limit, or would be in a trajectory whose Execute was refused.",
             "The trajectory goes beyond the limits of this arm.",
             "Check the trajectory against the arm file.",
             "jtc traj check FILE";

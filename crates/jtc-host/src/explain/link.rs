@@ -37,7 +37,8 @@ entries! {
         6 "incorrect-value":
             "A number that cannot be, or would throw or drop the arm: NaN, negative mass or gain, bounds exchanged, axis not \
              increasing, unknown command, gains, masses or friction beyond the bounds of these drives, a model whose weight the \
-             torque limits cannot hold; or a trajectory that leaves a limit.",
+             torque limits cannot hold; or a trajectory that leaves a limit: when it is uploaded or, if it came from an existing host, \
+             when it is executed.",
             "File or program that sends it.",
             "The push names the number, `jtc traj check` the place of a trajectory.",
             "jtc params push FILE";

@@ -2,6 +2,7 @@
 
 mod checked;
 mod denied;
+mod from_outside;
 mod heavier;
 mod imported;
 mod link;

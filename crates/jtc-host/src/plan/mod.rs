@@ -145,7 +145,8 @@ impl<'a> Planner<'a> {
     }
 
     /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer. Where a joint stands
-    /// outside its limits by up to the start tolerance, the motion begins at the nearest place inside (J-58).
+    /// outside its limits by up to the start tolerance, the motion begins at the nearest place inside (J-58). A goal outside by no more than the
+    /// rounding of a frame is the limit itself (J-36).
     ///
     /// # Errors
     ///
@@ -154,7 +155,8 @@ impl<'a> Planner<'a> {
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
         let first = self.nearest_inside(from);
-        let motion = self.within(|limits| jtc_plan::point_to_point(&first, to, limits, arm.as_ref()))?;
+        let to = within_rounding(self.config, to);
+        let motion = self.within(|limits| jtc_plan::point_to_point(&first, &to, limits, arm.as_ref()))?;
         self.checked(&motion, &first, Some(*from), false)
     }
 
@@ -348,6 +350,14 @@ impl<'a> Planner<'a> {
             });
         }
     }
+}
+
+/// The same place with each joint at its limit that is beyond it by no more than the rounding of a frame (J-36).
+fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
+    std::array::from_fn(|j| {
+        let range = PathRange::of(config, j, 0);
+        if range.contains(place[j]) { range.nearest_inside(place[j]) } else { place[j] }
+    })
 }
 
 /// A motion with the limits that it keeps.

@@ -102,6 +102,18 @@ fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     }
 }
 
+/// Position 16 376 of the wire, with which an int16 file has rounded 1.57 rad up, is 1.570077 rad.
+#[test]
+fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
+    let config = Config::avena();
+    for sign in [1.0, -1.0] {
+        let to = |q: f64| joint_move(&[0.0; 6], &[0.0, sign * q, 0.0, 0.0, 0.0, 0.0], &config, 50.0);
+        let planned = to(16_376.0 * 3.141592 / 32_767.0).unwrap();
+        assert_eq!(planned.points.last().unwrap().position[1], sign * 1.57);
+        assert!(to(1.570_1).unwrap_err().to_string().contains("joint 2"));
+    }
+}
+
 /// The same for the approach to a trajectory.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {

@@ -398,11 +398,11 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
     }
 }
 
-/// What the check has not passed is found in motion: a limit that is moved in while the path is loaded.
+/// What the check has not seen is found in motion: points that change in memory after it.
 #[test]
 fn j43_beyond_what_is_tolerated_a_position_ends_the_motion() {
     let mut points = quintic(0.8, 1.15);
-    // Two steps further than what is tolerated, where the check does not look again.
+    // The points are moved by two steps after the check, so that only the supervision in motion sees it.
     let mut rig = standing(0.8);
     assert_eq!(rig.ask(FrameType::Trajectory, &segment_body(3, 0, 1, 10, &points)), DataStatus::NoError);
     points.iter_mut().skip(140).for_each(|point| point.position[1] += 2);

@@ -112,7 +112,7 @@ proptest! {
         let config = config();
         let ([low, high], velocity, speed) = sampled(0, step, &a, &b);
         let (verdict, more) = (between(&config, step, &a, &b), tolerance(step));
-        // From outside a joint may come inside: `j36_..._inwards_...`.
+        // Paths from outside the limits have tests of their own.
         let before = a.position_rad()[0];
         prop_assume!((-0.7 - more..=1.3 + more).contains(&before));
         let over = |margin: f64| {

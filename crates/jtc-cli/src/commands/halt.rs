@@ -32,7 +32,6 @@ const REST: Duration = Duration::from_secs(5);
 
 /// The arm does not come to rest after a confirmed Stop.
 const STILL_MOVING: &str = "still-moving";
-const STILL_MOVING_HINT: &str = "press the emergency stop; `jtc status` shows the joints";
 
 /// Stops the arm, and waits until it stands.
 pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -389,7 +388,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
         }
     }
     let message = "one program after the other opens the port of the arm";
-    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT);
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(halt::STILL_MOVING);
     Err(NotHalted::after(Sent::Confirmed, failure))
 }
 
@@ -480,7 +479,7 @@ fn directly(
 fn still_moving(end: &End) -> Failure {
     let what = end.moving.as_deref().unwrap_or_default();
     let message = format!("the arm does not come to rest: {what} (state {})", end.state);
-    Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(STILL_MOVING_HINT)
+    Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(end.next_step())
 }
 
 /// An error of a frame that was written, or that an agent refused.

@@ -99,6 +99,9 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
+    /// The arm is in a held stop: what still moves yields to a push, or lowers its load.
+    #[serde(default)]
+    pub held_stop: bool,
 }
 
 impl Answer {
@@ -121,6 +124,9 @@ impl Answer {
     }
 }
 
+/// What to do about an arm that moves after a Stop.
+pub const STILL_MOVING: &str = "press the emergency stop; `jtc status` shows the joints";
+
 impl End {
     /// Of the last status.
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
@@ -141,7 +147,18 @@ impl End {
             None => Some("the arm was not still for long enough".to_owned()),
         };
         let (state, trajectory) = (status.state.to_string(), status.trajectory.to_string());
-        Self { stands, moved: standstill.moved(), moving, state, trajectory }
+        let held_stop = status.is_held_stop();
+        Self { stands, moved: standstill.moved(), moving, state, trajectory, held_stop }
+    }
+
+    /// What to do about an arm that still moves.
+    pub fn next_step(&self) -> &'static str {
+        if self.held_stop {
+            "keep clear and wait: the controller gives way to a push or lowers a load, and holds the arm where it comes to rest; `jtc status` \
+             shows the cause. The emergency stop takes the torque away: an arm without brakes falls"
+        } else {
+            STILL_MOVING
+        }
     }
 }
 
@@ -312,6 +329,19 @@ mod tests {
         }
         let (one, other) = UnixStream::pair().unwrap();
         assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
+    }
+
+    /// The emergency stop would drop an arm whose load is being lowered.
+    #[test]
+    fn j70_an_arm_that_still_moves_in_a_held_stop_is_waited_for() {
+        let standstill = Standstill::after(Halt::Stop);
+        let mut status = Status { state: ControllerState::HoldPos.into(), ..Status::default() };
+        status.joints[1].velocity = 0.3;
+        assert_eq!(End::of(&status, &standstill).next_step(), STILL_MOVING);
+        (status.errors, status.joints[1].internal) =
+            (jtc_wire::error::INTERNAL_JOINTS, jtc_wire::joint_error::TORQUE);
+        let next = End::of(&status, &standstill).next_step();
+        assert!(next.starts_with("keep clear and wait") && next.contains("falls"), "{next}");
     }
 
     #[test]

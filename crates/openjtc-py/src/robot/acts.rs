@@ -46,8 +46,9 @@ impl Machine {
             let status = self.session.next_status()?;
             standstill.see(self.session.now(), &status);
             if self.session.now() >= end {
-                let what = End::of(&status, &standstill).moving.unwrap_or_default();
-                return Err(Failure::fault("still-moving", what, "press the emergency stop"));
+                let end = End::of(&status, &standstill);
+                let next = end.next_step();
+                return Err(Failure::fault("still-moving", end.moving.unwrap_or_default(), next));
             }
             if status.state == ControllerState::Teaching {
                 self.session.end_teaching()?;

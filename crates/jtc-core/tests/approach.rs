@@ -216,13 +216,7 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     for (share, answer) in [(0.5, DataStatus::NoError), (0.98, DataStatus::StartPositionMismatch)] {
         let mut config = Config::avena();
         config.joints[1].torque_max = standing.abs() / share;
-        let mut rig = Rig::new(config);
-        rig.follow = false;
-        for (node, q) in rig.nodes.iter_mut().zip(pose) {
-            node.report.position = q;
-        }
-        rig.defaults();
-        rig.run(1_500);
+        let mut rig = Rig::held_at(config, pose);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let mut rest = RawPoint { position: pose.map(|q| raw(q, 3.141592)), ..RawPoint::default() };
         // Upwards, against gravity.

@@ -246,14 +246,7 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     ] {
         let mut config = Config { delay_ticks: 1, ..Config::avena() };
         config.joints[1].torque_max = hold(pose).abs() / share;
-        let mut rig = Rig::new(config);
-        rig.follow = false;
-        for (node, q) in rig.nodes.iter_mut().zip(pose) {
-            node.report.position = q;
-        }
-        rig.defaults();
-        rig.run(1_500);
-        rig.follow = true;
+        let mut rig = Rig::held_at(config, pose);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let mut rates = [0.0f32; 6];
         rates[joint] = 0.3 * sign as f32;

@@ -120,12 +120,22 @@ impl Rig {
     }
 
     pub fn holding_with(config: Config) -> Self {
+        Self::held_at(config, [0.0; 6])
+    }
+
+    /// The same in a pose, rad.
+    pub fn held_at(config: Config, pose: [f64; 6]) -> Self {
         let mut rig = Self::new(config);
+        rig.follow = false;
+        for (node, position) in rig.nodes.iter_mut().zip(pose) {
+            node.report.position = position;
+        }
         rig.defaults();
         // Until what the arm carries is known: teaching waits for that.
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
+        rig.follow = true;
         rig
     }
 

@@ -3,6 +3,7 @@ pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
+use crate::check::PathRange;
 use crate::controller::Controller;
 use crate::hold_back::{HoldBack, Next};
 use crate::motion::{self, ControlMode, LawInputs};
@@ -36,28 +37,40 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
         let paused = self.path_point();
         let there = self.motion.set.point.position == paused;
-        let approach = if self.near(&paused) { self.approach_to(&paused) } else { None };
+        let approach = match self.near(&paused) {
+            true if there => Some(Phase::Running { leave: None }),
+            true => self.approach_to(&paused),
+            false => None,
+        };
         let approach = approach.ok_or(DataStatus::StartPositionMismatch)?;
         self.braking_ms = None;
         self.motion.hold_back = HoldBack::default();
         self.phase = if self.clock.time == 0.0 || self.parameters.blend_left_ms() > 0 {
             Phase::BEGIN
-        } else if there {
-            self.go_on();
-            Phase::Running { leave: None }
         } else {
             approach
         };
+        if self.phase == (Phase::Running { leave: None }) {
+            self.go_on();
+        }
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
 
-    /// How the arm gets from where it is held to the point of the path at which it begins or goes on; `None` where the torque limits leave too
-    /// little for an approach. Without a distance there is none to the first point.
+    /// How the arm gets from where it is held to the point of the path at which it begins or goes on; `None` where a joint would leave its
+    /// range on the way, or the torque limits leave too little for an approach. Without a distance there is none to the first point.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {
             return Some(Phase::AtStart);
+        }
+        // The path may begin outside the limits (J-36), for an arm that stands there.
+        let within = |j: usize| {
+            let (low, high) = PathRange::of(&self.config, j, self.store.step_ms()).of_path(from[j]);
+            point[j] >= low && point[j] <= high
+        };
+        if !(0..JOINTS).all(within) {
+            return None;
         }
         let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
         self.motion.ramp.begin(nodes, config, parameters.dynamics);
@@ -238,6 +251,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// time is over cannot be stopped by torque: an error of the joints that move. An arm that is held by then and moved by
     /// something else is a matter of the ordinary limits.
     pub(crate) fn brake(&mut self) -> bool {
+        if self.motion.set.jogs_on() {
+            // A jog that has begun since, or goes on again.
+            self.braking_ms = None;
+        }
         let Some(ms) = self.braking_ms else { return false };
         let moving = self.motion.set.moving(&self.nodes);
         let stands = moving == [false; JOINTS];

@@ -94,6 +94,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         if let Some(upload) = self.uploads.get_mut(received.line) {
                             plain = upload.in_plain_words(&command, plain);
                         }
+                        let mut computes = false;
                         let (progress, served) = match command {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
@@ -104,6 +105,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             }
                             command => {
                                 let quick = self.is_quick(&command);
+                                computes = matches!(command, Command::Jog(_));
                                 (
                                     self.carry_out(received, command),
                                     if quick { Served::Quickly } else { Served::Fully },
@@ -112,8 +114,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // What the state forbids has cost nothing.
-                            SliceOutcome::Refused(DataStatus::NotAllowed) => {
+                            // What the state forbids has cost nothing; what a jog may do is computed.
+                            SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
                             SliceOutcome::Refused(status) => (status, served),

@@ -98,6 +98,11 @@ impl Jog {
         ends
     }
 
+    /// It has not begun to come to rest.
+    pub fn goes_on(&self) -> bool {
+        self.clock.is_going()
+    }
+
     fn is_wanted(&self) -> bool {
         self.joints.iter().any(|joint| joint.wanted != 0.0)
     }

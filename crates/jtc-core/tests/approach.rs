@@ -232,6 +232,76 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
+/// A path may begin outside a limit for an arm that stands there (J-36). One that stands inside is not moved out to it, however wide the start
+/// tolerance is.
+#[test]
+fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
+    for (at, first, tolerance, answer) in [
+        (1.149, 1.168, 0.02, DataStatus::StartPositionMismatch),
+        (1.14, 1.62, 0.5, DataStatus::StartPositionMismatch),
+        (1.168, 1.168, 0.02, DataStatus::NoError),
+        (1.168, 1.16, 0.02, DataStatus::NoError),
+        (1.16, 1.149, 0.02, DataStatus::NoError),
+    ] {
+        let mut config = Config { start_tolerance_rad: tolerance, ..Config::avena() };
+        let limit = 1.15;
+        config.joints[1].position_max = limit;
+        let mut rig = Rig::held_at(config, [0.0, at, 0.0, 0.0, 0.0, 0.0]);
+        let mut inwards: Vec<RawPoint> = points();
+        for (k, point) in inwards.iter_mut().enumerate() {
+            point.position[1] = raw(first - 0.001 * k as f64, 3.141592);
+            point.velocity[1] = -point.velocity[1];
+        }
+        rig.upload(&inwards, 10);
+        assert_eq!(rig.exec(ExecCommand::Execute), answer, "{at} {first}");
+        let mut furthest = f64::MIN;
+        for _ in 0..4_000 {
+            rig.tick();
+            furthest = furthest.max(rig.controller.telemetry().joints[1].set_position);
+        }
+        assert!(furthest <= at.max(limit) + 2e-4, "{at} {first}: {furthest}");
+        let finished = rig.trajectory() == TrajectoryState::Finish;
+        assert_eq!((finished, rig.errors()), (answer == DataStatus::NoError, 0), "{at} {first}");
+    }
+}
+
+/// Where the arm was paused it goes on without a way, whatever the torque limits leave: a table with friction at standstill took all of it.
+#[test]
+fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
+    let model = Parameters::avena().model;
+    let (start, end) = ([0.0, 0.4, 0.2, 0.0, 0.0, 0.0], [0.0, 1.4, 0.2, 0.0, 0.0, 0.0]);
+    let held = plant::standing(&model, &end)[1];
+    let mut config = Config { delay_ticks: 1, ..Config::avena() };
+    let limit = held.abs() / 0.95;
+    config.joints[1].torque_max = limit;
+    let mut rig = Rig::held_at(config, start);
+    let mut table = Vec::new();
+    for j in 0..6 {
+        table.extend((0..20).map(|i| -1.6 + 3.2 * i as f32 / 19.0));
+        table.extend((0..20).map(|i| 5.0 * i as f32));
+        table.extend([if j == 1 { 0.03 * (limit * held.signum()) as f32 } else { 0.0 }; 400]);
+    }
+    assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table)), DataStatus::NoError);
+    rig.run(1_000);
+    let path: Vec<RawPoint> = (0..=400)
+        .map(|k| {
+            let u = f64::from(k) / 400.0;
+            let mut point = RawPoint { position: start.map(|q| raw(q, 3.141592)), ..RawPoint::default() };
+            let (q, v) = (u.powi(3) * (10.0 + u * (6.0 * u - 15.0)), 7.5 * (u * (1.0 - u)).powi(2));
+            rig::put(&mut point, 1, 0.4 + q, v, 3.75 * u * (1.0 - u) * (1.0 - 2.0 * u));
+            point
+        })
+        .collect();
+    rig.upload(&path, 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(6_000, |rig| rig.controller.telemetry().joints[1].set_position > 1.35);
+    assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
+    rig.until(700, |rig| rig.trajectory() == TrajectoryState::Pause);
+    rig.run(100);
+    assert_eq!((rig.exec(ExecCommand::Execute), rig.errors()), (DataStatus::NoError, 0));
+    rig.until(6_000, |rig| rig.trajectory() == TrajectoryState::Finish);
+}
+
 /// An arm that stands at the first point sets out at once.
 #[test]
 fn j34_without_a_distance_there_is_no_approach() {

@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_core::{Config, ControllerState, Parameters, Payload};
+use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState};
 use jtc_wire::{DataStatus, FrameType, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats};
@@ -263,5 +263,120 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
         assert_eq!(speed > 0.0, moves, "{about}: {speed}");
         assert!(share > 0.9 || speed > 0.29, "{about}: {speed}");
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
+    }
+}
+
+/// A Stop on a path or the end of a jog is over when the next jog goes on, also where a joint is touched meanwhile: the jog is no stop that has
+/// failed.
+#[test]
+fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
+    let body = |rate: f32| floats([rate, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    for (torque_release, jogs_before) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mut rig = Rig::holding_with(Config { torque_release, delay_ticks: 1, ..Config::avena() });
+        if jogs_before {
+            for tick in 0..500 {
+                if tick % 50 == 0 {
+                    rig.send(FrameType::Jog, &body(0.5));
+                }
+                rig.tick();
+            }
+            rig.send(FrameType::Jog, &body(0.0));
+            rig.run(30);
+        } else {
+            rig.move_along(&rig::pieces(1, &[(0.5, 40), (0.0, 300), (-0.5, 40)]), 1_000);
+            rig.urgent(0, UrgentCommand::Stop);
+            rig.until(600, |rig| rig.trajectory() == TrajectoryState::Stop);
+        }
+        // Slower than what the release of the arm asks for.
+        rig.nodes[4].report.velocity = 0.03;
+        for tick in 0..1_500 {
+            if tick == 400 {
+                rig.nodes[4].report.velocity = 0.0;
+            }
+            if tick % 50 == 0 {
+                rig.send(FrameType::Jog, &body(0.5));
+            }
+            rig.tick();
+            let about = format!("{torque_release} {jogs_before}, {tick} ms");
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
+        }
+        assert!(rig.controller.telemetry().joints[0].set_velocity > 0.49);
+    }
+}
+
+/// A key that is held down takes joint 2 of an arm with 3.5 or 4 kg outwards to where it stays, without an error, and leaves it enough torque to
+/// come back.
+#[test]
+fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
+    for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
+        let model = loaded(Parameters::avena().model, mass);
+        let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), [0.0, 0.6, 0.2, 0.0, 0.0, 0.0]);
+        let mut rig = arm.holding(Config { payload: Payload { mass, ..Payload::NONE }, ..Config::avena() });
+        arm.brakes = false;
+        arm.run(&mut rig, 1_000);
+        let jog = |arm: &mut Plant, rig: &mut Rig, rate: f32, seconds: usize| {
+            for k in 0..1_000 * seconds {
+                if k % 50 == 0 {
+                    rig.send(FrameType::Jog, &floats([0.0, rate, 0.0, 0.0, 0.0, 0.0]));
+                }
+                arm.tick(rig);
+                let about = format!("{mass} kg, {rate} rad/s, {k} ms, {:?}", arm.q);
+                assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
+            }
+        };
+        jog(&mut arm, &mut rig, 0.2, seconds);
+        let (out, share) = (arm.q[1], shares(&plant::standing(&model, &arm.q))[1]);
+        assert!(share > 0.85 && share < 0.95, "{mass} kg: {share}");
+        arm.run(&mut rig, 1_000);
+        jog(&mut arm, &mut rig, -0.2, 15);
+        assert!(arm.q[1] < out - 0.3, "{mass} kg: from {out} to {}", arm.q[1]);
+    }
+}
+
+/// What is left for a jog is computed, so that one of them is served in a tick, refused or not.
+#[test]
+fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
+    let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];
+    let held = plant::standing(&Parameters::avena().model, &pose)[1];
+    for (share, answer) in [(0.999, DataStatus::NotAllowed), (0.5, DataStatus::NoError)] {
+        let mut config = Config { delay_ticks: 1, ..Config::avena() };
+        config.joints[1].torque_max = held.abs() / share;
+        let mut rig = Rig::held_at(config, pose);
+        rig.run(1_000);
+        // Upwards.
+        let rate = 0.3 * held.signum() as f32;
+        let jog = floats([0.0, rate, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(rig.ask(FrameType::Jog, &jog), answer, "{share}");
+        (0..8).for_each(|_| rig.send(FrameType::Jog, &jog));
+        for _ in 0..8 {
+            rig.tick();
+            assert_eq!(rig.last.host_done, 1, "{share}");
+        }
+    }
+}
+
+/// A joint that is set absent holds nothing, whatever the model says of it.
+#[test]
+fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
+    let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
+    let held = plant::standing(&Parameters::avena().model, &pose)[1];
+    let mut config = Config { delay_ticks: 1, absent_position: pose, ..Config::avena() };
+    config.absent[1] = true;
+    config.joints[1].torque_max = held.abs() / 1.2;
+    let mut rig = Rig::new(config);
+    rig.follow = false;
+    for (node, q) in rig.nodes.iter_mut().zip(pose) {
+        node.report.position = q;
+    }
+    rig.nodes[1].silent = true;
+    rig.defaults();
+    rig.run(1_500);
+    rig.follow = true;
+    rig.run(500);
+    for joint in [0, 2, 5] {
+        let mut rates = [0.0f32; 6];
+        rates[joint] = 0.2;
+        assert_eq!(rig.ask(FrameType::Jog, &floats(rates)), DataStatus::NoError, "joint {}", joint + 1);
+        rig.run(900);
     }
 }

@@ -83,7 +83,9 @@ impl PathRange {
 
     /// Range of what lies between a point at `before` and the next one, of a joint that is coming inside.
     pub(super) fn between(&self, before: f64) -> (f64, f64) {
-        let ((low, high), area) = (self.tolerated, self.area.max(before.abs()));
+        let (low, high) = self.tolerated;
+        // One that is outside the area already has the tolerance on its way in.
+        let area = if before.abs() > self.area { f64::INFINITY } else { self.area };
         if self.is_below(before) {
             ((before - self.tolerance).max(-area), high)
         } else {

@@ -15,6 +15,9 @@ use crate::teach::Payload;
 use crate::yielding::{DAMPING_RATE, Joint, Yield, Yielded};
 use crate::{JOINTS, friction, joint_error};
 
+/// Speed below which what the integral finds in motion may be friction that the model has wrong, rad/s: no load is learned from it.
+const CREEPS: f64 = 0.05;
+
 /// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
 
@@ -335,8 +338,10 @@ impl ControlLaw {
     fn observe_load(&mut self, set: &SetValues, config: &Config) {
         let j = usize::from(self.observed) % JOINTS;
         self.observed = (j as u8 + 1) % JOINTS as u8;
+        let speed = set.point.velocity[j].abs();
+        let creeps = speed > 0.0 && speed < CREEPS;
         // While the integral gives back what is in the model now, it says nothing of a load.
-        if self.yields[j].is_none() && self.unwinds_ms == 0 {
+        if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             self.loads[j].observe(self.torque[j].pid.i, set.settled(j), &config.joints[j]);
         }
     }

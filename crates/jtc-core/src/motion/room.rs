@@ -8,6 +8,8 @@ use crate::{JOINTS, jog};
 
 /// Highest share of a torque limit that an approach asks for; the feedback of a fast one takes up to a fifth.
 const APPROACH_TORQUE: f64 = 0.8;
+/// Highest share of a torque limit that a jog takes: the rest is for the feedback, and for the way back out of a place that takes more to hold.
+const JOG_TORQUE: f64 = 0.92;
 /// Share of what is left of a torque limit that a jog uses, and an approach where standing alone takes nearly all of the limit.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
@@ -21,6 +23,8 @@ const REST_S: f64 = 0.3;
 /// Speed below which friction may count for less than when the joint slides, rad/s: a jog that leaves nothing of a limit at the wanted speed may
 /// be possible at this one.
 const CREEP: f64 = 0.02;
+/// Speed from which on a joint slides, so that the friction of the model is all there, rad/s.
+const SLIDES: f64 = 0.1;
 /// Highest speed that counts as none, rad/s.
 const NO_SPEED: f64 = 1e-3;
 /// Share of a torque limit that counts as left at least for a motion that unloads the joint.
@@ -55,11 +59,19 @@ impl Motion {
             let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
             let times = (0..JOINTS).map(|j| {
                 let limit = config.joints[j].torque_max;
-                let held = standing.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()));
+                let held = highest(&standing, j);
                 let most = (APPROACH_TORQUE * limit).max(held + SHARE_OF_REST * (limit - held));
-                let left = most - highest(&standing, &friction, j);
+                let slides = if way[j] == 0.0 { 0.0 } else { friction[j] };
+                let demand = standing.iter().fold(held, |most, torque| most.max((torque[j] + slides).abs()));
+                let left = most - demand;
                 let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * way[k]).sum();
-                if left > 0.0 { 1_000.0 * sqrt(TOP_ACCELERATION * push.abs() / left) } else { f64::INFINITY }
+                if push == 0.0 {
+                    0.0
+                } else if left > 0.0 {
+                    1_000.0 * sqrt(TOP_ACCELERATION * push.abs() / left)
+                } else {
+                    f64::INFINITY
+                }
             });
             times.fold(shortest, f64::max)
         };
@@ -113,12 +125,13 @@ impl Motion {
     ) -> f64 {
         let left = self.jog_leaves(velocity, inputs);
         (0..JOINTS).fold(1.0, |share: f64, j| {
-            let needed = needed(j);
+            let needed = if inputs.config.absent[j] { 0.0 } else { needed(j) };
             if needed > 0.0 { share.min((SHARE_OF_REST * left[j] / needed).max(0.0)) } else { share }
         })
     }
 
-    /// What a jog at `velocity` (rad/s) leaves of each torque limit, here and where the joint would come to rest, N·m.
+    /// What a jog at `velocity` (rad/s) leaves of each torque limit, here and where the joint would come to rest, N·m. Friction counts in both
+    /// directions: a joint that is lowered has to be raised again.
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
@@ -129,28 +142,37 @@ impl Motion {
             (here[j] + velocity[j] * ahead_s).max(low.min(here[j])).min(high.max(here[j]))
         });
         let standing = [here, &rest].map(|q| self.standing(q, inputs));
-        let friction = compensation(inputs, velocity).0;
+        let faster = velocity.map(|v| if v == 0.0 { 0.0 } else { v.abs().max(SLIDES).copysign(v) });
+        let friction = compensation(inputs, &faster).0;
         core::array::from_fn(|j| {
             let limit = config.joints[j].torque_max;
-            let left = limit - highest(&standing, &friction, j);
             let [held, held_there] = standing.map(|torque| torque[j]);
-            // What lifts the joint takes more torque at first, also to where it then takes less to hold.
+            let (held, held_there) = (held.abs(), held_there.abs());
+            let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
+            // A joint that comes to where it takes less to hold moves as long as there is any torque for it.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
-            let unloads = held_there.abs() < held.abs() && held * push < 0.0;
-            if unloads { left.max(UNLOADING * limit) } else { left }
+            let lifts = standing[0][j] * push > 0.0;
+            let possible = !lifts || held + friction[j].abs() <= limit;
+            if held_there < held && possible { left.max(UNLOADING * limit) } else { left }
         })
     }
 
-    /// Torques that hold the arm at `q` (rad): gravity, and the loads that were found.
+    /// Torques that hold the arm at `q` (rad): gravity, and the loads that were found, or what the integrals have now where that is more. While
+    /// these give back a payload that the model has now, there is no other load.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
-        core::array::from_fn(|j| gravity[j] + self.law.load(j))
+        if self.law.unwinds_ms > 0 {
+            return gravity;
+        }
+        core::array::from_fn(|j| {
+            let found = gravity[j] + self.law.load(j);
+            let now = gravity[j] + self.law.torque[j].pid.i;
+            if now.abs() > found.abs() { now } else { found }
+        })
     }
 }
 
-/// The highest torque of a joint that stands or moves steadily at the ends of a motion, N·m.
-fn highest(standing: &[[f64; JOINTS]; 2], friction: &[f64; JOINTS], j: usize) -> f64 {
-    standing
-        .iter()
-        .fold(0.0, |most: f64, torque| most.max(torque[j].abs()).max((torque[j] + friction[j]).abs()))
+/// The highest torque of a joint at the ends of a motion, N·m.
+fn highest(torques: &[[f64; JOINTS]; 2], j: usize) -> f64 {
+    torques.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()))
 }

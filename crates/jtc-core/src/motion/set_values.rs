@@ -107,6 +107,11 @@ impl SetValues {
         self.jog = None;
     }
 
+    /// The arm is jogged, and does not come to rest.
+    pub fn jogs_on(&self) -> bool {
+        self.jog.as_ref().is_some_and(Jog::goes_on)
+    }
+
     /// The arm is jogged, or has not come to rest since.
     pub fn jogging(&self) -> bool {
         self.jog.is_some()

@@ -20,8 +20,7 @@ const TOP_ACCELERATION: f64 = 5.774;
 
 /// Time in which a jogged joint can come to rest with its share of what is left, s.
 const REST_S: f64 = 0.3;
-/// Speed below which friction may count for less than when the joint slides, rad/s: a jog that leaves nothing of a limit at the wanted speed may
-/// be possible at this one.
+/// Speed of a slow jog, rad/s: where friction leaves nothing of a limit at the wanted speed, it may leave some at this one.
 const CREEP: f64 = 0.02;
 /// Speed from which on a joint slides, so that the friction of the model is all there, rad/s.
 const SLIDES: f64 = 0.1;

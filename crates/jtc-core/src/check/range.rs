@@ -64,9 +64,9 @@ impl PathRange {
         position >= low && position <= high
     }
 
-    /// Range of the first point: up to the start tolerance outside the limits.
+    /// Range of the first point: up to the start tolerance outside the limits, and inside the working area.
     pub fn of_first(&self) -> (f64, f64) {
-        (self.tolerated.0 - self.start, self.tolerated.1 + self.start)
+        ((self.tolerated.0 - self.start).max(-self.area), (self.tolerated.1 + self.start).min(self.area))
     }
 
     /// Range of a whole path whose first point is at `first`; as from inside where a path cannot begin there.
@@ -83,9 +83,7 @@ impl PathRange {
 
     /// Range of what lies between a point at `before` and the next one, of a joint that is coming inside.
     pub(super) fn between(&self, before: f64) -> (f64, f64) {
-        let (low, high) = self.tolerated;
-        // One that is outside the area already has the tolerance on its way in.
-        let area = if before.abs() > self.area { f64::INFINITY } else { self.area };
+        let ((low, high), area) = (self.tolerated, self.area.max(before.abs()));
         if self.is_below(before) {
             ((before - self.tolerance).max(-area), high)
         } else {

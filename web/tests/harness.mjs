@@ -174,6 +174,14 @@ export function held(page) {
   return state(page).getByText('Holding', { exact: true }).waitFor();
 }
 
+/**
+ * Waits until the page says this in passing. To be begun before the touch that causes it: a busy browser answers that after seconds, and
+ * the words may be gone by then.
+ */
+export function says(page, pattern) {
+  return page.waitForFunction((source) => new RegExp(source).test(document.body.textContent), pattern.source, { polling: 100 });
+}
+
 /** The browser has complained of nothing but refused requests. */
 export function fine(page) {
   assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);

@@ -142,7 +142,8 @@ def test_a_move_without_a_speed_is_slow_and_says_so(robot):
     assert f"move {told}" in slow.notes
     robot.move([0] * 6, speed=100)
     same = robot.move(HOME, speed=25)
-    assert same.duration == pytest.approx(slow.duration, abs=0.1) and not same.notes
+    # With an approach of 0.2 s, or without one where the arm stands exactly at the first point.
+    assert same.duration == pytest.approx(slow.duration, abs=0.25) and not same.notes
     robot.move([0] * 6, speed=100)
     assert slow.duration > 1.7 * robot.move(HOME, speed=100).duration
     assert f"move {told}" in robot.move(flange=[0.6, -0.3, 0.4, 0, 0, 0]).notes

@@ -57,8 +57,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// How the arm gets from where it is held to the point of the path at which it begins or goes on; `None` where a joint would leave its
-    /// range on the way, or the torque limits leave too little for an approach. Without a distance there is none to the first point.
+    /// The phase that takes the arm from where it is held to `point` of the path; `None` if a joint would leave its range on the way, or if the
+    /// torque limits leave too little for an approach. An arm that stands exactly at the first point needs no approach.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {

@@ -114,7 +114,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // What the state forbids has cost nothing; what a jog may do is computed.
+                            // A command that the state forbids has cost nothing. A jog may have been computed before it was refused.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }

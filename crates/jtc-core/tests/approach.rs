@@ -265,7 +265,7 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// Where the arm was paused it goes on without a way, whatever the torque limits leave: a table with friction at standstill took all of it.
+/// An arm that stands exactly where it was paused goes on, however little torque is left. A friction table with torque at standstill once kept it there.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;

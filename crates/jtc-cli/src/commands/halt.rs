@@ -388,7 +388,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
         }
     }
     let message = "one program after the other opens the port of the arm";
-    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(halt::STILL_MOVING);
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(halt::STILL_MOVING_HELP);
     Err(NotHalted::after(Sent::Confirmed, failure))
 }
 

@@ -80,7 +80,7 @@ impl Motion {
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
 
-    /// What is left for a jog at the `wanted` velocities (rad/s); `None` where nothing is left of a torque limit, and the jog needs more of it.
+    /// Velocities and accelerations that the torque limits allow a jog at the `wanted` velocities (rad/s); `None` if a limit allows no motion.
     /// For the inertia of a ramp that begins here.
     pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
@@ -156,8 +156,8 @@ impl Motion {
         })
     }
 
-    /// Torques that hold the arm at `q` (rad): gravity, and the loads that were found, or what the integrals have now where that is more. While
-    /// these give back a payload that the model has now, there is no other load.
+    /// Torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While the integrals
+    /// give back a payload that the model has taken over, only gravity counts.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {

@@ -114,7 +114,7 @@ fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     }
 }
 
-/// The same for the approach to a trajectory.
+/// An approach to a trajectory begins there, too.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let arm = Arm::avena();

@@ -125,7 +125,7 @@ impl Answer {
 }
 
 /// What to do about an arm that moves after a Stop.
-pub const STILL_MOVING: &str = "press the emergency stop; `jtc status` shows the joints";
+pub const STILL_MOVING_HELP: &str = "press the emergency stop; `jtc status` shows the joints";
 
 impl End {
     /// Of the last status.
@@ -157,7 +157,7 @@ impl End {
             "keep clear and wait: the controller gives way to a push or lowers a load, and holds the arm where it comes to rest; `jtc status` \
              shows the cause. The emergency stop takes the torque away: an arm without brakes falls"
         } else {
-            STILL_MOVING
+            STILL_MOVING_HELP
         }
     }
 }
@@ -337,7 +337,7 @@ mod tests {
         let standstill = Standstill::after(Halt::Stop);
         let mut status = Status { state: ControllerState::HoldPos.into(), ..Status::default() };
         status.joints[1].velocity = 0.3;
-        assert_eq!(End::of(&status, &standstill).next_step(), STILL_MOVING);
+        assert_eq!(End::of(&status, &standstill).next_step(), STILL_MOVING_HELP);
         (status.errors, status.joints[1].internal) =
             (jtc_wire::error::INTERNAL_JOINTS, jtc_wire::joint_error::TORQUE);
         let next = End::of(&status, &standstill).next_step();

@@ -10,6 +10,10 @@ const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8]
 
 /// Silence that ends a frame (J-03).
 pub const GAP: Duration = Duration::from_millis(5);
+/// Systems hand a write to a terminal in pieces, the first of at least this many bytes.
+const PIECE: usize = 2048;
+/// Time of a byte on a serial line of 115,200 baud.
+const BYTE: Duration = Duration::from_micros(87);
 
 /// Bytes that came, and the pieces that are complete.
 #[derive(Default)]
@@ -60,29 +64,38 @@ impl Frames {
 ///
 /// Virtual time may pass faster than the host's: with `--speed max`, and while the simulator makes up for a delay. A gap between two pieces
 /// of a frame is then no longer than it was for the host.
+///
+/// A busy system can suspend a host between two pieces of one write for longer than a frame may be silent. The adapter of a real line still
+/// sends what it holds then. So a long frame counts as silent only after a line would have sent what has come of it.
 pub struct Incoming {
     head: Vec<u8>,
+    /// Bytes of the present frame that have come.
+    come: usize,
     /// Bytes of the present frame that have not come.
     missing: usize,
     /// Bytes have come that go on with a frame.
     continued: bool,
-    /// When the line carried the last byte.
+    /// When the line carried the last byte; for a long frame, when a serial line would have.
     heard: Instant,
 }
 
 impl Incoming {
     /// No byte has come.
     pub fn new(now: Instant) -> Self {
-        Self { head: Vec::new(), missing: 0, continued: false, heard: now }
+        Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
 
-    /// Takes bytes of the host in.
-    pub fn push(&mut self, bytes: &[u8]) {
+    /// Takes bytes of the host in that came at `now`.
+    pub fn push(&mut self, bytes: &[u8], now: Instant) {
         self.continued |= self.mid_frame();
         for &byte in bytes {
+            self.come += 1;
             if self.missing > 0 {
                 self.missing -= 1;
                 continue;
+            }
+            if self.head.is_empty() {
+                self.come = 1;
             }
             if self.head.is_empty() && byte != HEADER {
                 continue;
@@ -95,11 +108,16 @@ impl Incoming {
                 self.head.clear();
             }
         }
+        self.heard = if self.mid_frame() && self.come >= PIECE {
+            self.heard.max(now) + BYTE * bytes.len() as u32
+        } else {
+            self.heard.min(now)
+        };
     }
 
     /// The line carries bytes at `now`.
     pub fn carries(&mut self, now: Instant) {
-        self.heard = now;
+        self.heard = self.heard.max(now);
     }
 
     /// Bytes of a frame are still to come.
@@ -111,7 +129,7 @@ impl Incoming {
     /// will not be completed.
     pub fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
-            self.heard = now;
+            self.carries(now);
             return Some(Duration::ZERO);
         }
         let silence = self.mid_frame().then(|| now.saturating_duration_since(self.heard))?;
@@ -160,22 +178,46 @@ mod tests {
         let start = Instant::now();
         let mut incoming = Incoming::new(start);
         for &byte in &[0x00, 0x9B, 0x0B, 0x00, 0x07, 0x03, 0x7D] {
-            incoming.push(&[byte]);
+            incoming.push(&[byte], start);
         }
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         let later = |ms| start + Duration::from_millis(ms);
         assert_eq!(incoming.silence(later(4)), Some(Duration::from_millis(4)));
         incoming.carries(later(4));
         assert_eq!(incoming.silence(later(8)), Some(Duration::from_millis(4)));
-        incoming.push(&[0x9E]);
+        incoming.push(&[0x9E], later(8));
         assert_eq!(incoming.silence(later(8)), Some(Duration::ZERO), "the last byte came in time");
         assert_eq!(incoming.silence(later(8)), None, "the frame is complete");
-        incoming.push(&[0x9B, 0x0B, 0xFF, 0xFF]);
+        incoming.push(&[0x9B, 0x0B, 0xFF, 0xFF], later(8));
         assert!(!incoming.mid_frame(), "no frame has this length");
-        incoming.push(&[0x9B, 0x0B]);
+        incoming.push(&[0x9B, 0x0B], later(8));
         incoming.carries(later(8));
         assert_eq!(incoming.silence(later(12)), Some(Duration::from_millis(4)));
         assert_eq!(incoming.silence(later(13)), None, "too late");
         assert!(!incoming.mid_frame(), "the next byte begins anew");
+    }
+
+    #[test]
+    fn a_long_write_may_be_interrupted() {
+        let start = Instant::now();
+        let later = |ms| start + Duration::from_millis(ms);
+        let mut incoming = Incoming::new(start);
+        let mut frame = vec![0; 9006];
+        frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
+        // The host is suspended behind 2,048 bytes, which take 178 ms on a line.
+        incoming.push(&frame[..2048], start);
+        assert_eq!(incoming.silence(start), Some(Duration::ZERO));
+        assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
+        incoming.push(&frame[2048..], later(170));
+        assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
+        assert!(!incoming.mid_frame(), "complete");
+        incoming.push(&frame[..9], later(171));
+        assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
+        assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
+        // Of a host that died there, silence counts afterwards; a short frame is not waited for.
+        incoming.push(&frame[..2048], later(170));
+        assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
+        incoming.push(&frame[..2047], later(600));
+        assert_eq!(incoming.silence(later(605)), None);
     }
 }

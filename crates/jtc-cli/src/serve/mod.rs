@@ -157,7 +157,7 @@ impl Server {
             if n == 0 {
                 return Ok(());
             }
-            self.incoming.push(&buffer[..n]);
+            self.incoming.push(&buffer[..n], Instant::now());
             self.world.host_write(&buffer[..n]);
         }
     }

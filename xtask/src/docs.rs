@@ -14,10 +14,10 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     std::fs::copy(scratch.path().join("picture.svg"), root().join("docs/demo.svg"))
         .context("docs/demo.svg")?;
     println!("wrote docs/demo.svg");
-    let mut matrix = cargo(&["test", "--package", "jtc-sim", "--test", "fault_matrix"]);
+    let mut matrix = cargo(&["test", "--package", "jtc-sim", "--test", "suite", "fault_matrix::"]);
     run(matrix.env("UPDATE_DOCS", "1"))?;
     println!("wrote the fault matrix of docs/safety.md");
-    let mut reactions = cargo(&["test", "--package", "jtc-core", "--test", "reactions"]);
+    let mut reactions = cargo(&["test", "--package", "jtc-core", "--test", "suite", "reactions::"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
     // One after the other: they write the same page.
@@ -26,22 +26,22 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     run(drawn.env("UPDATE_DOCS", "1"))?;
     println!("wrote the diagrams of docs/protocol-jtc.md");
     for (package, part) in [("jtc-cli", "jtc"), ("ucom-cli", "ucom")] {
-        let mut troubles = cargo(&["test", "--package", package, "--test", "troubles"]);
+        let mut troubles = cargo(&["test", "--package", package, "--test", "suite", "troubles::"]);
         run(troubles.env("UPDATE_DOCS", "1"))?;
         println!("wrote the part of docs/troubles.md about {part}");
     }
-    let mut cycle = cargo(&["test", "--package", "jtc-cli", "--test", "cycle"]);
+    let mut cycle = cargo(&["test", "--package", "jtc-cli", "--test", "suite", "cycle::"]);
     run(cycle.env("UPDATE_DOCS", "1"))?;
     println!("wrote what the commands of docs/from-two-poses-to-a-cycle.md print");
     for package in ["jtc-host", "ucom-host"] {
-        let mut codes = cargo(&["test", "--package", package, "--test", "codes_page"]);
+        let mut codes = cargo(&["test", "--package", package, "--test", "suite", "codes_page::"]);
         run(codes.env("UPDATE_DOCS", "1"))?;
         println!("wrote the part of docs/codes.md of {package}");
     }
     for package in ["jtc-cli", "ucom-cli"] {
         let page = ["test", "--package", package, "--bins", "--", "the_page_of_the_commands"];
         run(cargo(&page).env("UPDATE_DOCS", "1"))?;
-        let mut pages = cargo(&["test", "--package", package, "--test", "pages"]);
+        let mut pages = cargo(&["test", "--package", package, "--test", "suite", "pages::"]);
         run(pages.env("UPDATE_DOCS", "1"))?;
         println!("wrote what the commands of {package} are and print on the pages that show it");
     }

@@ -25,6 +25,7 @@ mod soak;
 mod suite;
 mod tally;
 mod test;
+mod test_files;
 mod web;
 mod worked_bytes;
 

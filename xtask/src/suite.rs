@@ -1,7 +1,9 @@
 //! The tests of the workspace: cargo builds them, and their programs run beside each other.
 //!
 //! Cargo runs one test program after the other, and many of ours wait for what takes its time on a real line: leases that lapse, boards
-//! that are silent. They use little of a processor, so several run at once.
+//! that are silent. They use little of a processor, so several run at once. The tests of a crate are linked into one program, `suite`, which
+//! is run once for each of its files: no test then shares a process with more than those of its own file.
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -13,10 +15,14 @@ use crate::beside::{self, Ended};
 use crate::shell::{self, cargo, run_lines};
 use crate::tally::{Counts, Outcome};
 
-/// A test program that cargo has built.
+/// The tests of one file of a crate, or all of a program that is no `suite`.
 struct Program {
     package: PathBuf,
     executable: PathBuf,
+    /// Of the program, and of the file within it.
+    name: String,
+    /// All, if there are none.
+    tests: Vec<String>,
 }
 
 /// Every test of the workspace, and those in its documentation; their own counts are summed up.
@@ -38,9 +44,10 @@ pub fn run() -> Result<Outcome> {
     Ok(Outcome::Counted(counts))
 }
 
-/// Builds the test programs, in cargo's order.
+/// Builds the test programs, and no examples: the lints compile those.
 fn build() -> Result<Vec<Program>> {
-    let mut build = cargo(&["test", "--workspace", "--no-run", "--message-format=json-render-diagnostics"]);
+    let mut build =
+        cargo(&["test", "--workspace", "--tests", "--no-run", "--message-format=json-render-diagnostics"]);
     let messages = shell::read(&mut build)?;
     let mut programs = Vec::new();
     for message in messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok()) {
@@ -48,12 +55,41 @@ fn build() -> Result<Vec<Program>> {
         if let (Some(executable), true) = (executable, message["profile"]["test"] == true) {
             let manifest = message["manifest_path"].as_str().context("cargo names no manifest of a test")?;
             let package = Path::new(manifest).parent().context("a manifest in no directory")?;
-            programs.push(Program { package: package.into(), executable: executable.into() });
+            let name =
+                message["target"]["name"].as_str().context("cargo names no target of a test")?.to_owned();
+            let (package, executable) = (package.into(), executable.into());
+            programs.extend(Program { package, executable, name, tests: Vec::new() }.by_file()?);
         }
     }
-    programs.sort_by(|a, b| a.executable.cmp(&b.executable));
+    programs.sort_by(|a, b| (&a.name, &a.package).cmp(&(&b.name, &b.package)));
     ensure!(!programs.is_empty(), "cargo has built no test at all");
     Ok(programs)
+}
+
+impl Program {
+    /// A suite in as many parts as it has files.
+    fn by_file(self) -> Result<Vec<Self>> {
+        if self.name != "suite" {
+            return Ok(vec![self]);
+        }
+        let list = shell::read(shell::command(&self.executable).args(["--list", "--format", "terse"]))?;
+        let part = |(file, tests): (&str, Vec<String>)| Self {
+            package: self.package.clone(),
+            executable: self.executable.clone(),
+            name: format!("{file} of {}", self.name),
+            tests,
+        };
+        Ok(files(&list).into_iter().map(part).collect())
+    }
+}
+
+/// Names of tests by the module at the root that they are in, from a list of libtest's.
+fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
+    let mut files = BTreeMap::<&str, Vec<String>>::new();
+    for test in list.lines().filter_map(|line| line.strip_suffix(": test")) {
+        files.entry(test.split("::").next().unwrap_or(test)).or_default().push(test.to_owned());
+    }
+    files
 }
 
 /// Tests of one program of boards that run at once, for each processor: they wait for nearly all of their time. Of others one runs, which
@@ -66,10 +102,11 @@ const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
     let mut failures = Vec::new();
     let ended = |program: Program, ended: Result<Ended>| {
-        let name = program.executable.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let package = program.package.file_name().unwrap_or_default().to_string_lossy();
+        let name = format!("{} in {package}", program.name);
         match ended {
             Ok(Ended { output, passed, seconds }) => {
-                println!("\n$ {name} in {} ({seconds:.1} s)\n{}", program.package.display(), output.trim());
+                println!("\n$ {name} ({seconds:.1} s)\n{}", output.trim());
                 output.lines().for_each(|line| count_results(line, counts));
                 if !passed {
                     failures.push(name);
@@ -93,6 +130,9 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
         } else {
             shell::command(&program.executable)
         };
+        if !program.tests.is_empty() {
+            command.arg("--exact").args(&program.tests);
+        }
         command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
         if program.package.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ucom")) {
             command.env("RUST_TEST_THREADS", &threads);
@@ -115,4 +155,24 @@ pub fn count_results(line: &str, counts: &mut Counts) {
 fn count(line: &str, word: &str) -> u64 {
     let Some((before, _)) = line.split_once(&format!(" {word}")) else { return 0 };
     before.rsplit(' ').next().and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_are_listed_by_file() {
+        let list = "delay::a: test\nrecords::b: test\ndelay::inner::c: test\nat_the_root: test\n\n4 tests, 0 benchmarks\n";
+        let files: Vec<_> = files(list).into_iter().map(|(file, tests)| (file, tests.join(" "))).collect();
+        assert_eq!(
+            files,
+            [
+                ("at_the_root", "at_the_root"),
+                ("delay", "delay::a delay::inner::c"),
+                ("records", "records::b")
+            ]
+            .map(|(file, tests)| (file, tests.to_owned()))
+        );
+    }
 }

@@ -1,5 +1,5 @@
 //! What a program does by HTTP alone: numbers, boards, values, control loops, inputs, events, and a Stop.
-mod common;
+use crate::common;
 
 use std::time::{Duration, Instant};
 

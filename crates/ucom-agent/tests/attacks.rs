@@ -1,5 +1,5 @@
 //! What somebody could try who is not to be let in, as docs/security.md lists it: the same as with an arm's agent.
-mod common;
+use crate::common;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

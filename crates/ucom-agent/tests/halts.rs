@@ -1,5 +1,5 @@
 //! What was asked for before a Stop does nothing behind it, however long it was on its way, and whoever stopped.
-mod common;
+use crate::common;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

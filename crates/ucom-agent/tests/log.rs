@@ -1,5 +1,5 @@
 //! The log of commands: what was done, whoever has gone meanwhile, and what came of it.
-mod common;
+use crate::common;
 
 use std::io::Write as _;
 use std::net::TcpStream;

@@ -1,5 +1,5 @@
 //! What becomes of what a client has asked for when a Stop comes, its lease lapses, it goes, or others ask too.
-mod common;
+use crate::common;
 
 use std::io::Write as _;
 use std::net::TcpStream;

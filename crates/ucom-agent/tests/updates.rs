@@ -1,5 +1,5 @@
 //! Firmware by HTTP: uploaded, written, read back.
-mod common;
+use crate::common;
 
 use std::time::Duration;
 

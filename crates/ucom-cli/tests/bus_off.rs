@@ -1,7 +1,7 @@
 //! Controllers that leave the bus (bus-off) and come back: boards and clients of `ucom sim`.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::Sim;
 

@@ -1,7 +1,7 @@
 //! Commands against `ucom sim`: the chain, process data, recordings.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::{ended, signal};
 use common::{Sim, ended_by};

@@ -1,7 +1,7 @@
 //! `ucom conformance` and `ucom status --raw` against `ucom sim`.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, ended_by};
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! How commands end: readers that do not read, a second Ctrl-C, losses, and what is left of a start that failed.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::Write;
 use std::process::Stdio;

@@ -1,7 +1,7 @@
 //! A terminal that is closed (SIGHUP) and `kill` (SIGTERM) end commands as Ctrl-C does.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::time::Duration;
 

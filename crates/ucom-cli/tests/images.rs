@@ -1,7 +1,7 @@
 //! What is taken for firmware: records, raw bytes in a `.bin`, and nothing else unasked.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, image};
 

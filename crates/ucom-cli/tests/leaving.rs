@@ -1,7 +1,7 @@
 //! Boards that leave their control loop by themselves while `ucom run` supervises them (D-37): reported at once, as an event of
 //! `--json`, by values that are stale, and by exit code 5.
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::Child;

@@ -1,7 +1,7 @@
 //! `ucom monitor` at a terminal, from its begin to its end, and its lines for whoever is none.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;

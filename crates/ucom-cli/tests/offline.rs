@@ -1,6 +1,6 @@
 //! Commands that need no bus: exit codes, JSON, pages.
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::program;
 use common::{ucom, ucom_with};

@@ -1,7 +1,7 @@
 //! `--overwrite` writes over a file and lifts no check of the bus; `--force` lifts a check of the bus and writes over no file.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, ended_by, ucom};
 

@@ -1,7 +1,7 @@
 //! Parameter files and signal tables against `ucom sim`.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::Sim;
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! `ucom repair` against `ucom sim`: one board gets its number back, the others keep theirs.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::Sim;
 use test_kit::patience::Patience;

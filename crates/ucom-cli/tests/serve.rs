@@ -1,7 +1,7 @@
 //! `ucom serve`: an agent for a bus, or for a simulated chain.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;

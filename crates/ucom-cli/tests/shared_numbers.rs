@@ -1,7 +1,7 @@
 //! Two boards with one number: every command names it and changes nothing, `stop` stops both.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, image};
 

@@ -1,6 +1,6 @@
 //! Boards and buses from which nothing comes: what was asked, where, why, and the next command are always reported.
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::ended;
 use common::Sim;

@@ -2,7 +2,7 @@
 //! `UPDATE_DOCS=1` writes it again.
 #![cfg(target_os = "linux")]
 
-mod common;
+use crate::common;
 
 use std::io::Read;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! `ucom update` against `ucom sim`: outcomes, exit codes, and what is left behind.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::{ended, signal};
 use common::{Sim, ended_by, golden, image, outcomes};

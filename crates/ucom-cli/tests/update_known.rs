@@ -1,7 +1,7 @@
 //! `ucom update` of boards that show the program already: what the inventory knows decides (D-62, U-3).
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::ended;
 use common::{Sim, ended_by, image, outcomes};

@@ -1,7 +1,7 @@
 //! Environment variables: no variable moves, resets, numbers, programs or overrules a check; those that count are shown.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::{CommandOutput, run};
 use common::{Sim, ucom};

@@ -13,7 +13,7 @@ use can_link::{
 };
 use test_kit::patience::LONGEST;
 
-use crate::{frame, take, until};
+use super::{frame, take, until};
 
 /// An adapter between a port and a bus, in a thread of its own.
 struct Running {

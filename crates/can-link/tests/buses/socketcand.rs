@@ -8,7 +8,7 @@ use std::time::Duration;
 use can_link::{CanBus, CanFrame, Id, SocketcandServer, VirtualHub, open};
 use test_kit::patience::LONGEST;
 
-use crate::{frame, numbered, socketcand_bench, take, until};
+use super::{frame, numbered, socketcand_bench, take, until};
 
 /// A client as simple as python-can's.
 struct Raw(TcpStream);

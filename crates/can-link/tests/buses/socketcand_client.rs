@@ -7,7 +7,7 @@ use std::time::Duration;
 use can_link::{AnswerError, CanBus, CanError, CanFrame, ErrorState, Id, OpenError, SocketcandBus, open};
 use test_kit::patience::LONGEST;
 
-use crate::{frame, numbered, socketcand_bench, take};
+use super::{frame, numbered, socketcand_bench, take};
 
 #[test]
 fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can_link::{BusEvent, CanBus, CanFrame, ClientEvent, ErrorState, Id, SocketcandGateway, TimedBus, open};
 use test_kit::patience::LONGEST;
 
-use crate::{numbered, take, until};
+use super::{numbered, take, until};
 
 #[test]
 fn a_host_can_run_the_bus_itself() {

@@ -6,7 +6,7 @@ use can_link::{
 };
 use proptest::prelude::*;
 
-use crate::{MS, errors, frame, received, run};
+use super::{MS, errors, frame, received, run};
 
 /// Bits of a frame on the wire without the intermission.
 fn bits(frame: &CanFrame) -> u64 {

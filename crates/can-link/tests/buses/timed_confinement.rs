@@ -2,7 +2,7 @@
 
 use can_link::{BusError, BusEvent, ErrorState, FaultConfig, FaultSchedule, Id, TimedBus, TimedEvent};
 
-use crate::{MS, errors, frame, received, run};
+use super::{MS, errors, frame, received, run};
 
 #[test]
 fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {

@@ -1,5 +1,4 @@
 //! An agent of a simulated chain in this process, and requests to it as anybody could send them.
-#![allow(dead_code)]
 
 use std::net::TcpListener;
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
 //! Runs the `ucom` command as a user does, and a simulated chain for it to talk to.
-#![allow(dead_code)]
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};

@@ -2,7 +2,7 @@
 
 use ucom::Frame;
 
-use crate::bench::{Member, frame};
+use super::bench::{Member, frame};
 
 /// Gives the answers to a frame. They are due 300 µs after it, each 1 µs after the one before.
 pub struct Answering<A> {

@@ -5,8 +5,8 @@ use ucom::{Frame, Profile};
 use ucom_host::master::{Event, Master, Outcome, ProcedureId, Request, frame_bits};
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-pub use crate::exit::Exit;
-pub use crate::script::Script;
+pub use super::exit::Exit;
+pub use super::script::Script;
 
 /// Microseconds of a millisecond.
 pub const MS: u64 = 1000;

@@ -2,7 +2,7 @@
 
 use ucom_host::master::{InitOptions, Outcome, Request};
 
-use crate::bench::Bench;
+use super::bench::Bench;
 
 pub fn initialised(flash_ids: &[u16]) -> Bench {
     let mut bench = Bench::chain(flash_ids);

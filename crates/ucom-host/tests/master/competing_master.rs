@@ -1,6 +1,6 @@
 //! A competing master's heartbeats for single boards (D-08), and single boards that are reset.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::Profile;
 use ucom::node::Phase;
 use ucom::{Function, Status};
@@ -8,8 +8,8 @@ use ucom_host::master::{
     Diagnose, Error, Event, ExchangeError, InitOptions, Life, MasterError, Outcome, Request, StatusError,
 };
 
-use crate::bench::{Bench, MS, Script, frame};
-use crate::chain::initialised;
+use super::bench::{Bench, MS, Script, frame};
+use super::chain::initialised;
 
 fn has_competing_master(bench: &Bench) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
@@ -95,7 +95,7 @@ fn a_single_reset_is_checked() {
     whole.go(reset(2), 10).unwrap();
     for lost in from..whole.log.len() {
         let mut bench = initialised(&[0x21, 0x42, 0x63]);
-        bench.fault = Some((lost, crate::bench::Fault::Lost));
+        bench.fault = Some((lost, super::bench::Fault::Lost));
         let what = format!("{:?}", whole.log[lost]);
         match bench.go(reset(2), 20) {
             Ok(Outcome::Reset(reports)) => {

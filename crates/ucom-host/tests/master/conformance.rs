@@ -1,6 +1,6 @@
 //! The conformance tests: boards of this crate pass them all, and each mistake is found by the test that is meant for it.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ucom::profile::Endian;
@@ -12,7 +12,7 @@ use ucom_host::master::update::UpdateImage;
 use ucom_host::master::{Event, InitOptions, Outcome, Request};
 use ucom_sim::memory::WirePins;
 
-use crate::bench::{Bench, From, Member, TestNode, frame, image, node};
+use super::bench::{Bench, From, Member, TestNode, frame, image, node};
 
 /// Everything that is allowed.
 pub fn all() -> ConformanceOptions {

@@ -1,7 +1,7 @@
 //! The conformance tests leave boards as they were found: at their end, when they are cancelled, when a board is gone. And
 //! what they refuse.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::{Function, Status};
 use ucom_host::master::conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict};
 use ucom_host::master::update::UpdateImage;
@@ -10,8 +10,8 @@ use ucom_host::master::{
     Request, RunBoard, RunOptions, RunningError,
 };
 
-use crate::bench::{Bench, From, image};
-use crate::conformance::all;
+use super::bench::{Bench, From, image};
+use super::conformance::all;
 
 const FLASH: [u16; 3] = [0x21, 0x42, 0x63];
 

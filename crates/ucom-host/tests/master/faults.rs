@@ -3,8 +3,8 @@
 
 use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
-use crate::bench::{Bench, CI, Fault, PAR, SO};
-use crate::chain::initialised;
+use super::bench::{Bench, CI, Fault, PAR, SO};
+use super::chain::initialised;
 
 const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 

@@ -2,7 +2,7 @@
 
 use ucom::Frame;
 
-use crate::bench::{Bench, MS, Member};
+use super::bench::{Bench, MS, Member};
 
 /// A board as a table: takes every block; the last rule defines what ends the update.
 pub struct Loader {
@@ -48,7 +48,7 @@ impl Loader {
     }
 
     fn answer(&mut self, at: u64, text: &str) {
-        self.out.push((at, crate::bench::frame(text)));
+        self.out.push((at, super::bench::frame(text)));
         self.out.sort_by_key(|(at, _)| *at);
     }
 }

@@ -4,9 +4,9 @@ use ucom::Profile;
 use ucom::node::Phase;
 use ucom_host::master::{InitOptions, Request, RunBoard, RunOptions, StopLevel};
 
-use crate::bench::{Bench, Exit};
-use crate::chain::initialised;
-use crate::update::{options, update};
+use super::bench::{Bench, Exit};
+use super::chain::initialised;
+use super::update::{options, update};
 
 fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     let mut bench = initialised(flash_ids);

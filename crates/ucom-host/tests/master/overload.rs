@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use ucom::Profile;
 use ucom_host::master::{InitOptions, Request, RunBoard, RunOptions, frame_bits};
 
-use crate::bench::{Bench, CI, MS, frame};
+use super::bench::{Bench, CI, MS, frame};
 
 const BOARDS: u8 = 8;
 

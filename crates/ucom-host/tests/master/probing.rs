@@ -10,9 +10,9 @@ use ucom_host::master::{
     RunOptions, RunningError, ScanFinding,
 };
 
-use crate::bench::{Bench, image};
-use crate::chain::initialised;
-use crate::update::options;
+use super::bench::{Bench, image};
+use super::chain::initialised;
+use super::update::options;
 
 /// P-20: boards with other readings give them away; the profile found is theirs.
 #[test]
@@ -80,7 +80,7 @@ fn d10_a_wrong_byte_order_is_named() {
         assert_eq!(**error, Error::Identity(IdentityError::ByteOrder { endian: here }));
         assert!(error.hint().contains("ucom probe"));
         assert!(bench.log[before..].iter().all(|(_, from, frame)| {
-            *from != crate::bench::From::Master || matches!(frame.id() >> 6, 8 | 9 | 26)
+            *from != super::bench::From::Master || matches!(frame.id() >> 6, 8 | 9 | 26)
         }));
         let received = bench.events.len();
         bench.go(Request::Info { board: 1 }, 60).unwrap();
@@ -108,7 +108,7 @@ fn p20_probe_is_harmless_unless_allowed() {
     assert!(row("endian").measured && !row("chain.auto_opinit").measured);
     for (_, from, frame) in &bench.log[before..] {
         let harmless = matches!(frame.id() >> 6, 8 | 9 | 22 | 23);
-        assert!(harmless || *from != crate::bench::From::Master, "{frame}");
+        assert!(harmless || *from != super::bench::From::Master, "{frame}");
     }
 }
 
@@ -162,8 +162,8 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     }
 }
 
-fn sent(from: crate::bench::From, frame: &ucom::Frame) -> String {
-    format!("{}{frame}", if from == crate::bench::From::Master { '<' } else { '>' })
+fn sent(from: super::bench::From, frame: &ucom::Frame) -> String {
+    format!("{}{frame}", if from == super::bench::From::Master { '<' } else { '>' })
 }
 
 /// A control loop is not ended by a measurement that nobody expects to end it.

@@ -1,11 +1,11 @@
 //! One board gets its number back (5.4): never two boards with one number and a success, whatever is lost.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
 
-use crate::bench::{Bench, Fault};
-use crate::chain::initialised;
-use crate::update::{options, recorded, update};
+use super::bench::{Bench, Fault};
+use super::chain::initialised;
+use super::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
@@ -126,7 +126,7 @@ fn u4_an_update_gives_a_number_to_one_board_only() {
     let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
     bench.until(|b| b.count("042#") > 0);
     // It reboots in the moment of XRESET.
-    let reset = crate::bench::frame("002#");
+    let reset = super::bench::frame("002#");
     let now = bench.now;
     bench.members[1].receive(now, &reset);
     let Ok(Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };

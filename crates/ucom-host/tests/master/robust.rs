@@ -6,8 +6,8 @@ use ucom::{Checksum, Profile};
 use ucom_host::master::update::UpdateOutcome;
 use ucom_host::master::{InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
-use crate::bench::{Bench, CI, PAR, SO};
-use crate::update::{check_program, options, update};
+use super::bench::{Bench, CI, PAR, SO};
+use super::update::{check_program, options, update};
 
 proptest! {
     /// Any frames at any time into any procedure: no panic, no wait without end, exactly one end.

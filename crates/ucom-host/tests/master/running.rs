@@ -1,6 +1,6 @@
 //! Descriptions, inputs, parameters, flags, supervision.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
 use ucom_host::master::io::{IoDescription, ParValue};
@@ -9,8 +9,8 @@ use ucom_host::master::{
     Outcome, Request, RunBoard, RunOptions, RunningError, Setting, SignalError, StopLevel, Supervision,
 };
 
-use crate::bench::{Bench, CI, MS, PAR, SO, Script};
-use crate::chain::initialised;
+use super::bench::{Bench, CI, MS, PAR, SO, Script};
+use super::chain::initialised;
 
 fn run_options(boards: &[u8]) -> RunOptions {
     let board = |b: &u8| RunBoard { board: *b, ..Default::default() };
@@ -42,7 +42,7 @@ fn start_order() {
     let repeated = ["201#", "680#", "341#0000DC0509000000"];
     let sent: Vec<String> = bench.log[before..]
         .iter()
-        .filter(|(_, from, _)| *from == crate::bench::From::Master)
+        .filter(|(_, from, _)| *from == super::bench::From::Master)
         .map(|(.., f)| f.to_string())
         .filter(|t| !repeated.contains(&t.as_str()))
         .collect();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ucom::Frame;
 
-use crate::bench::{MS, Member, frame};
+use super::bench::{MS, Member, frame};
 
 /// A peer that knows nothing but a table of frames.
 #[derive(Default)]

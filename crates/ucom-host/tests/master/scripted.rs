@@ -1,11 +1,11 @@
 //! Rows of the acceptance table where the other side is a table of frames and nothing else.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom_host::master::{
     AddressError, Error, Event, InitFinding, InitOptions, MasterError, Outcome, Request, ScanFinding,
 };
 
-use crate::bench::{Bench, Script};
+use super::bench::{Bench, Script};
 
 /// Boards 1 to n of the golden chain as a table.
 fn golden(boards: usize) -> Script {
@@ -156,7 +156,7 @@ fn p17_d08_second_master() {
         Bench::script(golden(1).at(100, "683#").at(110, "601#01010000").at(120, "381#0000640065006600"));
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 10), Ok(Outcome::Init(r)) if r.is_ok()));
     // 600 ms of listening before the first frame.
-    assert!(bench.log.iter().find(|(_, f, _)| *f == crate::bench::From::Master).unwrap().0 >= 600_000);
+    assert!(bench.log.iter().find(|(_, f, _)| *f == super::bench::From::Master).unwrap().0 >= 600_000);
 }
 
 /// P-18: an error code that nobody knows is shown as its number.

@@ -1,6 +1,6 @@
 //! Two boards with one number (D-24): a named error in whatever is asked of that number, before anything is changed.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::{Profile, Status};
 use ucom_host::master::conformance::ConformanceOptions;
 use ucom_host::master::probe::ProbeOptions;
@@ -11,7 +11,7 @@ use ucom_host::master::{
 };
 use ucom_sim::memory::WirePins;
 
-use crate::bench::{Bench, From, Member, Script, image, node};
+use super::bench::{Bench, From, Member, Script, image, node};
 
 /// Two boards that both think that they are the first of the chain.
 fn strapped(flash: [u16; 2]) -> Bench {
@@ -164,7 +164,7 @@ fn d24_it_is_named_when_it_shows_in_an_update() {
     let image = UpdateImage { bytes: image(500).into(), address_words: 0 };
     let options = || UpdateOptions::new(vec![target], image.clone(), 0x3AC1);
     let frames = {
-        let mut bench = crate::chain::initialised(&[0x21]);
+        let mut bench = super::chain::initialised(&[0x21]);
         assert!(matches!(bench.go(Request::Update(options()), 60), Ok(Outcome::Update(r)) if r.exit() == 0));
         program_frames(&bench)
     };
@@ -173,7 +173,7 @@ fn d24_it_is_named_when_it_shows_in_an_update() {
             for after in (1..frames).step_by(23).chain([frames - 1, frames]) {
                 let what =
                     format!("flash number {flash:#x}, programming {programming}, after {after} frames");
-                let mut bench = crate::chain::initialised(&[0x21]);
+                let mut bench = super::chain::initialised(&[0x21]);
                 let id = bench.master.start(bench.now, Request::Update(options())).unwrap();
                 bench.until(|b| program_frames(b) >= after);
                 let now = bench.now / 1000;
@@ -261,14 +261,14 @@ fn d24_a_scan_names_both() {
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {
-        let mut bench = crate::chain::initialised(&[0x21]);
+        let mut bench = super::chain::initialised(&[0x21]);
         let from = bench.log.len();
         bench.go(Request::Info { board: 1 }, 10).unwrap();
         from..bench.log.len()
     };
     for at in whole {
-        for fault in [crate::bench::Fault::Doubled, crate::bench::Fault::Corrupted(3)] {
-            let mut bench = crate::chain::initialised(&[0x21]);
+        for fault in [super::bench::Fault::Doubled, super::bench::Fault::Corrupted(3)] {
+            let mut bench = super::chain::initialised(&[0x21]);
             bench.fault = Some((at, fault));
             let result = bench.go(Request::Info { board: 1 }, 10);
             assert!(

@@ -1,6 +1,6 @@
 //! A run that does not come about leaves every board as it was found.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::node::Phase;
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
@@ -9,8 +9,8 @@ use ucom_host::master::{
     RunOptions, RunningError, Setting, SignalError, Supervision,
 };
 
-use crate::bench::{Bench, MS};
-use crate::chain::initialised;
+use super::bench::{Bench, MS};
+use super::chain::initialised;
 
 const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 /// What the boards of [`found`] do before the run, in their order.

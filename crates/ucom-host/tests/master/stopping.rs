@@ -1,15 +1,15 @@
 //! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been commanded to start.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::node::Phase;
 use ucom::{ErrorCode, Profile};
 use ucom_host::master::{
     Error, ExchangeError, Master, MasterError, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel,
 };
 
-use crate::bench::{Bench, CI, MS, Script};
-use crate::chain::initialised;
-use crate::update::{options, update};
+use super::bench::{Bench, CI, MS, Script};
+use super::chain::initialised;
+use super::update::{options, update};
 
 fn run(boards: &[u8]) -> Request {
     let board = |b: &u8| RunBoard { board: *b, ..Default::default() };

@@ -1,6 +1,6 @@
 //! Firmware updates of real boards of this crate and of tables of frames.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::{BoardInfo, Memory};
 use ucom_host::files::FlashRecord;
 use ucom_host::master::update::{
@@ -11,9 +11,9 @@ use ucom_host::master::{
     Error, Event, IdentityError, InitOptions, Outcome, Request, RunBoard, RunOptions, RunningError,
 };
 
-use crate::bench::{Bench, Fault, MS, OLD, Script, image};
-use crate::chain::initialised;
-use crate::loader::{Loader, loader};
+use super::bench::{Bench, Fault, MS, OLD, Script, image};
+use super::chain::initialised;
+use super::loader::{Loader, loader};
 
 pub const DATE: u16 = 0x3AC1;
 
@@ -88,7 +88,7 @@ fn golden_update() {
     let report = update(&mut bench, recorded(options(&[1], 1000), &report));
     assert_eq!((report.boards[0].outcome, report.boards[0].verified), (UpdateOutcome::UpToDate, true));
     let silent = ["201#", "200#", "680#"];
-    let master = bench.log[before..].iter().filter(|(_, f, _)| *f == crate::bench::From::Master);
+    let master = bench.log[before..].iter().filter(|(_, f, _)| *f == super::bench::From::Master);
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
@@ -328,7 +328,7 @@ fn dry_run() {
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 1000) });
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!((report.exit(), report.bytes), (0, 2 * 17 * 64));
-    let sent = bench.log[before..].iter().filter(|(_, f, _)| *f == crate::bench::From::Master);
+    let sent = bench.log[before..].iter().filter(|(_, f, _)| *f == super::bench::From::Master);
     assert!(sent.map(|(.., f)| f.to_string()).all(|t| ["201#", "200#", "680#"].contains(&t.as_str())));
 }
 

@@ -1,17 +1,17 @@
 //! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::{Frame, Status};
 use ucom_host::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom_host::master::{
     Diagnose, Error, Event, IdentityError, Master, MasterError, Outcome, Request, StatusError,
 };
 
-use crate::answering::Answering;
-use crate::bench::{Bench, From, Member, OLD, Script};
-use crate::chain::initialised;
-use crate::loader::{Loader, loader};
-use crate::update::{check_program, options, outcomes, recorded, update};
+use super::answering::Answering;
+use super::bench::{Bench, From, Member, OLD, Script};
+use super::chain::initialised;
+use super::loader::{Loader, loader};
+use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
@@ -220,7 +220,7 @@ fn one_damaged_answer_is_no_swapped_board() {
         };
         bench.log.iter().enumerate().filter_map(info).next_back().unwrap()
     };
-    bench.fault = Some((asked, crate::bench::Fault::Corrupted(1)));
+    bench.fault = Some((asked, super::bench::Fault::Corrupted(1)));
     let report = update(&mut bench, options(&[1], 128));
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
 }

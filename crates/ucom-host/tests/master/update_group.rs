@@ -1,14 +1,14 @@
 //! Updates of several boards at once: who takes part, who must not, and what is reported of those that fell behind.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::{Frame, Profile};
 use ucom_host::master::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome};
 use ucom_host::master::{Error, Request, StatusError};
 
-use crate::answering::Answering;
-use crate::bench::{Bench, From, Member, OLD};
-use crate::chain::initialised;
-use crate::update::{check_program, options, outcomes, update};
+use super::answering::Answering;
+use super::bench::{Bench, From, Member, OLD};
+use super::chain::initialised;
+use super::update::{check_program, options, outcomes, update};
 
 const DATE: u16 = 0x3AC1;
 
@@ -157,7 +157,7 @@ fn d43_not_every_error_ends_a_transfer() {
             let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
             bench.until(|b| broadcasts(b) >= 10);
             let now = bench.now;
-            bench.master.handle(now, Ok(crate::bench::frame(&format!("082#{code}"))));
+            bench.master.handle(now, Ok(super::bench::frame(&format!("082#{code}"))));
             if !received {
                 bench.lose = vec![("> 142#", u32::MAX), ("> 182#", u32::MAX), ("> 102#", u32::MAX)];
             }

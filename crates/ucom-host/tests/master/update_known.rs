@@ -1,8 +1,8 @@
 //! What counts as up to date (D-62, U-3): the board's answer and the flash record together, and what neither covers.
 
-use crate::bench::{Bench, Exit};
-use crate::chain::initialised;
-use crate::update::{DATE, options, recorded, update};
+use super::bench::{Bench, Exit};
+use super::chain::initialised;
+use super::update::{DATE, options, recorded, update};
 use ucom::profile::Plan;
 use ucom::{Memory, Profile, Status};
 use ucom_host::master::update::{UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};

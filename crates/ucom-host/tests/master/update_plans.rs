@@ -1,7 +1,7 @@
 //! Updates by other plans and headers than the usual ones: what each cycle may destroy, what can be verified, and what the
 //! report shows where nothing can.
 
-use crate::bench::Exit;
+use super::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{Checksum, Memory, Profile};
 use ucom_host::master::update::{
@@ -9,9 +9,9 @@ use ucom_host::master::update::{
 };
 use ucom_host::master::{Error, InitOptions, Request};
 
-use crate::bench::{Bench, OLD, image};
-use crate::loader::Loader;
-use crate::update::{options, update};
+use super::bench::{Bench, OLD, image};
+use super::loader::Loader;
+use super::update::{options, update};
 
 fn with_plan(prog_plan: Plan) -> Profile {
     Profile { prog_plan, ..Profile::default() }

@@ -3,7 +3,7 @@
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
 
-use crate::bus::{Bus, MS, frames, sorted};
+use super::bus::{Bus, MS, frames, sorted};
 
 const FIVE: [u16; 5] = [0x21, 0x42, 0x63, 0x04, 0x7F];
 const FIVE_REPORTS: &str = "404#04 441#21 482#42 4C3#63 4DF#7F";

@@ -2,7 +2,7 @@
 
 use ucom::{Frame, Profile, Status};
 
-use crate::bus::{Bus, blocks, frames, header, image, sorted};
+use super::bus::{Bus, blocks, frames, header, image, sorted};
 
 /// D-T17, D-40, D-42: a whole update by raw frames, with the golden header.
 #[test]

@@ -3,7 +3,7 @@
 use ucom::profile::CiLatch;
 use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
 
-use crate::bus::{Bus, MS, frames};
+use super::bus::{Bus, MS, frames};
 
 /// Debug texts in what was received.
 fn texts(received: &[Frame]) -> Vec<String> {

@@ -3,7 +3,7 @@
 use ucom::profile::{AliveMode, Broadcast, Endian, ReportMode};
 use ucom::{Profile, Sequence, Status};
 
-use crate::bus::{Bus, frames};
+use super::bus::{Bus, frames};
 
 fn with(change: impl FnOnce(&mut Profile)) -> Profile {
     let mut profile = Profile::default();

@@ -2,7 +2,7 @@
 
 use ucom::Profile;
 
-use crate::bus::{Bus, MS, frames};
+use super::bus::{Bus, MS, frames};
 
 /// Reset and a chain of three.
 #[test]

@@ -4,7 +4,7 @@ use ucom::Frame;
 use ucom::node::{Node, NodeConfig, Store};
 use ucom_sim::memory::{MemoryFlash, WirePins};
 
-use crate::bus::application;
+use super::bus::application;
 
 /// ASTART, and how often it was kept.
 #[derive(Default)]

@@ -3,7 +3,7 @@
 use ucom::node::Phase;
 use ucom::{Frame, Profile};
 
-use crate::bus::{Board, Bus};
+use super::bus::{Board, Bus};
 
 /// splitmix64, so that a seed makes a run.
 struct Random(u64);

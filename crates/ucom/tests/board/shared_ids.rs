@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use ucom::Profile;
 
-use crate::bus::{Bus, MS, frames};
+use super::bus::{Bus, MS, frames};
 
 /// What can happen to a board that has reasons to send its flags or its descriptions.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ proptest! {
         for (at, frame) in &bus.received {
             // The dimensions begin a dump; the rest of one that is under way follows at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
-            let start = at - crate::bus::duration(frame);
+            let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
             if let (true, Some((request, _))) = (begins, last) {
                 prop_assert!(start - request >= 2 * MS, "{frame} at {start}, asked at {request}");

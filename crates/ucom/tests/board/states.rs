@@ -3,7 +3,7 @@
 use ucom::node::Phase;
 use ucom::{Frame, Profile, Sequence, Status};
 
-use crate::bus::{Bus, blocks, frames, image};
+use super::bus::{Bus, blocks, frames, image};
 
 /// The columns of the table; S3x and S4 are distinguished from their neighbours.
 const STATES: [Phase; 7] = [

@@ -3,7 +3,7 @@
 use ucom::Frame;
 use ucom::node::{Phase, Store};
 
-use crate::bus::{Board, Bus, MS, frames};
+use super::bus::{Board, Bus, MS, frames};
 
 fn frame(text: &str) -> Frame {
     text.parse().unwrap()
@@ -90,7 +90,7 @@ fn d43_pause_inside_a_block() {
 fn d42_block_time() {
     let (mut board, now) = board(Bus::initialised());
     board.receive(now, &frame("041#"));
-    for data in crate::bus::blocks(&[1; 64], &ucom::Profile::default())[0].chunks_exact(8) {
+    for data in super::bus::blocks(&[1; 64], &ucom::Profile::default())[0].chunks_exact(8) {
         board.receive(now, &Frame::new(0x2C1, data).unwrap());
     }
     let looked_at = now + board.config().block_us;
@@ -178,7 +178,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     };
     let last_block = || {
         let mut bus = programming();
-        let all = crate::bus::blocks(&[1; 64], &ucom::Profile::default());
+        let all = super::bus::blocks(&[1; 64], &ucom::Profile::default());
         for block in &all[..3] {
             assert_eq!(bus.block(block, 200), frames("181#"));
         }
@@ -227,7 +227,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     assert_eq!((waiting.next_deadline(), waiting.poll(now)), (0, Some(acknowledge)));
     // The two answers of a transfer.
     let (whole, last) = last_block();
-    let first = crate::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
+    let first = super::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
     for (mut bus, data, expected) in [(programming(), first, "181#"), (whole, last, "101#")] {
         bus.hold = |_| true;
         bus.send("281#");
@@ -313,7 +313,7 @@ fn d44_steps_after_the_last_block() {
     let mut bus = Bus::initialised();
     bus.send("041#");
     let image: Vec<u8> = (0..2560).map(|i| (i % 251) as u8).collect();
-    let all = crate::bus::blocks(&image, &ucom::Profile::default());
+    let all = super::bus::blocks(&image, &ucom::Profile::default());
     let (last, before) = all.split_last().unwrap();
     for block in before {
         assert_eq!(bus.block(block, 200), frames("181#"));

@@ -4,7 +4,7 @@ use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
 use ucom::{Checksum, Memory, Profile, Status};
 
-use crate::bus::{Bus, GOLDEN, blocks, frames, header, image};
+use super::bus::{Bus, GOLDEN, blocks, frames, header, image};
 
 /// 200 bytes: four data blocks, the last one short.
 pub fn small() -> Vec<u8> {

@@ -5,8 +5,8 @@ use ucom::profile::{HeaderForm, Plan};
 use ucom::{Checksum, Memory, Profile, checksum, data_block};
 use ucom_sim::memory::MemoryFlash;
 
-use crate::bus::{Board, Bus, blocks, frames, header, image};
-use crate::update::{data as data_blocks, small, update};
+use super::bus::{Board, Bus, blocks, frames, header, image};
+use super::update::{data as data_blocks, small, update};
 
 /// One board with number 1 whose images have no header blocks and are as long as `small`.
 fn headerless(plan: Plan) -> Bus {

@@ -1,0 +1,9 @@
+//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+mod api;
+mod attacks;
+mod common;
+mod description;
+mod halts;
+mod log;
+mod orders;
+mod updates;

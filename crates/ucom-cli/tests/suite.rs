@@ -1,0 +1,22 @@
+//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+mod bus_off;
+mod chain;
+mod common;
+mod conformance;
+mod endings;
+mod hangup;
+mod images;
+mod leaving;
+mod monitor;
+mod offline;
+mod overwrite;
+mod pages;
+mod params;
+mod repair;
+mod serve;
+mod shared_numbers;
+mod silence;
+mod troubles;
+mod update;
+mod update_known;
+mod variables;

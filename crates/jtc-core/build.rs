@@ -64,9 +64,10 @@ fn generate(arm: &Table) -> String {
         let n = |key: &str| number(get(j, key));
         let rotor = j.get("rotor_inertia_kg_m2").map_or(0.0, number);
         let gain = j.get("torque_gain").map_or(1.0, number);
+        let damping = n("teach_damping_nm_s_rad");
         let _ = writeln!(
             s,
-            "JointConfig {{ position_min: {:?}, position_max: {:?}, velocity_max: {:?}, acceleration_max: {:?}, torque_max: {:?}, position_error_max: {:?}, rotor_inertia: {rotor:?}, torque_gain: {gain:?} }},",
+            "JointConfig {{ position_min: {:?}, position_max: {:?}, velocity_max: {:?}, acceleration_max: {:?}, torque_max: {:?}, position_error_max: {:?}, rotor_inertia: {rotor:?}, torque_gain: {gain:?}, teach_damping: {damping:?} }},",
             n("position_min_rad"),
             n("position_max_rad"),
             n("velocity_max_rad_s"),

@@ -112,6 +112,8 @@ fn a_whole_session() {
     // J-25.
     rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
+    // It begins when the integral has come to rest behind the motion.
+    rig.wait("Teaching", 3_000, |rig| rig.state() == ControllerState::Teaching);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
     assert!(rig.speed() < 1.2);

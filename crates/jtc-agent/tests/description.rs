@@ -1,4 +1,4 @@
-//! docs/openapi.json is what an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test description` writes it.
+//! docs/openapi.json is what an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite description::` writes it.
 use std::path::Path;
 
 #[test]
@@ -11,6 +11,6 @@ fn the_description_in_the_docs_is_that_of_the_code() {
     let written = std::fs::read_to_string(&path).expect("docs/openapi.json");
     assert!(
         written == description,
-        "docs/openapi.json is old: UPDATE_DOCS=1 cargo test -p jtc-agent --test description"
+        "docs/openapi.json is old: UPDATE_DOCS=1 cargo test -p jtc-agent --test suite description::"
     );
 }

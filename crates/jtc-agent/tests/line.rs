@@ -1,5 +1,5 @@
 //! Many clients on one line: whose records are whose, who may command, and how soon a Stop is on the line.
-mod board;
+use crate::board;
 
 use std::time::Duration;
 

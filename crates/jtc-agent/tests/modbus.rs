@@ -13,8 +13,8 @@ use jtc_agent::modbus::{Allowed, Plc, Server, plc};
 use jtc_agent::{LineEvent, Owner};
 use jtc_host::port::sim::LivePort;
 use jtc_host::{Arm, plan};
-use jtc_sim::{SimConfig, World};
-use jtc_wire::{ControllerState, Status};
+use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+use jtc_wire::{ControllerState, Joint, Status};
 use proptest::prelude::*;
 use test_kit::patience::{LONGEST, until};
 
@@ -36,6 +36,11 @@ struct Cell {
 
 impl Cell {
     fn start(allowed: &[&str]) -> Self {
+        Self::with_faults(allowed, Vec::new())
+    }
+
+    /// One whose arm has these faults.
+    fn with_faults(allowed: &[&str], faults: Vec<Fault>) -> Self {
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
         let sent: Arc<Mutex<Vec<Class>>> = Arc::default();
@@ -45,7 +50,9 @@ impl Cell {
                 seen.lock().expect("nobody panics").push(*class);
             }
         });
-        let owner = Owner::new(LivePort::new(World::new(config)), observer);
+        let mut world = World::new(config);
+        faults.into_iter().for_each(|fault| world.inject(fault));
+        let owner = Owner::new(LivePort::new(world), observer);
         let log = Arc::new(Mutex::new(CommandLog::open(None, LIMIT, |_| {}).expect("none")));
         let jobs = Jobs::new(owner.line(), Store::in_memory(), arm);
         jobs.store.put(3, "there and back", &there_and_back(), false).expect("a trajectory");
@@ -347,6 +354,31 @@ fn is_next(pdu: &[u8]) -> bool {
         _ => return false,
     };
     u16::from_be_bytes(value) == FIRST + 1
+}
+
+/// The cause stands in no status: the agent asks for it. After the errors were cleared an arm whose encoder has jumped executes nothing.
+#[test]
+fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
+    // Long after the drives are enabled.
+    let jump = Fault {
+        kind: FaultKind::EncoderJump { joint: Joint::ALL[2], rad: 0.02 },
+        trigger: Trigger::InState(ControllerState::HoldPos, 10_000),
+        duration_ms: None,
+    };
+    let cell = Cell::with_faults(&[], vec![jump]);
+    let mut client = cell.connect();
+    cell.recover(&mut client);
+    let bit = |client: &mut Client| client.ask(&[2, 0, 13, 0, 1]) == [2, 1, 1];
+    assert!(!bit(&mut client) && client.input(86) == 0);
+    until("a cause", || client.input(86) != 0);
+    assert_eq!((client.input(86), client.input(87), client.input(93)), (9, 3, 0b100));
+    assert!(bit(&mut client) && client.input(92) < 60);
+    assert_eq!(client.command(Command::Clear), Outcome::Done);
+    until("it is cleared", || !bit(&mut client));
+    assert_eq!((client.input(86), client.input(93)), (0, 0b100));
+    assert_eq!(client.command(Command::Start), Outcome::Done);
+    until("it is refused", || client.input(19) == 4);
+    assert_eq!((client.input(20), client.input(21)), (33, 3));
 }
 
 /// Whatever a PLC writes without the next number: nothing goes to the controller, no job begins, nobody commands.

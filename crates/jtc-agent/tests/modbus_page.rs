@@ -1,4 +1,4 @@
-//! The tables of docs/modbus.md are those of the code. `UPDATE_DOCS=1 cargo test -p jtc-agent --test modbus_page` writes them.
+//! The tables of docs/modbus.md are those of the code. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite modbus_page::` writes them.
 use std::path::Path;
 
 const BEGIN: &str = "<!-- map begin -->\n";
@@ -16,7 +16,7 @@ fn the_map_in_the_docs_is_that_of_the_code() {
     } else {
         assert!(
             page == made,
-            "docs/modbus.md is old: UPDATE_DOCS=1 cargo test -p jtc-agent --test modbus_page"
+            "docs/modbus.md is old: UPDATE_DOCS=1 cargo test -p jtc-agent --test suite modbus_page::"
         );
     }
 }

@@ -1,5 +1,5 @@
 //! Whose policy acts on what moves when the agent is killed.
-mod board;
+use crate::board;
 
 use std::time::Duration;
 

@@ -121,16 +121,23 @@ impl<'a> Operator<'a> {
 
     /// What the person wants of the motion.
     pub fn wish(&mut self, status: &Status) -> Flow {
-        if self.keys.is_some()
-            && status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
+        if status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
             && self.announced != Some(status.trajectory)
+            // Which ends the run, and has its own words.
+            && !status.is_held_stop()
         {
-            self.announced = Some(status.trajectory);
-            self.out.note(if status.trajectory == TrajectoryState::Pause {
-                "paused; space goes on"
-            } else {
-                "moving"
-            });
+            let before = self.announced.replace(status.trajectory);
+            match (status.trajectory == TrajectoryState::Pause, &self.keys) {
+                (true, Some(_)) => self.out.note("paused; space goes on"),
+                (false, Some(_)) => self.out.note("moving"),
+                // It begins.
+                (_, None) if before.is_none() => {}
+                // Another program has paused it, or the controller, which heard nothing from this one for too long (J-59).
+                (true, None) => {
+                    self.out.note("paused; `jtc traj resume` goes on, `jtc traj stop` ends the motion");
+                }
+                (false, None) => self.out.note("moving"),
+            }
         }
         let wish = self.keys.as_mut().and_then(wish);
         if self.stop.asked() || wish == Some(Wish::Stop) {

@@ -1,7 +1,7 @@
 //! Runs that were broken off: what is run of them again, and from which place.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, at, jtc, moving_after, moving_while, place, slow_motion};
 use serde_json::Value;

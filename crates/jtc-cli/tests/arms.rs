@@ -1,6 +1,6 @@
 //! Arm files and robot descriptions: what they give, and what is refused of them.
 
-mod common;
+use crate::common;
 
 use common::{Sim, jtc, motion};
 

@@ -1,6 +1,6 @@
 //! `jtc bench`: joints that are not there (J-53).
 
-mod common;
+use crate::common;
 
 use common::{Sim, motion};
 

@@ -2,17 +2,10 @@
 //! they print again.
 #![cfg(target_os = "linux")]
 
-mod common;
-#[path = "troubles/desk.rs"]
-#[allow(dead_code)]
-mod desk;
-/// The page needs no files beside those that its commands write.
-mod files {
-    pub fn write(_: &std::path::Path) {}
-}
-
-use desk::Desk;
 use test_kit::page::{Page, Printed, blurred};
+
+use crate::common::Sim;
+use crate::desk::Desk;
 
 const PAGE: &str = "from-two-poses-to-a-cycle.md";
 
@@ -157,7 +150,7 @@ fn broken_off() {
     page.case_of_a_moment("Ctrl-C in the middle of it", run, || {
         let run = format!("{run} --overwrite");
         done(&desk, "jtc move --to 0,0,0,0,0,0 --speed 100");
-        let in_motion = |jtc: &std::process::Child, _: &common::Sim| {
+        let in_motion = |jtc: &std::process::Child, _: &Sim| {
             std::thread::sleep(std::time::Duration::from_millis(1500));
             cli_kit::trial::signal(jtc, "-INT");
         };

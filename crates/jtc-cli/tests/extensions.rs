@@ -1,6 +1,6 @@
 //! What a controller with extensions reports and takes: identity, arm, speed, jogging (J-52 to J-58).
 
-mod common;
+use crate::common;
 
 use common::{Sim, jtc, motion};
 use serde_json::Value;

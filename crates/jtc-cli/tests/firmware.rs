@@ -2,9 +2,8 @@
 //! library.
 
 #[cfg(unix)]
-#[path = "firmware/board.rs"]
 mod board;
-mod common;
+use crate::common;
 
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,8 @@
 //! `jtc plan` with the flange on lines and arcs: where the flange is, from the trajectory that was written, and what is refused.
 
-mod common;
+use crate::common;
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
+#[allow(dead_code, reason = "the tests of jtc-plan use more")]
 mod robots;
 
 use common::{Dir, jtc};

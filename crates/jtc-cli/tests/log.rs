@@ -1,6 +1,6 @@
 //! The flight recorder as a user reads it (J-56): after a fault, while the arm moves, and again from the file.
 
-mod common;
+use crate::common;
 
 use common::{Sim, jtc, slow_motion};
 use serde_json::Value;

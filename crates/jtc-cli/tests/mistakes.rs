@@ -1,6 +1,6 @@
 //! Files of newcomers: what is wrong with a trajectory, and what helps.
 
-mod common;
+use crate::common;
 
 use common::{Dir, jtc};
 

@@ -1,7 +1,7 @@
 //! Moves to poses, waypoints that are run, runs that are repeated, replayed and gone on with, against the simulator.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, at, jtc, moving_while, place, slow_motion};
 use jtc_host::recording::Recording;

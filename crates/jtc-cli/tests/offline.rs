@@ -1,6 +1,6 @@
 //! Commands that need no controller: exit codes, JSON, filters.
 
-mod common;
+use crate::common;
 
 use common::{jtc, jtc_with, motion};
 

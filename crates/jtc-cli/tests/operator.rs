@@ -1,7 +1,7 @@
 //! A person at a terminal while an arm moves: keys, signals, and a terminal that is as it was afterwards.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};

@@ -1,6 +1,6 @@
 //! `jtc payload`: what the arm carries (J-60).
 
-mod common;
+use crate::common;
 
 use common::{Sim, jtc, moving_while};
 use serde_json::Value;

@@ -1,6 +1,6 @@
 //! `jtc plan`: trajectories through waypoints, and what is refused of them.
 
-mod common;
+use crate::common;
 
 use common::{Dir, jtc};
 use serde_json::Value;

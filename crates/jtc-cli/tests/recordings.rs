@@ -1,7 +1,7 @@
 //! Recordings of a run, of the simulator and of the demo: what a killed program, a full disk and a second run leave of them.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, jtc, motion};
 use std::io::{BufRead, BufReader};

@@ -1,7 +1,7 @@
 //! `jtc serve`: an agent, and every other command through it.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};

@@ -1,7 +1,7 @@
 //! `jtc serve --record`: a recording of each motion, whoever commands it.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::path::{Path, PathBuf};
 use std::process::Stdio;

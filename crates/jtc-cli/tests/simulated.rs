@@ -1,7 +1,7 @@
 //! Commands against `jtc sim` over its pseudo-terminal, in free-running virtual time.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{Read, Write};
 

@@ -1,7 +1,7 @@
 //! `jtc stop` from a second terminal: whatever the program is doing that has the port, the arm stands, and that program moves it no more.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::FileTypeExt as _;

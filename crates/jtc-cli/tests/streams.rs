@@ -1,7 +1,7 @@
 //! Events of `--json`: stderr has what happens as it happens, stdout the result alone.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::Write;
 use std::process::Stdio;

@@ -1,7 +1,7 @@
 //! Host supervision (J-59) as docs/arm.md sets it: motions of `jtc` come to their end, and one whose program was killed is paused.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
@@ -16,12 +16,13 @@ fn supervised(host_timeout_ms: u32) -> Sim {
     sim.held()
 }
 
-/// A motion of 4 s.
-const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n4,0.4,0,0,0,0,0\n";
+/// A motion of 8 s.
+const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    let sim = supervised(1000);
+    // As long as a program may have to wait for its turn on a busy computer.
+    let sim = supervised(4000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");
     sim.jtc(&["move", "--to", "0,0,0,0,0,0", "--speed", "5"]).ends(0);

@@ -2,22 +2,24 @@
 //! `UPDATE_DOCS=1` writes it again.
 #![cfg(target_os = "linux")]
 
-mod common;
-#[path = "troubles/desk.rs"]
-mod desk;
-#[path = "troubles/files.rs"]
 mod files;
 
 use std::process::Command;
 
-use desk::{Desk, Line};
 use test_kit::page::Page;
+
+use crate::desk::{Desk, Line};
+
+/// With the files of the cases.
+fn with_files(desk: Desk) -> Desk {
+    files::write(desk.dir());
+    desk
+}
 
 #[test]
 fn the_page_of_troubles_says_what_jtc_prints() {
     let mut page = Page::new("troubles.md", "jtc");
-    let desk = Desk::new();
-    files::write(desk.dir());
+    let desk = with_files(Desk::new());
     trajectory_files(&mut page, &desk);
     arms(&mut page, &desk);
     link(&mut page, &desk);
@@ -67,11 +69,11 @@ fn link(page: &mut Page, desk: &Desk) {
         "jtc status --port motion.csv",
         &desk.run("jtc status --port motion.csv"),
     );
-    let silent = Desk::at(Line::new(""));
+    let silent = with_files(Desk::at(Line::new("")));
     page.case("Nothing answers", "jtc status", &silent.run("jtc status").blurred());
-    let noisy = Desk::at(Line::new("a rate that is not ours makes noise\n"));
+    let noisy = with_files(Desk::at(Line::new("a rate that is not ours makes noise\n")));
     page.case("Another rate, or another device", "jtc status", &noisy.run("jtc status").blurred());
-    let sim = Desk::simulated(&["--speed", "max", "--no-throttle"]);
+    let sim = with_files(Desk::simulated(&["--speed", "max", "--no-throttle"]));
     page.case("No parameters yet", "jtc traj run motion.csv", &sim.run("jtc traj run motion.csv"));
     let push = "jtc params push slower.toml";
     page.case("An arm whose limits the controller does not have", push, &sim.run(push));
@@ -96,7 +98,7 @@ fn link(page: &mut Page, desk: &Desk) {
 fn moving(page: &mut Page) {
     page.group("jtc: while the arm moves");
     let ready = |options: &[&str]| {
-        let desk = Desk::simulated(&[&["--no-throttle"], options].concat());
+        let desk = with_files(Desk::simulated(&[&["--no-throttle"], options].concat()));
         assert_eq!(desk.run("jtc recover --defaults").code, 0);
         desk
     };
@@ -134,13 +136,18 @@ fn moving(page: &mut Page) {
     std::fs::write(&fault, text).unwrap();
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
-    page.case("What is wrong after it", "jtc doctor", &pushed.run("jtc doctor").blurred());
+    let mut doctor = pushed.run("jtc doctor").blurred();
+    // The simulated time runs as fast as it can: how long ago it was may be seconds or hours.
+    for unit in ["s", "min", "h", "days"] {
+        doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
+    }
+    page.case("What is wrong after it", "jtc doctor", &doctor);
     page.case("The way back", "jtc recover", &pushed.run("jtc recover"));
 }
 
 fn outputs(page: &mut Page) {
     page.group("jtc: terminal and outputs");
-    let desk = Desk::simulated(&["--speed", "max", "--no-throttle"]);
+    let desk = with_files(Desk::simulated(&["--speed", "max", "--no-throttle"]));
     assert_eq!(desk.run("jtc recover --defaults").code, 0);
     desk.run("touch old.csv; ln -s /dev/full full.csv");
     for (title, command) in [

@@ -1,7 +1,7 @@
 //! Environment variables: no variable moves, resets, programs, answers a question or overrules a check; those that count are shown.
 #![cfg(target_os = "linux")]
 
-mod common;
+use crate::common;
 
 use cli_kit::trial::{CommandOutput, run};
 use common::{Dir, Sim, command, jtc};

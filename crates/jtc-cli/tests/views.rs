@@ -1,7 +1,7 @@
 //! `jtc` at a terminal: the live view from its begin to its end, and a run with its bar.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;

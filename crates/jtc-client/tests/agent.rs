@@ -1,5 +1,5 @@
 //! Sessions through an agent: all that works over a serial port, several at a time.
-mod common;
+use crate::common;
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
 //! What a program does by HTTP alone: lease, trajectories, runs, events that it can resume.
-mod common;
+use crate::common;
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
 //! The arm of a controller as one thing by HTTP: read, given, kept, and refused whole.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::{Program, event, is_for_the_one_who_commands};

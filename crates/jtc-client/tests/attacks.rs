@@ -1,5 +1,5 @@
 //! What somebody could try who is not to be let in, as docs/security.md lists it.
-mod common;
+use crate::common;
 
 use common::Served;
 use jtc_client::{AgentPort, Options};

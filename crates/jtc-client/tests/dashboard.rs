@@ -1,5 +1,5 @@
 //! What a page shows that looks at an agent: the arm as numbers, trajectories to draw, what is commanded, what codes mean, reports.
-mod common;
+use crate::common;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

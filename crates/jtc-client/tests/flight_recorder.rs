@@ -1,5 +1,5 @@
 //! The flight recorder by HTTP: what it does, its log as a file, and beginning anew.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::Program;

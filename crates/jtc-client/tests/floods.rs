@@ -1,4 +1,5 @@
 //! Clients that take all connections: in a program of its own, for they take many.
+#[allow(dead_code, reason = "the suite uses more")]
 mod common;
 
 use common::Served;

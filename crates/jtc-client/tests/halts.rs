@@ -1,5 +1,5 @@
 //! What a Stop takes back, and what is given up by whoever asked for it, however late the rest of it comes.
-mod common;
+use crate::common;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

@@ -1,5 +1,5 @@
 //! Jogging over a connection that is slow: what comes late moves nothing.
-mod common;
+use crate::common;
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 //! What is run is what was looked at, and what is kept is replaced by whoever means to.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::Program;

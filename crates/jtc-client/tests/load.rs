@@ -1,4 +1,5 @@
 //! Many who look and one who commands: nobody disturbs anybody, and who does not read is put out.
+#[allow(dead_code, reason = "the suite uses more")]
 mod common;
 
 use std::sync::Arc;

@@ -1,5 +1,5 @@
 //! What brings a controller back by HTTP: clearing and resetting nodes, its own arm, a given one, and what a doctor finds.
-mod common;
+use crate::common;
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 //! Moves by HTTP: to joint positions, to a named pose, to a pose of the flange, also on a straight line.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::{Program, event};

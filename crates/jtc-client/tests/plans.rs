@@ -1,5 +1,5 @@
 //! Trajectories through waypoints, made by the agent: planned, kept, run, and refused with what is wrong.
-mod common;
+use crate::common;
 
 use std::time::Duration;
 

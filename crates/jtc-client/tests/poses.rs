@@ -1,5 +1,5 @@
 //! Named poses by HTTP: those of the arm file, and those that are saved.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::Program;

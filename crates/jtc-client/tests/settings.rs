@@ -1,5 +1,5 @@
 //! Settings and what else is given to a controller by HTTP: taken, refused to others and in the wrong state, and never by half.
-mod common;
+use crate::common;
 
 use common::Served;
 use common::program::{Program, event, is_for_the_one_who_commands, logged};

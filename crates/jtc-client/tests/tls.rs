@@ -1,5 +1,5 @@
 //! TLS: who trusts the agent's certificate gets in, and nobody else speaks with it.
-mod common;
+use crate::common;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

@@ -1,4 +1,5 @@
 //! Time of one control tick in Operate and memory of the controller, one `name value` a line (ns, bytes).
+use std::collections::VecDeque;
 use std::hint::black_box;
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
@@ -16,8 +17,12 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Nodes that answer at once and are where they should be.
-fn answers(request: &Request, state: &mut [NodeState; 7], position: &[f64; 6]) -> Vec<Frame> {
+/// Ticks that the drives' speed is the mean over.
+const WINDOW: usize = 10;
+
+/// Nodes that answer at once and are where they should be: `position` has where they were in the last ticks, rad, the newest first.
+fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f64; 6]>) -> Vec<Frame> {
+    let at = |j: usize, ago: usize| position.get(ago).or(position.back()).map_or(0.0, |position| position[j]);
     let mut out = Vec::new();
     for n in 0..7u8 {
         let node = &mut state[usize::from(n)];
@@ -25,7 +30,8 @@ fn answers(request: &Request, state: &mut [NodeState; 7], position: &[f64; 6]) -
             Request::Move { .. } if n < 6 => Answer::Joint {
                 node: n,
                 report: JointReport {
-                    position: position[usize::from(n)],
+                    position: at(n.into(), 0),
+                    velocity: (at(n.into(), 0) - at(n.into(), WINDOW)) / (WINDOW as f64 * 1e-3),
                     temperature: 30,
                     state: *node,
                     motor_temperature: Some(30),
@@ -81,10 +87,11 @@ fn main() {
         (FrameType::Trajectory, body),
         (FrameType::TrajSetExecStatus, vec![3]),
     ];
-    let mut queue: std::collections::VecDeque<_> = commands.iter().map(|(t, b)| (*t, frame(*t, b))).collect();
+    let mut queue: VecDeque<_> = commands.iter().map(|(t, b)| (*t, frame(*t, b))).collect();
 
     let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
     let mut nodes = [NodeState::INIT; 7];
+    let mut positions = VecDeque::new();
     let mut bus = Vec::new();
     let mut recorded: Vec<Vec<Frame>> = Vec::new();
     let mut start = None;
@@ -108,8 +115,9 @@ fn main() {
         ticks += 1;
         assert!(ticks < 60_000, "the trajectory is not executed: {:?}", controller.violation());
         let request = Request::parse(&outputs.bus.expect("a frame each tick")).expect("a request");
-        let set = controller.telemetry().joints.map(|j| j.set_position);
-        bus = answers(&request, &mut nodes, &set);
+        positions.push_front(controller.telemetry().joints.map(|j| j.set_position));
+        positions.truncate(WINDOW + 1);
+        bus = answers(&request, &mut nodes, &positions);
     }
     let start = start.expect("the trajectory was executed");
 

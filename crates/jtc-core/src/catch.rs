@@ -31,9 +31,11 @@ pub(crate) struct Catch {
     /// Highest speed of this half of a swing, with its sign, and of the half before, rad/s.
     peak: f64,
     peak_before: f64,
+    /// That half was faster than the one before it.
+    grew: bool,
 }
 
-remembered!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before });
+remembered!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before, grew });
 
 impl Catch {
     /// The joint was just enabled.
@@ -58,14 +60,9 @@ impl Catch {
             return false;
         }
         self.left_ms = self.left_ms.saturating_sub(1);
-        let speed = velocity.abs();
         if moves(velocity) {
             self.busy_ms = CALM_MS;
-            if velocity * self.peak < 0.0 {
-                (self.peak_before, self.peak) = (self.peak.abs(), velocity);
-            } else if speed > self.peak.abs() {
-                self.peak = velocity;
-            }
+            self.swing(velocity);
         } else {
             // Noise around standstill is no half of a swing: the fall that follows it has not grown out of it.
             self.busy_ms = self.busy_ms.saturating_sub(1);
@@ -75,6 +72,33 @@ impl Catch {
             self.left_ms = 0;
         }
         self.left_ms > 0
+    }
+
+    /// A tick of a swing.
+    fn swing(&mut self, velocity: f64) {
+        if velocity * self.peak < 0.0 {
+            let peak = self.peak.abs();
+            self.grew = self.peak_before > 0.0 && peak > self.peak_before;
+            (self.peak_before, self.peak) = (peak, velocity);
+        } else if velocity.abs() > self.peak.abs() {
+            self.peak = velocity;
+        }
+    }
+
+    /// Swings from now on count, and not those before.
+    pub fn watch_anew(&mut self) {
+        (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
+    }
+
+    /// One tick of a joint that has settled: whether it swings, each of three halves faster than the one before it.
+    pub fn watch(&mut self, velocity: f64) -> bool {
+        if !self.settled || self.left_ms > 0 {
+            return false;
+        }
+        if moves(velocity) {
+            self.swing(velocity);
+        }
+        self.grew && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
     /// The joint has come to rest in another way.
@@ -186,6 +210,23 @@ mod tests {
             assert!(goes_on(&[noise, -0.15]) && goes_on(&[-noise, 0.15]), "{noise} before a fall");
             assert!(goes_on(&[0.2, -noise, 0.15, -noise, 0.19]), "{noise} within a half");
         }
+    }
+
+    /// Gains on trial: a joint that has settled swings on its own only when its loop is unstable.
+    #[test]
+    fn j71_a_swing_that_grows_over_three_halves_is_seen_of_a_joint_that_has_settled() {
+        let seen = |peaks: &[f64]| {
+            let mut catch = begun();
+            for _ in 0..1_000 {
+                catch.step(0.0);
+            }
+            catch.watch_anew();
+            let halves = peaks.iter().flat_map(|peak| [0.5, 1.0, 0.5, 0.0].map(|share| share * peak));
+            halves.into_iter().any(|velocity| catch.watch(velocity))
+        };
+        assert!(seen(&[0.05, -0.08, 0.11]) && seen(&[-0.2, 0.21, -0.22]) && seen(&[0.3, -0.1, 0.12, -0.13]));
+        assert!(!seen(&[0.2, -0.3]), "two halves may be a push and its answer");
+        assert!(!seen(&[0.03, -0.05, 0.09]) && !seen(&[0.3, -0.31, 0.2, -0.25]) && !seen(&[0.1, 0.2, 0.3]));
     }
 
     #[test]

@@ -26,6 +26,10 @@ pub struct Config {
     pub velocity_full_scale: f64,
     /// Speed at which the drives trip by themselves while configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
+    /// Time that the drives' speed is the mean over, ms: over it their position and their speed are compared (J-35); 0: they are not.
+    pub drive_speed_window_ms: u8,
+    /// How far torque twists a gear, N·m/rad: by as much the position at its one end may differ from the speed at the other (J-35).
+    pub gear_stiffness: f64,
     /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
     /// held within one such step (J-41).
     pub encoder_step: f64,
@@ -84,18 +88,12 @@ pub struct Config {
     pub catch_ms_max: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
     pub blend_ms: u16,
-    /// Joint speed above which teaching brakes, rad/s (J-25).
-    pub teach_velocity_max: f64,
-    /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25); less where a joint is too light for it.
-    pub teach_damping: f64,
-    /// Largest mass at the flange, kg, that teaching takes the torque for that HoldPos had found missing (J-25); also of a
-    /// negative one, where the modelled arm is too heavy.
-    pub teach_payload_max: f64,
-    /// Joint speed, rad/s, from which on the torque for it fades where it drives the joint; at three times that speed none is
-    /// left (J-25). What HoldPos had found missing may have been a contact, and the contact may go.
-    pub teach_payload_velocity: f64,
-    /// Time over which teaching fades out the missing torque that no such mass explains, ms (J-25).
-    pub teach_fade_ms: u16,
+    /// Torque, as a share of the torque limit, up to which Teaching holds a joint at standstill, friction of its own included (J-25).
+    pub teach_stiction: f64,
+    /// Share of the joints' Coulomb friction that Teaching takes away (J-25).
+    pub teach_friction: f64,
+    /// Speed of the flange from which on Teaching brakes harder, m/s, at twice that fully: a brake, no limit; 0: any.
+    pub tool_speed_max: f64,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
     /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.

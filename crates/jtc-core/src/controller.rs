@@ -6,6 +6,7 @@ use crate::config::Config;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
 use crate::extension::Extensions;
+use crate::held_stop::LastStop;
 use crate::host::overtaking::Overtaking;
 use crate::host::slices::SliceProgress;
 use crate::host::upload::LineUpload;
@@ -46,6 +47,8 @@ pub struct Controller<M> {
     /// Ticks since a pause or stop was commanded on the path, until the arm stands (J-33).
     pub(crate) braking_ms: Option<u16>,
     pub(crate) motion: Motion,
+    /// Why the arm came to a held stop last (J-69).
+    pub(crate) last_stop: LastStop,
     // The link to the host.
     pub(crate) slice_progress: SliceProgress,
     pub(crate) overtaking: [Overtaking; HOST_LINES],
@@ -77,6 +80,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             phase: Phase::BEGIN,
             braking_ms: None,
             motion: Motion::default(),
+            last_stop: LastStop::default(),
             slice_progress: SliceProgress::Begin,
             overtaking: [Overtaking::default(); HOST_LINES],
             uploads: [LineUpload::default(); HOST_LINES],
@@ -156,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // J-60: what HoldPos finds missing is known when the payload is in the model.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
-                && self.motion.may_be_taught(&self.config, self.errors.held_stop()),
+                && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
             execute: self.trajectory == TrajectoryState::Execute,
         }
     }
@@ -176,6 +180,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         match next {
             ControllerState::Error | ControllerState::Init | ControllerState::Start => {
+                self.end_trial();
                 self.teaching = false;
                 self.motion.release(&self.nodes);
                 self.errors.end_held_stop();
@@ -186,12 +191,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.end_teaching(&self.nodes, &self.config, &self.parameters.pid);
             }
             ControllerState::Teaching => {
-                let contact = self.errors.held_stop();
-                self.motion.law.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics, contact);
+                self.motion.law.begin_teaching(&self.nodes, &self.config);
             }
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
-        self.motion.law.change_mode();
+        if last == ControllerState::Teaching {
+            // What decelerates the arm goes on doing so, with all of its torque.
+            self.motion.law.change_whole_torque();
+        } else {
+            self.motion.law.change_mode();
+        }
     }
 
     pub(crate) fn set_trajectory(&mut self, trajectory: TrajectoryState) {

@@ -10,6 +10,10 @@ use crate::remembered::remembered;
 const STANDING: f64 = 0.02;
 /// Highest deceleration of a joint that falls while it is enabled, rad/s²: most of its torque is gravity's.
 const CATCH_DECELERATION: f64 = 3.0;
+/// Highest deceleration of a falling joint, in the middle of its way, as a multiple of the mean.
+const STEEPEST: f64 = 1.5;
+/// The same of a joint that was led, at the begin: there the damping of Teaching decelerates it already.
+pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// A joint with this velocity (rad/s) moves.
 pub(crate) fn moves(velocity: f64) -> bool {
@@ -24,24 +28,25 @@ pub(crate) struct Deceleration {
     /// 0 in the first tick, which commands what was measured: the error begins at 0, and so does its derivative.
     elapsed_ms: f64,
     length_ms: f64,
+    /// It falls: no torque decelerates it at the begin.
+    falls: bool,
 }
 
-remembered!(Deceleration { from, velocity, elapsed_ms, length_ms });
+remembered!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
     /// A joint that a hand leads: from a measured position (rad) and velocity (rad/s), of which the velocity limit is used at
-    /// most.
-    pub fn led(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
+    /// most, within `length_ms`.
+    pub fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
-        Self { from, velocity, elapsed_ms: -1.0, length_ms: f64::from(config.ramp_ms.max(1)) }
+        Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
     /// A joint that falls: the faster it is, the longer it takes.
     pub fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
-        let led = Self::led(from, velocity, config, limits);
-        // The velocity falls steepest in the middle: by 3/2 of its mean.
-        let length_ms = led.length_ms.max(1.5 * led.velocity.abs() / (CATCH_DECELERATION * DT));
-        Self { length_ms, ..led }
+        let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
+        let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
+        Self { length_ms, falls: true, ..led }
     }
 
     /// Where it begins, rad, and at which velocity, rad/s.
@@ -54,17 +59,22 @@ impl Deceleration {
         self.from += way;
     }
 
-    /// Position and velocity of the next tick, and whether the joint rests then.
-    pub fn step(&mut self, limits: &JointConfig) -> (f64, f64, bool) {
+    /// Position, velocity and acceleration of the next tick, and whether the joint rests then.
+    pub fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
-        // Integral of the falling velocity v·(1 − smooth(u)).
-        let way = (u - u * u * u + 0.5 * u * u * u * u) * self.length_ms * DT;
+        let (seconds, left) = (self.length_ms * DT, 1.0 - u);
+        // The velocity, and its integral and its slope, as shares of v, v·T and v/T.
+        let (velocity, way, slope) = if self.falls {
+            (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
+        } else {
+            (left * left, (1.0 - left * left * left) * (1.0 / 3.0), -2.0 * left)
+        };
         // Never out of the limits; where the arm already is outside, it stays.
-        let position = (self.from + self.velocity * way)
+        let position = (self.from + self.velocity * way * seconds)
             .max(limits.position_min.min(self.from))
             .min(limits.position_max.max(self.from));
-        (position, self.velocity * (1.0 - smooth(u)), u >= 1.0)
+        ([position, self.velocity * velocity, self.velocity * slope / seconds], u >= 1.0)
     }
 }
 
@@ -75,6 +85,8 @@ mod tests {
 
     use super::*;
 
+    const RAMP_MS: f64 = 200.0;
+
     /// Wide enough for every way in here.
     fn limits() -> JointConfig {
         JointConfig { position_min: -9.0, position_max: 9.0, ..Config::avena().joints[0] }
@@ -84,7 +96,7 @@ mod tests {
     fn ways(mut deceleration: Deceleration, limits: &JointConfig) -> Vec<(f64, f64)> {
         let mut ways = Vec::new();
         for _ in 0..5_000 {
-            let (position, velocity, rests) = deceleration.step(limits);
+            let ([position, velocity, _], rests) = deceleration.step(limits);
             ways.push((position, velocity));
             if rests {
                 return ways;
@@ -105,7 +117,7 @@ mod tests {
         let config = Config::avena();
         for velocity in [-1.4, -0.3, 0.05, 1.0] {
             let (led, falling) = (
-                Deceleration::led(0.7, velocity, &config, &limits()),
+                Deceleration::led(0.7, velocity, RAMP_MS, &limits()),
                 Deceleration::falling(0.7, velocity, &config, &limits()),
             );
             for way in [ways(led, &limits()), ways(falling, &limits())] {
@@ -141,18 +153,18 @@ mod tests {
 
     #[test]
     fn j43_coming_to_rest_keeps_the_velocity_limit_and_the_position_limits() {
-        let (config, limits) = (Config::avena(), Config::avena().joints[0]);
+        let limits = Config::avena().joints[0];
         for velocity in [-7.0, 7.0] {
-            let way = ways(Deceleration::led(0.0, velocity, &config, &limits), &limits);
+            let way = ways(Deceleration::led(0.0, velocity, RAMP_MS, &limits), &limits);
             assert_eq!(way[0].1, limits.velocity_max.copysign(velocity));
             for (end, outside) in [(limits.position_min, -0.1), (limits.position_max, 0.1)] {
                 let inside =
-                    ways(Deceleration::led(end - 0.1 * outside, velocity, &config, &limits), &limits);
+                    ways(Deceleration::led(end - 0.1 * outside, velocity, RAMP_MS, &limits), &limits);
                 let inward = velocity * outside < 0.0;
                 assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
                 // An arm that is found outside is not driven further out.
                 let found = end + outside;
-                let beyond = ways(Deceleration::led(found, velocity, &config, &limits), &limits);
+                let beyond = ways(Deceleration::led(found, velocity, RAMP_MS, &limits), &limits);
                 let last = beyond[beyond.len() - 1].0;
                 assert!(if inward { (last - end).abs() < (found - end).abs() } else { last == found });
             }
@@ -161,8 +173,7 @@ mod tests {
 
     #[test]
     fn j43_a_load_that_is_caught_moves_the_whole_way() {
-        let config = Config::avena();
-        let plain = Deceleration::led(0.4, 0.3, &config, &limits());
+        let plain = Deceleration::led(0.4, 0.3, RAMP_MS, &limits());
         let mut moved = plain;
         moved.shift(-0.02);
         for ((p, v), (q, w)) in ways(plain, &limits()).into_iter().zip(ways(moved, &limits())) {

@@ -1,7 +1,7 @@
 //! The execution of a trajectory (J-30 to J-36): from Execute to standstill, wherever that comes about.
 pub(crate) mod phase;
 
-use jtc_wire::{DataStatus, ExecCommand, RawPoint};
+use jtc_wire::{DataStatus, ExecCommand, RawPoint, StopCause, StopKind};
 
 use crate::check::PathRange;
 use crate::controller::Controller;
@@ -117,7 +117,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 (false, true) => joint_error::TORQUE,
                 (false, false) => 0,
             };
-            self.hold_stop(&core::array::from_fn(cause));
+            let kind = if lags.contains(&true) { StopKind::PositionError } else { StopKind::Overload };
+            self.hold_stop(&core::array::from_fn(cause), kind);
         } else if next == Next::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
         }
@@ -172,7 +173,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     let to = self.path_point();
                     match if self.near(&to) { self.approach_to(&to) } else { None } {
                         Some(phase) => self.phase = phase,
-                        None => self.set_trajectory(TrajectoryState::Stop),
+                        None => {
+                            // The host was told that it would move.
+                            self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
+                            self.set_trajectory(TrajectoryState::Stop);
+                        }
                     }
                 }
             }
@@ -276,7 +281,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             } else {
                 // The path stands, and what still moves is let down (J-70).
                 self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
-                self.hold_stop(&causes);
+                self.hold_stop(&causes, StopKind::Overload);
                 if jogged {
                     self.motion.set.drop_jog();
                 } else {

@@ -26,6 +26,9 @@ const LIVE_MAX: usize = 4;
 /// Most values of a SetSettings frame under an arm that is held or taught: a payload has ten.
 const STANDING_MAX: usize = 16;
 
+/// Highest velocity of a jog while encoders do not fit (J-35), rad/s: a host has single numbers.
+const UNTRUSTED_MAX: f32 = 0.1;
+
 /// Who the device is, as its board knows it (J-52).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Identity {
@@ -134,8 +137,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::StoreArm => self.store_arm(),
-            Command::Disable if self.state == ControllerState::Init || self.holds_at_rest() => {
-                // J-53: with its parameters missing the controller goes to Init, without torque, and stays there.
+            Command::Disable if self.settable() || self.holds_at_rest() => {
+                // J-53: with its parameters missing the controller goes to Init, without torque, and stays there. In Init and Error another
+                // arm can be given then, whose parts do not go with those of the last one (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -174,13 +178,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::NotAllowed);
         }
         let mut wanted = [0.0; JOINTS];
+        let untrusted = self.nodes.untrusted() != 0;
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
             // The wire has f32: the limit itself may come as the next number above it. Written so that NaN is refused.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
-            if velocity != 0.0 && self.config.absent.get(j) == Some(&true) {
-                // J-53: there is no such joint.
+            // J-53: there is no such joint.
+            let absent = self.config.absent.get(j) == Some(&true);
+            if absent && velocity != 0.0 || untrusted && velocity.abs() > f64::from(UNTRUSTED_MAX) {
                 return Err(DataStatus::NotAllowed);
             }
         }
@@ -239,6 +245,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos => {
                 self.trajectory != TrajectoryState::Execute
                     && !self.motion.set.jogging()
+                    && !self.motion.set.is_led()
                     && !self.motion.law.is_yielding()
             }
             _ => false,
@@ -268,8 +275,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn info(&self, hash: u64) -> Info {
         let Extensions { identity, name, store, sequence, log, .. } = &self.extensions;
-        let mut capabilities =
-            capability::SETTINGS | capability::SPEED | capability::JOG | capability::PAYLOAD;
+        let mut capabilities = capability::SETTINGS
+            | capability::SPEED
+            | capability::JOG
+            | capability::PAYLOAD
+            | capability::STOP_CAUSE;
         if *store != StoreState::Absent {
             capabilities |= capability::STORE;
         }
@@ -292,6 +302,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             arm: *name,
             board: Name::cut(identity.board),
             program: identity.program,
+            reactions: Some(self.reactions()),
             ..Info::default()
         }
         .with_firmware(identity.firmware, identity.revision)
@@ -347,15 +358,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.set_speed(config.speed);
             return SliceOutcome::Done;
         }
-        let table = if let SliceProgress::TableCheck(j) = self.slice_progress { j } else { 0 };
-        let fits = if table == 0 { self.parameters.fits(&config) } else { true };
-        if !fits || !self.parameters.table_fits(table, &config) {
-            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        if !matches!(self.slice_progress, SliceProgress::Pose(_)) {
+            let table = if let SliceProgress::TableCheck(j) = self.slice_progress { j } else { 0 };
+            let fits = if table == 0 { self.parameters.fits(&config) } else { true };
+            if !fits || !self.parameters.table_fits(table, &config) {
+                return SliceOutcome::Refused(DataStatus::IncorrectValue);
+            }
+            if self.parameters.tables_in_use().is_some() && table + 1 < JOINTS {
+                return SliceOutcome::Unfinished(SliceProgress::TableCheck(table + 1));
+            }
         }
-        if self.parameters.tables_in_use().is_some() && table + 1 < JOINTS {
-            return SliceOutcome::Unfinished(SliceProgress::TableCheck(table + 1));
+        match self.parameters.look_again(self.slice_progress, &config, &self.config) {
+            SliceOutcome::Done => self.use_settings(config),
+            outcome => return outcome,
         }
-        self.use_settings(config);
         SliceOutcome::Done
     }
 

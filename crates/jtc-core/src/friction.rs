@@ -15,8 +15,28 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // A speed that is NaN makes the torque NaN by c1.
     let s = within(v * sign_slope, -1.0, 1.0);
-    let factor = within(1.0 + c[4] * (t - c[5]), 0.2, 2.0);
-    factor * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
+    warmth(c, t) * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
+}
+
+/// Coulomb friction of the polynomial, N·m.
+pub(crate) fn coulomb_of_polynomial(c: &[f64; 6], t: f64) -> f64 {
+    (warmth(c, t) * c[0]).max(0.0)
+}
+
+/// Factor of the temperature `t` (°C) in the polynomial.
+fn warmth(c: &[f64; 6], t: f64) -> f64 {
+    within(1.0 + c[4] * (t - c[5]), 0.2, 2.0)
+}
+
+/// Coulomb friction of the table, N·m: what a straight line through two slow speeds has at standstill, in the direction in which that is
+/// less. Nothing where the table has not these speeds.
+pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
+    const SLOW: f64 = 0.1;
+    let at = |direction: f64| {
+        let (near, far) = (table(of, direction * SLOW, t)?, table(of, 2.0 * direction * SLOW, t)?);
+        Some((direction * (2.0 * near - far)).min(direction * near))
+    };
+    at(1.0).unwrap_or(0.0).min(at(-1.0).unwrap_or(0.0)).max(0.0)
 }
 
 /// Not `clamp`, which compares: the board has an instruction for each of these.

@@ -67,6 +67,11 @@ impl HoldBack {
         self.active = false;
     }
 
+    /// Time of holding back in this run, ms.
+    pub fn run_ms(&self) -> u16 {
+        self.run_ms
+    }
+
     /// Whether the joint has been at its limit since the path is held back.
     pub fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0

@@ -13,9 +13,12 @@ use crate::controller::Controller;
 use crate::defaults;
 use crate::errors::Errors;
 use crate::friction::celsius;
+use crate::held_stop::LastStop;
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
-use crate::{ControllerState, JOINTS, TrajectoryState};
+use crate::parameters::PidGains;
+use crate::received::{ReceivedParameters, read_pid};
+use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use overtaking::Overtaking;
 use slices::{SliceOutcome, SliceProgress};
 use upload::LineUpload;
@@ -153,6 +156,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
                 && !jogging
+                && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
             // J-69: what the controller reacts to is not gone yet.
@@ -175,7 +179,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::ClearOccurredErrors => {
                 self.motion.law.end_yields();
-                self.clear_errors(Errors::clear_occurred).into()
+                let cleared = self.clear_errors(Errors::clear_occurred);
+                if cleared.is_ok() {
+                    self.last_stop = LastStop::default();
+                }
+                cleared.into()
             }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
@@ -246,22 +254,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 return self.use_stored(command.frame_type());
             }
         }
-        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
         match *command {
-            Command::PidParam(floats) => {
-                parameters.take_pid(&floats, config).map(|()| motion.law.change_gains()).into()
+            Command::PidParam(floats) => read_pid(&floats).and_then(|gains| self.take_gains(&gains)).into(),
+            Command::PidParamUseDefault => self.take_gains(&defaults::PID).into(),
+            Command::ArmModel(floats) => {
+                self.take_model(|own, progress, at, config| own.take_model(&floats, progress, at, config))
             }
-            Command::PidParamUseDefault => {
-                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_gains()).into()
-            }
-            Command::ArmModel(floats) => parameters
-                .take_model(&floats, self.nodes.known_positions(), config)
-                .map(|()| motion.law.change_model())
-                .into(),
-            Command::ArmModelUseDefault => parameters
-                .set_model(&defaults::MODEL, self.nodes.known_positions(), config)
-                .map(|()| motion.law.change_model())
-                .into(),
+            Command::ArmModelUseDefault => self.take_model(|own, progress, at, config| {
+                own.set_model(&defaults::MODEL, progress, at, config)
+            }),
+            _ => self.take_friction(command),
+        }
+    }
+
+    /// Friction, in slices.
+    fn take_friction(&mut self, command: &Command<'_>) -> SliceOutcome {
+        let (parameters, config) = (&mut self.parameters, &self.config);
+        match *command {
             Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
             Command::FrictionTable(floats) => parameters.take_table(&floats, self.slice_progress, config),
             Command::FrictionPolynomialUseDefault => parameters.take_default_polynomial(config).into(),
@@ -270,21 +279,61 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
+    /// A model, in slices, `taken` by the parameters.
+    fn take_model(
+        &mut self,
+        taken: impl FnOnce(
+            &mut ReceivedParameters,
+            SliceProgress,
+            Option<&[f64; JOINTS]>,
+            &Config,
+        ) -> SliceOutcome,
+    ) -> SliceOutcome {
+        let at = self.nodes.known_positions();
+        let outcome = taken(&mut self.parameters, self.slice_progress, at, &self.config);
+        self.model_taken(outcome)
+    }
+
+    /// Tells the control law of an arm under torque about the model that was taken.
+    fn model_taken(&mut self, outcome: SliceOutcome) -> SliceOutcome {
+        if self.powered() && matches!(outcome, SliceOutcome::Done) {
+            self.motion.law.change_model();
+        }
+        outcome
+    }
+
+    /// Gains. Under torque they have to hold what is held, and are on trial (J-71).
+    #[inline(never)]
+    fn take_gains(&mut self, gains: &[PidGains; JOINTS]) -> Result<(), DataStatus> {
+        self.parameters.check_pid(gains, &self.config)?;
+        if self.powered() && *gains != self.parameters.pid {
+            if !self.motion.law.hold_on(gains, &self.config) {
+                return Err(DataStatus::IncorrectValue);
+            }
+            let before = self.parameters.pid;
+            self.parameters.trial.begin(&before, gains);
+            self.motion.change_gains(gains);
+        }
+        self.parameters.put_pid(gains);
+        Ok(())
+    }
+
     /// What a default means where an arm is stored (J-54).
     #[inline(never)]
     fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
-        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
-        let Some(arm) = self.extensions.stored.arm() else {
+        let Self { extensions, parameters, config, nodes, .. } = self;
+        let Some(arm) = extensions.stored.arm() else {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         };
         match frame_type {
             FrameType::PidParamUseDefault => {
-                parameters.take_pid(&arm.pid, config).map(|()| motion.law.change_gains()).into()
+                read_pid(&arm.pid).and_then(|gains| self.take_gains(&gains)).into()
             }
-            FrameType::ArmModelUseDefault => parameters
-                .take_model(&arm.model, self.nodes.known_positions(), config)
-                .map(|()| motion.law.change_model())
-                .into(),
+            FrameType::ArmModelUseDefault => {
+                let at = nodes.known_positions();
+                let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
+                self.model_taken(outcome)
+            }
             // It has one friction, whichever a host asks for.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
@@ -321,9 +370,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Teaching was accepted, and begins as soon as the arm is held; or joints are absent (J-53).
+            // Teaching was accepted, and begins as soon as the arm is held; a hand had led the arm, and it is not at rest yet; or joints are
+            // absent (J-53).
             (_, ExecCommand::Execute)
                 if self.teaching
+                    || self.motion.set.is_led()
                     || self.motion.set.jogging()
                     || self.joints_absent()
                     || self.stops_held() =>
@@ -339,12 +390,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
                 self.check_verdict()?;
+                self.check_trust()?;
                 self.check_friction()?;
                 self.start_path()?;
                 self.uploads.iter_mut().for_each(LineUpload::executed);
                 Ok(())
             }
             (TrajectoryState::Pause, ExecCommand::Execute) => {
+                self.check_trust()?;
                 self.check_friction()?;
                 self.resume_path()?;
                 self.uploads.iter_mut().for_each(LineUpload::executed);

@@ -23,6 +23,18 @@ pub struct JointConfig {
     /// What the drive is asked for, as a multiple of the torque that the joint is to have (J-61). Drives that deliver less than
     /// they are asked need more than 1.
     pub torque_gain: f64,
+    /// Damping in Teaching, N·m·s/rad (J-25); less where the joint is too light for it.
+    pub teach_damping: f64,
+}
+
+/// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
+const UNKNOWN_ROTOR: f64 = 0.7;
+
+impl JointConfig {
+    /// Rotor inertia that is counted with, kg·m²: a drive has a rotor also if the configuration gives none.
+    pub fn counted_rotor(&self) -> f64 {
+        if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
+    }
 }
 
 /// Ticks that are looked back upon.
@@ -89,6 +101,36 @@ impl Saturation {
     /// What was counted is forgotten.
     pub fn forget(&mut self) {
         self.over.forget();
+    }
+}
+
+/// Time within which torques at both limits, twice each, are those of an unstable loop, ticks.
+const TURNS_MS: u32 = 200;
+
+/// How the torque of a joint goes from one limit to the other.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Turns {
+    /// Ticks in which it came to a limit from the other one: the last three, oldest first.
+    at: [u32; 3],
+    /// How many there have been, three at most.
+    count: u8,
+    /// The last of them was the upper limit.
+    upper: bool,
+}
+
+remembered!(Turns { at, count, upper });
+
+impl Turns {
+    /// The torque is at a limit in this tick. Returns whether it has been at both, twice each, of late.
+    pub fn hits(&mut self, upper: bool, tick: u32) -> bool {
+        if self.count > 0 && self.upper == upper {
+            return false;
+        }
+        let [first, a, b] = self.at;
+        let unstable = self.count == 3 && tick.wrapping_sub(first) <= TURNS_MS;
+        self.at = [a, b, tick];
+        (self.count, self.upper) = ((self.count + 1).min(3), upper);
+        unstable
     }
 }
 
@@ -211,6 +253,20 @@ mod tests {
             assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
         assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, true));
+    }
+
+    /// In ticks of these numbers the torque is at its upper (true) or its lower limit.
+    #[test]
+    fn j66_a_torque_that_was_at_both_limits_twice_each_within_200_ms_is_unstable() {
+        let seen = |hits: &[(u32, bool)]| {
+            let mut turns = Turns::default();
+            hits.iter().position(|&(tick, upper)| turns.hits(upper, tick))
+        };
+        assert_eq!(seen(&[(0, true), (50, false), (100, true), (200, false)]), Some(3));
+        assert_eq!(seen(&[(0, true), (50, false), (100, true), (201, false), (240, true)]), Some(4));
+        assert_eq!(seen(&[(0, true), (100, false), (200, true), (300, false), (400, true)]), None);
+        assert_eq!(seen(&[(0, true), (50, true), (60, false), (70, false), (80, true)]), None);
+        assert_eq!(seen(&[(u32::MAX - 9, false), (u32::MAX, true), (5, false), (9, true)]), Some(3));
     }
 
     proptest! {

@@ -52,6 +52,11 @@ impl Load {
         torque.max(-highest).min(highest)
     }
 
+    /// The load is known.
+    pub fn is_known(&self) -> bool {
+        self.known
+    }
+
     /// It was found in another way: a load that was lowered has become this torque, N·m.
     pub fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };

@@ -11,8 +11,12 @@ mod set_values;
 mod torque;
 mod transfer;
 
+use jtc_dynamics::Dynamics;
+
 use crate::JOINTS;
+use crate::catch::Catch;
 use crate::config::Config;
+use crate::deceleration::moves;
 use crate::hold_back::HoldBack;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
@@ -20,10 +24,11 @@ use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
 use crate::path::PathClock;
 use crate::remembered::remembered;
+use crate::teach::Taught;
 pub(crate) use commanded::Commanded;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
-pub(crate) use limiter::Found;
+pub(crate) use limiter::{Found, RUSH};
 use limiter::{Limited, Limiter};
 use ramp::PathRamp;
 use set_values::SetValues;
@@ -32,6 +37,9 @@ pub(crate) use set_values::approach;
 pub(crate) use torque::JointTorque;
 #[cfg(test)]
 pub(crate) type Ramp = PathRamp;
+
+/// Time in which joints that are not pressed find what they carry, ms.
+const KNOWN_MS: u32 = 2_000;
 
 /// The parts of the motion.
 #[derive(Clone, Debug, Default)]
@@ -58,22 +66,28 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Begin to hold where the arm is, coming to rest first if it moves.
-    pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
-        self.set.hold_measured(nodes, config);
-        self.law.begin();
-    }
-
     /// Joints that yield from the next tick on (J-68), and joints that lower their loads (J-70). The ramp has their inertia.
     pub fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
             if yields[j] || lowers[j] {
                 let set = self.set.point.position[j];
-                self.law.begin_yield(j, lowers[j], set, inertia[j], &config.joints[j]);
+                self.law.begin_yield(j, (lowers[j], self.set.is_led()), set, inertia[j], &config.joints[j]);
                 self.limiter.forget(j);
             }
         }
+    }
+
+    /// The gains become these under the holding arm (J-71).
+    pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
+        self.law.change_gains(gains);
+        self.set.catch.iter_mut().for_each(Catch::watch_anew);
+        self.limiter.forget_turns();
+    }
+
+    /// All joints have settled since they were enabled, and none yields.
+    pub fn holds(&self, config: &Config) -> bool {
+        (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
     /// Joints that are at their torque limits, and joints with position errors beyond half of what they may be.
@@ -83,19 +97,33 @@ impl Motion {
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// The arm is held at rest, and what it carries is known. In a held stop, where a `contact` may be against it, nothing is found out and
-    /// nothing is waited for.
-    pub fn may_be_taught(&self, config: &Config, contact: bool) -> bool {
+    /// The arm is held at rest, and what it carries is known. In a held stop a `contact` may be against it and is not waited for, and after
+    /// [`KNOWN_MS`] of waiting (`waits_ms`) nothing is.
+    pub fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
+        let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
             && !self.law.is_yielding()
-            && (contact || self.law.unwinds_ms > 0 || self.law.payload.is_known(config))
+            && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.
+    /// A tick of Teaching: what a ramp needs is kept ready, since Teaching may end in the midst of a motion.
+    pub fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+        if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
+            self.ramp.begin(nodes, config, dynamics);
+        }
+    }
+
+    /// Teaching ends: the arm comes to rest and is held there, and the integral takes over what Teaching carried. What moves is stopped
+    /// within `ramp_ms`, or as much later, up to `stop_ms`, as the torque limits ask for (J-33).
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
-        self.hold_measured(nodes, config);
-        self.set.catch_decelerating(config);
-        self.law.end_teaching(gains);
+        let mut length_ms = f64::from(config.ramp_ms);
+        if nodes.velocities().iter().any(|v| moves(*v)) {
+            let needed = self.ramp.shortest_stop_ms(&self.law, nodes.velocities(), config);
+            length_ms = length_ms.max(needed).min(f64::from(config.stop_ms).max(length_ms));
+        }
+        self.set.hold_measured(nodes, length_ms, config);
+        self.law.begin();
+        self.law.end_teaching(nodes, config, gains);
     }
 
     /// Begins to hold joints that have just been enabled.
@@ -131,6 +159,8 @@ impl Motion {
     }
 
     /// A tick of the control law and of its limits: torques to command, and what was found on the way.
+    // One function with all that every tick does: calls inside would move the torques to and fro.
+    #[inline(never)]
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();
         let yields = self.law.any_yields();

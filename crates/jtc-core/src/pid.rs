@@ -55,10 +55,14 @@ impl Pid {
     /// found it. An integral without gain or at its bounds takes over less.
     pub fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
+        self.keep(gains, torque);
+    }
+
+    /// Puts a `torque` (N·m) into the integral, as far as these gains can hold it.
+    pub fn keep(&mut self, gains: &PidGains, torque: f64) {
         let integral = torque / gains.ki;
-        if integral.is_finite() {
-            self.integral = integral.max(gains.int_min).min(gains.int_max);
-        }
+        self.integral =
+            if integral.is_finite() { integral.max(gains.int_min).min(gains.int_max) } else { 0.0 };
     }
 
     /// The commanded position moves by `way` (rad) without a motion: the derivative does not see it.
@@ -192,6 +196,21 @@ mod tests {
             let mut pid = Pid::default();
             pid.take_over(&none, torque);
             assert_eq!(pid.step(&wide, 0.0, true, None).i, 0.0, "{torque}");
+        }
+    }
+
+    /// Other gains hold the same torque, as far as their integral can, and see the same motion.
+    #[test]
+    fn j71_the_integral_keeps_its_torque_under_other_gains() {
+        let mut pid = Pid::default();
+        pid.reset(0.0);
+        let before = (0..200).map(|k| pid.step(&GAINS, 1e-5 * f64::from(k), false, None)).last().unwrap();
+        for (ki, kept) in [(2.0, 1.0), (50.0, 1.0), (0.5, 0.5 * 0.003 / before.i), (0.0, 0.0)] {
+            let (mut pid, gains) = (pid, PidGains { ki, kp: 300.0, ..GAINS });
+            pid.keep(&gains, before.i);
+            let after = pid.step(&gains, 199e-5, true, None);
+            assert!((after.i - kept * before.i).abs() < 1e-12, "{ki}: {} N·m, then {}", before.i, after.i);
+            assert!((after.d - 0.8 * before.d).abs() < 1e-9, "{ki}: four of five ticks of the same motion");
         }
     }
 

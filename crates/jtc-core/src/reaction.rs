@@ -3,8 +3,9 @@
 //! | found | reaction |
 //! |---|---|
 //! | a torque that is no number; with `torque_reaction` 1 an overloaded joint | release: the torque of all joints becomes zero (J-21) |
-//! | anything else in Teaching | none: what it adds to the model is bounded (J-25) |
-//! | a joint whose swing grows while its load is caught: its gains make the loop unstable | it yields (J-68) |
+//! | anything else in Teaching | none: what it adds to the model is bounded, and a joint that is led too fast ends it (J-25) |
+//! | an unstable loop: a torque that goes from limit to limit, or a swing that grows | the last gains come back, or the joint gets softer ones; it yields (J-68) |
+//! | the same joint again within 500 ms | release |
 //! | an overloaded joint that has not settled since it was enabled | it lowers its load (J-70) |
 //! | a joint that is pushed, or overloaded by its feedback torque; a position error | it yields (J-68), the others stop |
 //! | a joint that is overloaded otherwise: on the path | path time is held back (J-75); where that does not help the arm stops on its path |
@@ -14,10 +15,11 @@
 //!
 //! The first row that applies to a joint wins. All but the first end in a held stop (J-69): the arm is held, the cause is shown, and
 //! nothing moves until the host clears it.
-use jtc_wire::{ExecCommand, RawPoint};
+use jtc_wire::{RawPoint, StopCause, StopKind};
 
 use crate::controller::Controller;
 use crate::motion::{ControlMode, Found};
+use crate::parameters::PidGains;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
 /// Limits of the path.
@@ -37,26 +39,34 @@ enum Reaction {
     Stop,
 }
 
-/// The reaction to what was found of a joint, and its cause as joint errors.
-fn reaction(found: &Found, mode: ControlMode, releases: bool) -> Option<(Reaction, u16)> {
+/// The reaction to what was found of a joint, and its cause, also as joint errors. `again`: it was unstable a moment ago.
+fn reaction(
+    found: &Found,
+    mode: ControlMode,
+    releases: bool,
+    again: bool,
+) -> Option<(Reaction, StopKind, u16)> {
     let Found { errors, overloaded, pushed, strained, settled, unstable } = *found;
     let torque = joint_error::TORQUE;
     if errors & torque != 0 || (overloaded && releases) {
-        Some((Reaction::Release, torque))
+        Some((Reaction::Release, StopKind::Overload, torque))
     } else if mode == ControlMode::Teach {
         None
+    } else if unstable && again {
+        Some((Reaction::Release, StopKind::Unstable, torque))
     } else if unstable {
-        Some((Reaction::Yield, torque))
+        Some((Reaction::Yield, StopKind::Unstable, torque))
     } else if overloaded && !settled {
-        Some((Reaction::Lower, torque))
+        Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        Some((Reaction::Yield, torque))
+        // Its torque tells of the push, or its speed alone.
+        Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
-        Some((Reaction::Yield, joint_error::POSITION_ERROR))
+        Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
     } else if overloaded {
-        Some((if mode.moves() { Reaction::Stop } else { Reaction::Lower }, torque))
+        Some((if mode.moves() { Reaction::Stop } else { Reaction::Lower }, StopKind::Overload, torque))
     } else if errors & PATH != 0 {
-        Some((Reaction::Stop, errors & PATH))
+        Some((Reaction::Stop, StopKind::of_limit(errors), errors & PATH))
     } else {
         None
     }
@@ -65,24 +75,45 @@ fn reaction(found: &Found, mode: ControlMode, releases: bool) -> Option<(Reactio
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Reacts to what the control law has found of the joints. Returns the joint errors that release the arm.
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
-        let (mut release, mut causes) = ([0; JOINTS], [0; JOINTS]);
+        let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        for (j, found) in found.iter().enumerate() {
-            let Some((reaction, cause)) = reaction(found, mode, self.config.torque_release) else {
+        // Joints (a bit each) that do not stand their gains, and those of them whose loops are unstable (J-71).
+        let (mut failed, mut unstable) = (0u8, 0u8);
+        // Counted, so that the compiler sees that the index is one of a joint.
+        for j in 0..JOINTS {
+            let again = self.parameters.trial.again(j);
+            // The torque of a joint that yields is bounded by construction.
+            let found =
+                Found { unstable: found[j].unstable && (again || !self.motion.law.yields(j)), ..found[j] };
+            let Some((reaction, kind, cause)) = reaction(&found, mode, self.config.torque_release, again)
+            else {
                 continue;
             };
+            let fails = reaction == Reaction::Yield || (reaction == Reaction::Lower && !found.settled);
+            failed |= u8::from(fails) << j;
+            unstable |= u8::from(fails && found.unstable) << j;
             match reaction {
                 Reaction::Release => release[j] = cause,
                 Reaction::Stop if cause == joint_error::TORQUE && self.hold_back() => {}
-                _ => causes[j] = cause,
+                _ => {
+                    causes[j] = cause;
+                    first = first.or(Some(kind));
+                }
             }
             (yields[j], lowers[j]) = (reaction == Reaction::Yield, reaction == Reaction::Lower);
         }
-        if causes == [0; JOINTS] || release != [0; JOINTS] {
-            return release;
-        }
+        let Some(kind) = first.filter(|_| release == [0; JOINTS]) else { return release };
         let before = self.braking_ms;
-        self.hold_stop(&causes);
+        if let Some((kind, gains)) =
+            self.parameters.trial.fails(failed, unstable, &self.parameters.pid, self.config.delay_ticks)
+        {
+            self.use_other_gains(&gains);
+            let joint = failed.trailing_zeros() as usize;
+            self.keep_cause(self.cause(kind, joint, 0.0, 0.0));
+            self.rest_and_hold(&causes);
+        } else {
+            self.hold_stop(&causes, kind);
+        }
         if yields != lowers {
             // The begin of a stop has computed the inertia already: one mass matrix in a tick.
             if self.braking_ms == before {
@@ -93,22 +124,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// A held stop begins (J-69): what moves comes to rest, and the arm is held.
-    pub(crate) fn hold_stop(&mut self, causes: &[u16; JOINTS]) {
-        self.errors.hold_joints(causes, self.config.protective_stop_latches);
-        if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
-            self.leave_path(ExecCommand::Pause);
-        }
-        if self.motion.set.jogging() {
-            self.motion.set.end_jog();
-            self.extensions.refuse_jogs();
-        }
+    /// Gains that the controller has chosen: those before a trial that failed, or softer ones (J-66, J-71).
+    fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
+        self.parameters.pid = *gains;
+        self.motion.change_gains(gains);
+        self.extensions.forget_hash();
+    }
+
+    /// The arm is not held any more. Gains on trial have not held it: it is not enabled again with them.
+    pub(crate) fn end_trial(&mut self) {
+        let Some(gains) = self.parameters.trial.end() else { return };
+        self.parameters.pid = gains;
+        self.extensions.forget_hash();
+        self.keep_cause(StopCause { kind: StopKind::Gains, ..StopCause::default() });
     }
 
     /// The controller still reacts: it is too early to clear the cause (J-69).
     pub(crate) fn is_reacting(&self) -> bool {
         let moves = self.trajectory == TrajectoryState::Execute || self.motion.set.jogging();
-        self.motion.law.is_yielding() || (self.errors.held_stop() && moves)
+        self.motion.law.is_yielding() || (self.errors.held_stop() && (moves || self.motion.set.is_led()))
     }
 }
 
@@ -126,37 +160,59 @@ mod tests {
     };
 
     #[test]
+    fn j66_a_loop_that_is_unstable_again_releases_the_arm() {
+        let unstable = Found { unstable: true, ..HELD };
+        for mode in [ControlMode::Hold, ControlMode::Follow] {
+            assert_eq!(
+                reaction(&unstable, mode, false, true),
+                Some((Reaction::Release, StopKind::Unstable, joint_error::TORQUE))
+            );
+            assert_eq!(reaction(&HELD, mode, false, true), None, "it has to be so again");
+        }
+    }
+
+    #[test]
     fn j66_the_first_row_that_applies_wins() {
         use Reaction::*;
+        use StopKind::{Overload, Position, PositionError, Push, Unstable, Velocity};
         let (torque, error, path) = (joint_error::TORQUE, joint_error::POSITION_ERROR, joint_error::VELOCITY);
         let (hold, follow) = (ControlMode::Hold, ControlMode::Follow);
         let overloaded = Found { overloaded: true, ..HELD };
         let rows = [
             (HELD, hold, None),
-            (Found { errors: torque, ..HELD }, hold, Some((Release, torque))),
-            (Found { errors: torque | error, unstable: true, ..overloaded }, follow, Some((Release, torque))),
-            (Found { unstable: true, settled: false, ..overloaded }, hold, Some((Yield, torque))),
-            (Found { settled: false, strained: true, ..overloaded }, hold, Some((Lower, torque))),
-            (Found { pushed: true, strained: true, ..HELD }, follow, Some((Yield, torque))),
-            (Found { strained: true, ..overloaded }, follow, Some((Yield, torque))),
+            (Found { errors: torque, ..HELD }, hold, Some((Release, Overload, torque))),
+            (
+                Found { errors: torque | error, unstable: true, ..overloaded },
+                follow,
+                Some((Release, Overload, torque)),
+            ),
+            (Found { unstable: true, settled: false, ..overloaded }, hold, Some((Yield, Unstable, torque))),
+            (Found { settled: false, strained: true, ..overloaded }, hold, Some((Lower, Overload, torque))),
+            (Found { pushed: true, strained: true, ..HELD }, follow, Some((Yield, Push, torque))),
+            (Found { strained: true, ..overloaded }, follow, Some((Yield, Push, torque))),
+            (Found { pushed: true, ..HELD }, hold, Some((Yield, StopKind::Shove, torque))),
             (Found { strained: true, ..HELD }, hold, None),
-            (Found { errors: error | path, ..HELD }, follow, Some((Yield, error))),
-            (Found { errors: error, ..overloaded }, follow, Some((Yield, error))),
-            (overloaded, follow, Some((Stop, torque))),
-            (overloaded, ControlMode::Approach, Some((Stop, torque))),
-            (overloaded, hold, Some((Lower, torque))),
-            (Found { errors: path, ..HELD }, follow, Some((Stop, path))),
-            (Found { errors: joint_error::POSITION, ..HELD }, follow, Some((Stop, joint_error::POSITION))),
+            (Found { errors: error | path, ..HELD }, follow, Some((Yield, PositionError, error))),
+            (Found { errors: error, ..overloaded }, follow, Some((Yield, PositionError, error))),
+            (overloaded, follow, Some((Stop, Overload, torque))),
+            (overloaded, ControlMode::Approach, Some((Stop, Overload, torque))),
+            (overloaded, hold, Some((Lower, Overload, torque))),
+            (Found { errors: path, ..HELD }, follow, Some((Stop, Velocity, path))),
+            (
+                Found { errors: joint_error::POSITION, ..HELD },
+                follow,
+                Some((Stop, Position, joint_error::POSITION)),
+            ),
         ];
         for (found, mode, expected) in rows {
-            assert_eq!(reaction(&found, mode, false), expected, "{found:?} {mode:?}");
-            let taught = reaction(&found, ControlMode::Teach, false);
-            assert_eq!(taught, expected.filter(|(reaction, _)| *reaction == Release), "{found:?}");
+            assert_eq!(reaction(&found, mode, false, false), expected, "{found:?} {mode:?}");
+            let taught = reaction(&found, ControlMode::Teach, false, false);
+            assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
             // With the manual's words torque alone releases, and is no push before that.
-            let released = reaction(&found, mode, true);
+            let released = reaction(&found, mode, true, false);
             if found.overloaded {
-                assert_eq!(released, Some((Release, torque)), "{found:?}");
+                assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");
             } else if found.pushed {
                 assert_eq!(released, None, "{found:?}");
             } else {

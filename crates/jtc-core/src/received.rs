@@ -2,12 +2,14 @@
 mod floats;
 mod frames;
 
+pub(crate) use frames::read_pid;
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::{DataStatus, missing_parameter};
 
 use crate::JOINTS;
 use crate::config::Config;
 use crate::defaults;
+use crate::gains::{FeltInertia, POSES, Trial};
 use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
@@ -33,6 +35,11 @@ pub(crate) struct ReceivedParameters {
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
+    /// What the joints feel of the model that was received, and of one that is being looked at (J-71).
+    felt: FeltInertia,
+    looked_at: FeltInertia,
+    /// Gains that were given under torque.
+    pub trial: Trial,
     polynomial: [[f64; 6]; JOINTS],
     /// Zeros until they are received.
     pub tables: [TableOf<f32>; JOINTS],
@@ -49,20 +56,25 @@ pub(crate) struct ReceivedState {
     friction_is_table: bool,
     friction_is_new: bool,
     payload: BlendState,
+    felt: FeltInertia,
+    trial: Trial,
 }
 
-remembered!(ReceivedState { received, given, friction_is_table, friction_is_new, payload });
+remembered!(ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
 
 impl ReceivedParameters {
     /// What is remembered of them, without the numbers.
     pub fn state(&self) -> ReceivedState {
-        let Self { received, given, friction_is_table, friction_is_new, .. } = *self;
-        ReceivedState { received, given, friction_is_table, friction_is_new, payload: self.payload.state() }
+        let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
+        let payload = self.payload.state();
+        ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
     /// The same again, with the payload of these settings.
     pub fn restore(&mut self, state: &ReceivedState, config: &Config) {
-        let ReceivedState { received, given, friction_is_table, friction_is_new, payload } = *state;
+        let ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
+            *state;
+        (self.felt, self.trial) = (felt, trial);
         self.set_gravity(config);
         self.payload.restore(&payload, &mut self.dynamics);
         (self.received, self.given) = (received, given);
@@ -97,6 +109,9 @@ impl ReceivedParameters {
             payload: PayloadBlend::none(&dynamics),
             dynamics,
             pid: defaults::PID,
+            felt: FeltInertia::NONE,
+            looked_at: FeltInertia::NONE,
+            trial: Trial::default(),
             polynomial: defaults::POLYNOMIAL,
             tables: [NO_TABLE; JOINTS],
             friction_is_table: false,
@@ -143,7 +158,8 @@ impl ReceivedParameters {
     /// What the control law needs of them.
     pub fn control(&self) -> ControlParameters<'_> {
         let (dynamics, pid, polynomial) = (&self.dynamics, &self.pid, &self.polynomial);
-        ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use() }
+        let on_trial = self.trial.is_on();
+        ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use(), on_trial }
     }
 
     /// The arm can be held at `position` (rad), by the torque limits (J-06).
@@ -224,24 +240,112 @@ impl ReceivedParameters {
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
-    pub fn set_pid(&mut self, gains: [PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
+    /// Gains that no joint is too light for (J-71), as far as the model is known.
+    pub fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
         for (gains, joint) in gains.iter().zip(&config.joints) {
             config.parameter_bounds.check_gains(gains, joint)?;
         }
-        self.pid = gains;
-        self.receive(missing_parameter::PID);
-        Ok(())
+        let borne = self.missing() & missing_parameter::MODEL != 0 || self.felt.bears(gains, config);
+        borne.then_some(()).ok_or(DataStatus::IncorrectValue)
     }
 
-    /// `at`: measured positions (rad), once all are known.
+    /// A tick under torque after gains were given: the gains of this tick, while they come in. `held`: all joints have settled, and none
+    /// yields.
+    #[inline(never)]
+    pub fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
+        self.trial.step(held);
+        self.trial.blended(&self.pid)
+    }
+
+    /// The gains go with the model that was looked at last, with the present settings.
+    pub fn gains_are_borne(&self, config: &Config) -> bool {
+        self.felt.is_known() && self.felt.bears(&self.pid, config)
+    }
+
+    /// The model that was looked at last, taken or not, does not bear the gains.
+    #[cfg(test)]
+    pub fn gains_were_too_much(&self, config: &Config) -> bool {
+        self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
+    }
+
+    /// Gains that have passed [`check_pid`](Self::check_pid).
+    pub fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
+        self.pid = *gains;
+        self.receive(missing_parameter::PID);
+    }
+
+    /// Looks at the inertia of a model with these settings, a pose in each slice (J-71). Then it is refused if the gains that were given
+    /// need more; otherwise it is `used`.
+    fn look_at(
+        &mut self,
+        model: &ArmModel,
+        progress: SliceProgress,
+        config: &Config,
+        used: impl FnOnce(&mut Self) -> Result<(), DataStatus>,
+    ) -> SliceOutcome {
+        let number = if let SliceProgress::Pose(number) = progress { number } else { 0 };
+        if number == 0 {
+            self.looked_at = FeltInertia::NONE;
+        }
+        if number < POSES {
+            self.looked_at.look(number, model, config);
+            return SliceOutcome::Unfinished(SliceProgress::Pose(number + 1));
+        }
+        let given = self.missing() & missing_parameter::PID == 0;
+        if given && !self.looked_at.bears(&self.pid, config) {
+            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        }
+        let looked_at = self.looked_at;
+        let outcome = used(self);
+        if outcome.is_ok() {
+            self.felt = looked_at;
+            self.trial.keep_if(|gains| looked_at.bears(gains, config));
+        }
+        outcome.into()
+    }
+
+    /// The model in use with other settings, where these have to do with the inertia of its joints (J-71).
+    pub fn look_again(&mut self, progress: SliceProgress, config: &Config, before: &Config) -> SliceOutcome {
+        let same = |j: usize| {
+            config.joints[j].rotor_inertia == before.joints[j].rotor_inertia
+                && config.position_range(j) == before.position_range(j)
+        };
+        if config.delay_ticks == before.delay_ticks && (0..JOINTS).all(same) {
+            return SliceOutcome::Done;
+        }
+        if self.missing() & missing_parameter::MODEL != 0 {
+            // It is looked at when it is given again.
+            self.felt = FeltInertia::NONE;
+            return SliceOutcome::Done;
+        }
+        let model = self.model;
+        self.look_at(&model, progress, config, |_| Ok(()))
+    }
+
+    /// A model, in slices. `at`: measured positions (rad), once all are known.
     pub fn set_model(
+        &mut self,
+        model: &ArmModel,
+        progress: SliceProgress,
+        at: Option<&[f64; JOINTS]>,
+        config: &Config,
+    ) -> SliceOutcome {
+        if let SliceProgress::Pose(_) = progress {
+            return self.look_at(model, progress, config, |own| own.put_model(model, at, config));
+        }
+        match check_model(model, config) {
+            Ok(()) => SliceOutcome::Unfinished(SliceProgress::Pose(0)),
+            Err(status) => SliceOutcome::Refused(status),
+        }
+    }
+
+    /// A model that has passed [`check_model`].
+    fn put_model(
         &mut self,
         model: &ArmModel,
         at: Option<&[f64; JOINTS]>,
         config: &Config,
     ) -> Result<(), DataStatus> {
-        model.check().map_err(|_| DataStatus::IncorrectValue)?;
-        config.parameter_bounds.check_masses(model)?;
         let dynamics = dynamics(model, config);
         // Undecided before every position is known; it is checked again when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
@@ -307,6 +411,11 @@ impl ReceivedParameters {
         self.friction_is_new = true;
         self.receive(missing_parameter::FRICTION);
     }
+}
+
+fn check_model(model: &ArmModel, config: &Config) -> Result<(), DataStatus> {
+    model.check().map_err(|_| DataStatus::IncorrectValue)?;
+    Ok(config.parameter_bounds.check_masses(model)?)
 }
 
 fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result<(), DataStatus> {

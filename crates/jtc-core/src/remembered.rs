@@ -4,7 +4,7 @@
 //! list does not compile, so that no snapshot lacks it. Reading is total: bits that no snapshot has give some value, and
 //! [`BitSource::is_damaged`] reports it.
 use jtc_bus::{JointReport, NodeState};
-use jtc_wire::{ControllerState, TrajectoryState};
+use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 
 /// Takes bits.
 pub(crate) trait BitSink {
@@ -207,7 +207,7 @@ macro_rules! code {
     )+};
 }
 
-code!(ControllerState, TrajectoryState);
+code!(ControllerState, StopKind, TrajectoryState);
 
 remembered!(JointReport {
     position,

@@ -48,7 +48,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             torque_i: parts.pid.i,
             torque_d: parts.pid.d,
             torque_friction: parts.friction,
-            torque_other: parts.payload + parts.brake + parts.blend,
+            torque_other: parts.load + parts.brake + parts.blend,
             torque: self.observed.torque[j],
             state: node.state(),
             internal: self.errors.joint(j).0,
@@ -133,7 +133,7 @@ mod tests {
             model: 1.0,
             pid: PidTorque { p: 2.0, i: 4.0, d: 8.0 },
             friction: 16.0,
-            payload: 32.0,
+            load: 32.0,
             brake: 64.0,
             blend: 128.0,
         };

@@ -13,6 +13,9 @@ pub use table::TABLE;
 /// Number of the speed override (J-57).
 pub const SPEED: u8 = 128;
 
+/// Number of the tool speed limit (J-25).
+pub const TOOL_SPEED: u8 = 79;
+
 /// Number of the switch of an absent joint, and of where the model has that joint (J-53).
 pub const ABSENT: u8 = 16;
 /// See [`ABSENT`].

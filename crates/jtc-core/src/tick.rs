@@ -58,6 +58,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.nodes.go_on_moving(&found_moving, commanded.due_velocity(&self.config));
         }
         self.nodes.take(inputs, &self.config, self.goal(), commanded);
+        if self.nodes.misfits() != 0 {
+            self.hold_misfits();
+        }
+        if self.state == ControllerState::Teaching {
+            self.end_fast_teaching(inputs.missed_ticks);
+        }
         self.pump &= !self.nodes.gripper_lost();
         if self.late_ticks.count(inputs.missed_ticks) {
             self.errors.raise_device();
@@ -108,6 +114,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if self.motion.set.jogging() {
             return self.control(ControlMode::Approach);
         }
+        if self.motion.set.is_led() {
+            return self.rest();
+        }
         if jogged {
             // It has come to rest.
             self.motion.law.change_mode();
@@ -115,10 +124,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.control(ControlMode::Hold)
     }
 
+    /// A tick in which the arm comes to rest because a hand has led it.
+    fn rest(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let mode = if self.motion.set.led_to_rest(&self.config) {
+            self.motion.law.change_mode();
+            ControlMode::Hold
+        } else {
+            ControlMode::Rest
+        };
+        self.control(mode)
+    }
+
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        self.motion.keep_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
         self.motion.set.follow_measured(&self.nodes);
         if self.parameters.blend_left_ms() > 0 {
-            // As much of what Teaching had found missing is now given.
+            // As much of the mass that had been found is now given.
             self.motion.law.give_way_to_payload(self.parameters.next_mass());
             self.parameters.blend_payload();
         }
@@ -142,7 +163,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
-        let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
+        let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {
+            self.parameters.try_gains(self.motion.holds(&self.config))
+        } else {
+            None
+        };
+        let (nodes, config, mut parameters) = (&self.nodes, &self.config, self.parameters.control());
+        if let Some(gains) = &blended {
+            parameters.pid = gains;
+        }
         let limited = self.motion.control(&LawInputs { mode, braking, nodes, config, parameters });
         let Some(mut found) = limited.found else { return (limited.torque, too_fast) };
         self.tolerate_positions(&mut found);

@@ -10,12 +10,13 @@
 use crate::limits::{JointConfig, within};
 use crate::pid::PidTorque;
 use crate::remembered::remembered;
+use crate::soft_end;
 use crate::{DT, JOINTS};
 
 /// Longest stretch of the spring, rad.
 const STRETCH: f64 = 0.02;
 /// Natural frequency that the spring has with the inertia of the joint at most, 1/s.
-const SPRING_RATE: f64 = 30.0;
+pub(crate) const SPRING_RATE: f64 = 30.0;
 /// Rate at which the damper of a load that is lowered reduces a speed, 1/s; of several, shared among them. Joints that are held move each
 /// other at the frequencies that a late speed leaves unstable, so the inertia that a joint feels is a third of that with the others fixed.
 const LOWERING_RATE: f64 = 40.0;
@@ -23,21 +24,29 @@ const LOWERING_RATE: f64 = 40.0;
 const SETTLES: f64 = 0.2;
 /// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them: a damper above
 /// 200 1/s would drive a joint to and fro, and joints that move each other lower that bound.
-pub(crate) const DAMPING_RATE: f64 = 100.0;
-/// Distance from a position limit, rad, from which on a spring pushes the joint back into its range.
-const SOFT_END: f64 = 0.1;
+const DAMPING_RATE: f64 = 100.0;
 /// Speed below which a joint that yields is calm, rad/s.
 const CALM: f64 = 0.05;
 /// Speed below which a load that is lowered is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// How long a joint has to be calm until it is held again, ms.
+/// How long a joint has to be calm until it is held again, and for how long its load may seem to drive it meanwhile, ms.
 const CALM_MS: u16 = 200;
+const DRIVEN_CALM_MS: u16 = 50;
 /// Share of the torque limit by which gravity must load a joint before its motion counts as sinking.
 const LOADED: f64 = 0.05;
 /// Way (rad) and time (ms) of sinking after which the joint is taken for overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant with which the load takes over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
+/// What spring and damper have against a joint that its own load drives, as a share of that load; the rest is friction. A load that has driven
+/// the joint for so long (ms) is not there: somebody had leaned on the arm. It goes with the first time constant (s), and comes back with the
+/// second where the joint sinks without it.
+const DRIVEN: (f64, f64) = (0.5, 1.2);
+/// The same from this speed on, rad/s.
+const CREEPS: f64 = 0.002;
+const DRIVEN_MS: u16 = 300;
+const GOES_S: f64 = 1.0;
+const COMES_BACK_S: f64 = 0.3;
 /// Share of the torque limit up to which a lowered load is held by the position controller again: its encoder noise needs the rest.
 const HOLDABLE: f64 = 0.95;
 /// Missing answers after which the spring does not act.
@@ -58,9 +67,11 @@ pub(crate) struct Yield {
     set: f64,
     /// Inertia that the joint moves, kg·m²: a lower bound.
     inertia: f64,
-    /// Torque of the load that the model lacks, N·m, and what it was at the begin of lowering: it is never taken back beyond that.
+    /// Torque of the load that the model lacks, N·m, and what it was at the begin, or at that of lowering: it is never taken back beyond that.
     load: f64,
     least: f64,
+    /// How long the load has driven the joint, ms.
+    driven_ms: u16,
     /// N·m·s/rad.
     damping: f64,
     /// Share of the spring that acts.
@@ -83,6 +94,7 @@ remembered!(Yield {
     inertia,
     load,
     least,
+    driven_ms,
     damping,
     grip,
     holdable,
@@ -122,6 +134,7 @@ impl Yield {
             inertia,
             load,
             least: load,
+            driven_ms: 0,
             damping: 0.0,
             grip: 1.0,
             holdable: true,
@@ -166,6 +179,26 @@ impl Yield {
         self.least = self.load;
     }
 
+    /// The load has turned out to be another one than was found.
+    pub fn has_learned(&self) -> bool {
+        self.lowers || self.load != self.least
+    }
+
+    /// What the position controller has to carry when it takes over, N·m: what the `spring` (N·m) has against the load acts no more,
+    /// and what it has of a load that was doubted goes on.
+    pub fn left(&self, spring: f64) -> f64 {
+        if self.lowers {
+            self.load
+        } else {
+            (self.load + spring).max(self.least.min(0.0)).min(self.least.max(0.0))
+        }
+    }
+
+    /// What Teaching carries, N·m: of a load that is doubted what the `spring` (N·m) leaves, because the rest may not be there.
+    pub fn taught_load(&self, spring: f64) -> f64 {
+        if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
+    }
+
     /// Torque of the load that the model lacks, N·m.
     pub fn load(&self) -> f64 {
         self.load
@@ -189,7 +222,8 @@ impl Yield {
         let d = (-self.damping * velocity).max(-limit).min(limit);
         self.grip += SETTLES * (if self.missing > MISSING { 0.0 } else { 1.0 } - self.grip);
         let stiffness = (most / STRETCH).min(SPRING_RATE * SPRING_RATE * self.inertia);
-        let pull = stiffness * (self.set - joint.position) + soft_end(joint, most);
+        let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
+        let pull = stiffness * (self.set - joint.position) + end;
         let spring = self.grip * pull.max(-most).min(most);
         // Only for a shove spring and damper together use more than the share.
         let p = if self.lowers { 0.0 } else { within(spring, d, most) };
@@ -202,7 +236,9 @@ impl Yield {
         if !self.lowers && loaded && (self.sunk > SINKS.0 || self.sinks_ms > SINKS.1) {
             self.lower(p);
         }
-        if self.lowers && loaded {
+        if !self.lowers {
+            self.doubt(velocity, p + d);
+        } else if loaded {
             // Never beyond the limit; and what was there at the begin is not taken back from a joint that is lifted.
             let learned = self.load + d * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
@@ -212,19 +248,28 @@ impl Yield {
             self.holdable = (joint.model + self.load).abs() <= HOLDABLE * limit;
             velocity.abs() < AT_REST
         } else {
-            velocity.abs() < CALM && d.abs() <= most
+            velocity.abs() < CALM && d.abs() <= most && self.driven_ms < DRIVEN_CALM_MS
         };
         self.calm_ms = if calm { self.calm_ms.saturating_add(1) } else { 0 };
         PidTorque { p, i: self.load, d }
     }
-}
 
-/// Torque of a spring that acts from [`SOFT_END`] before a position limit on, N·m: `most` at the limit.
-fn soft_end(joint: &Joint<'_>, most: f64) -> f64 {
-    let (low, high) = joint.range;
-    let above = (joint.position - (high - SOFT_END)).max(0.0);
-    let below = ((low + SOFT_END) - joint.position).max(0.0);
-    most * (below - above) / SOFT_END
+    /// A load that drives the joint all by itself, against this `torque` (N·m) of spring and damper, goes; it comes back where it is missed.
+    fn doubt(&mut self, velocity: f64, torque: f64) {
+        let (along, has) = (velocity * self.least.signum(), self.load.abs());
+        let against = -torque * self.least.signum();
+        let driven = along > CREEPS && against > DRIVEN.0 * has && against < DRIVEN.1 * has;
+        self.driven_ms = if driven {
+            (self.driven_ms + 1).min(DRIVEN_MS + DRIVEN_CALM_MS)
+        } else {
+            self.driven_ms.saturating_sub(1)
+        };
+        if self.driven_ms > DRIVEN_MS {
+            self.load *= 1.0 - DT / GOES_S;
+        } else if along < -CALM && self.load != self.least {
+            self.load += (self.least - self.load) * (DT / COMES_BACK_S);
+        }
+    }
 }
 
 /// How often each joint has yielded in the last seconds.
@@ -485,5 +530,54 @@ mod tests {
         assert!(yielded.count(2) && !yielded.count(3) && yielded.count(2));
         wait(&mut yielded, AGAIN_MS);
         assert!(!yielded.count(2));
+    }
+
+    /// The joint moves for so long at `velocity`, rad/s; its load becomes this, N·m.
+    fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
+        let limits = limits();
+        let mut position = yields.set;
+        for _ in 0..ms {
+            position += velocity * DT;
+            // The model is against the load: gravity does not pull where it sinks.
+            tick(yields, &at(&limits, position, velocity, -40.0));
+        }
+        yields.load()
+    }
+
+    /// Spring and damper have 40 N·m against a joint that nobody pushes: its load does that, and was a lean. It goes within a second, and comes
+    /// back where the joint sinks. A hand that leads the joint faster, or against its load, says nothing of it.
+    #[test]
+    fn j68_a_load_that_drives_the_joint_by_itself_goes() {
+        let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);
+        for (velocity, ms) in [(0.01, DRIVEN_MS), (1.0, 1_000), (-0.01, 1_000), (-0.3, 1_000)] {
+            assert_eq!(moves(&mut begun(), velocity, ms), 40.0, "{velocity} rad/s for {ms} ms");
+        }
+        let mut yields = begun();
+        let left = moves(&mut yields, 0.01, 1_300);
+        assert!((10.0..30.0).contains(&left) && yields.has_learned(), "{left} N·m");
+        let led = moves(&mut yields, 1.0, 400);
+        assert!((0.9 * left..=left).contains(&led), "{led} N·m");
+        let back = moves(&mut yields, -0.1, 1_000);
+        assert!((0.9 * 40.0..=40.0).contains(&back), "{back} N·m");
+    }
+
+    /// The position controller takes over what the spring leaves of the load, never more than the load and never the other way.
+    #[test]
+    fn j68_the_position_controller_takes_over_what_the_spring_leaves() {
+        for (load, spring, left) in [
+            (40.0, 0.0, 40.0),
+            (40.0, -15.0, 25.0),
+            (40.0, -54.0, 0.0),
+            (40.0, 20.0, 40.0),
+            (-40.0, 54.0, 0.0),
+            (-40.0, -9.0, -40.0),
+        ] {
+            assert_eq!(
+                Yield::begin(false, false, 0.0, INERTIA, load).left(spring),
+                left,
+                "{load}, {spring} N·m"
+            );
+            assert_eq!(Yield::begin(true, false, 0.0, INERTIA, load).left(spring), load, "lowered");
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! On the way to the path, and on the way from it: what is remembered of a motion must not outlive its place.
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};

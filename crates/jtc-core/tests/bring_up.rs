@@ -1,5 +1,5 @@
 //! Order of the bring-up: what counts when, and who is asked for what (J-16, J-20, J-21).
-mod rig;
+use crate::rig;
 
 use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target, warning};
 use jtc_core::{Config, ControllerState, error};

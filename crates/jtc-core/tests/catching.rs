@@ -1,6 +1,5 @@
 //! Enabling an arm that carries a load which its model lacks (J-43): any that the torque limits hold is caught.
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};

@@ -1,5 +1,5 @@
 //! A trajectory is checked when it is loaded, and again by what may have changed when it is executed (J-36).
-mod rig;
+use crate::rig;
 
 use jtc_core::check::Quantity;
 use jtc_core::{Config, ControllerState, TrajectoryState, Violation};

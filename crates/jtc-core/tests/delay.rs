@@ -1,6 +1,5 @@
 //! A measurement is older than the command that answers it, and is compared with the set value of its own time (J-62).
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use std::collections::VecDeque;
 
@@ -17,7 +16,12 @@ const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
     // What a wrong delay makes of an exact motion is no push.
-    Config { delay_ticks: ticks, torque_release: true, ..Config::avena() }
+    let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
+    if ticks > 3 {
+        // With the longest of them the gains need heavier joints (J-71).
+        config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 1.8);
+    }
+    config
 }
 
 /// Ways of all joints (rad), there and back in `seconds` each.
@@ -115,7 +119,7 @@ proptest! {
             let ticks = (f64::from(late) - f64::from(wrong)).abs();
             for (j, (right, wrong)) in right.iter().zip(follow(wrong)).enumerate() {
                 let way = ticks * DT * wrong.1;
-                prop_assert!(right.0 < 0.4 * way + 0.5 * ENCODER_STEP, "joint {}: {right:?} of {way}", j + 1);
+                prop_assert!(right.0 < 0.4 * way + ENCODER_STEP, "joint {}: {right:?} of {way}", j + 1);
                 prop_assert!((wrong.0 / way - 1.0).abs() < 0.4, "joint {}: {wrong:?}, {way}", j + 1);
             }
         }
@@ -222,7 +226,7 @@ fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
                 arm.tick(0.0);
             }
             let way = arm.here[0] - from;
-            assert!((way - 0.1 * led).abs() < 0.01, "{late} ticks, led at {led} rad/s: {way} rad");
+            assert!((way - 0.2 / 3.0 * led).abs() < 0.01, "{late} ticks, led at {led} rad/s: {way} rad");
         }
     }
 }

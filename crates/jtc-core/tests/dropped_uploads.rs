@@ -1,5 +1,5 @@
 //! A Stop during an upload drops it: nothing of it is executed, and jogging, teaching and the next upload are free (J-30, J-58).
-mod rig;
+use crate::rig;
 
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, Response, UrgentCommand};

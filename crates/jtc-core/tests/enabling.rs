@@ -1,5 +1,5 @@
 //! Joints are enabled only in an arm that hardly moves, and come to rest without a torque step where one moves all the same (J-16).
-mod rig;
+use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{Config, ControllerState, error};

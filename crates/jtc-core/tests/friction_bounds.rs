@@ -1,5 +1,5 @@
 //! Which friction is taken from a host: any that an arm of such drives has, and none that would throw it (J-06, J-42).
-mod rig;
+use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
 use jtc_wire::{DataStatus, FrameType, RawPoint};

@@ -1,5 +1,5 @@
 //! The gripper: it is brought up beside the arm, never takes its torque away, and never starts its pump by itself (J-14, J-23).
-mod rig;
+use crate::rig;
 
 use jtc_bus::{NodeState, Request};
 use jtc_core::{Config, ControllerState, TrajectoryState};

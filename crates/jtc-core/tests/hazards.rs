@@ -1,5 +1,5 @@
 //! Situations in which a controller that follows each rule by itself would still drop, jerk or misplace an arm.
-mod rig;
+use crate::rig;
 
 use jtc_bus::{NodeState, Request, warning};
 use jtc_core::{Config, ControllerState, TrajectoryState, error};
@@ -54,9 +54,12 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     rig.send(FrameType::TeachingModeDisable, &[]);
     let points = pieces(0, &[(0.05, 20), (0.0, 60), (-0.05, 20)]);
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
-    rig.send(FrameType::TrajSetExecStatus, &[3]);
     rig.run(5);
     rig.nodes[0].report.velocity = 0.0;
+    // Not before the arm that was led is at rest.
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
+    rig.run(500);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     let mut last = rig.controller.telemetry();
     for _ in 0..2500 {
         rig.tick();
@@ -241,7 +244,7 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
 fn j25_the_brake_leaves_room_for_what_is_being_blended_out() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    rig.nodes[5].report.position = 0.002;
+    rig.nodes[5].report.position = 0.0003;
     rig.run(30);
     rig.ask(FrameType::TeachingModeEnable, &[]);
     rig.nodes[5].report.velocity = 1.75;

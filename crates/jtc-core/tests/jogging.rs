@@ -1,6 +1,5 @@
 //! Jogs at the velocity limit, through the whole controller (J-58).
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState};
 use jtc_wire::{DataStatus, FrameType, UrgentCommand};

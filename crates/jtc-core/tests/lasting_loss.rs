@@ -1,7 +1,6 @@
 //! Answers of one joint that are lost again and again, never so many running that it is an error: the position loop stays
 //! closed, and the arm does what it does with every answer (J-14, J-63).
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
 use jtc_wire::{FrameType, RawPoint};

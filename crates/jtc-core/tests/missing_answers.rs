@@ -1,5 +1,5 @@
 //! Answers that are missing, or that no arm can have given: no torque step when they go, none when they come back (J-35, J-63).
-mod rig;
+use crate::rig;
 
 use jtc_bus::Request;
 use jtc_core::{Config, ControllerState, JointTelemetry, error};

@@ -1,5 +1,5 @@
 //! A joint that moves faster than it may, whatever was commanded (J-35), and arms that drives cannot do (J-35, J-43).
-mod rig;
+use crate::rig;
 
 use jtc_core::{Config, ConfigError, ControllerState, joint_error};
 use jtc_wire::FrameType;

@@ -1,5 +1,5 @@
 //! Plain lines, on which no extension request came: hosts that know the protocol of existing devices only (J-30, J-51).
-mod rig;
+use crate::rig;
 
 use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
 use jtc_core::{Config, ControllerState, TrajectoryState, joint_error};

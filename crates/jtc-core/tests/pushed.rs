@@ -1,14 +1,13 @@
 //! Pushes, walls and loads that are too heavy (J-66, J-68, J-70): the arm yields and stays held.
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
-use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
-use plant::{LuGre, POSES, Plant, Random, heavier, loaded, standing};
+use plant::{ArmFile, LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
 
 /// A motion from one position to another in `seconds`, of 100 points.
-fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
+pub fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
     let step = (seconds * 10.0).round() as u16;
     let seconds = f64::from(step) * 0.099;
     let points = (0..100).map(|i| {
@@ -28,7 +27,8 @@ fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) 
     (points.collect(), step)
 }
 
-fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
+/// Uploads and executes it.
+pub fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, *step, points));
     rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
 }
@@ -48,59 +48,105 @@ fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
+/// A pose of this arm within its ranges, rad, in which it stands with half of each torque limit at most.
+fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
+    loop {
+        let pose = core::array::from_fn(|j| {
+            let (low, high) = arm.config.position_range(j);
+            random.between((low + 0.3).max(-2.0), (high - 0.3).min(2.0))
+        });
+        let torque = standing(&arm.model, &pose);
+        if (0..6).all(|j| torque[j].abs() < 0.5 * arm.config.joints[j].torque_max) {
+            return pose;
+        }
+    }
+}
+
 /// Pushes of 60 to 100 % of what a joint has left beside its load, for 50 ms to 1 s, on an arm with errors of 10 % in its masses and of
-/// 20 % in its friction.
-fn push_at_random(seed: u64, moving: bool) {
-    println!("seed {seed}");
-    let mut random = Random(seed);
+/// 20 % in its friction. Returns how many of 48 have released the arm: by over-speed, and nothing else.
+fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
+    println!("{}, seed {seed}", file.name);
+    let (mut random, mut released) = (Random(seed), 0);
     for trial in 0..48 {
-        let (pose, joint) = (POSES[trial % 4], trial % 6);
-        let model = heavier(Parameters::avena().model, random.between(0.9, 1.1));
-        let friction = LuGre::of_avena_times(random.between(0.8, 1.2));
-        let left = 0.95 * LIMITS(joint) - 1.1 * standing(&model, &pose)[joint].abs();
+        let joint = trial % 6;
+        let pose = if file.name == "avena" { POSES[trial % 4] } else { pose_of(file, &mut random) };
+        let model = heavier(file.model, random.between(0.9, 1.1));
+        let friction = file.friction(random.between(0.8, 1.2));
+        let left = 0.95 * file.config.joints[joint].torque_max - 1.1 * standing(&model, &pose)[joint].abs();
         let push = random.between(0.6, 1.0) * left * if random.next() < 0.5 { -1.0 } else { 1.0 };
         let ms = random.between(50.0, 1_000.0) as usize;
-        let to: [f64; 6] = core::array::from_fn(|j| 0.8 * pose[j] + random.between(-0.6, 0.6));
+        let to: [f64; 6] = core::array::from_fn(|j| {
+            let (low, high) = file.config.position_range(j);
+            (0.8 * pose[j] + random.between(-0.6, 0.6)).clamp(low + 0.05, high - 0.05)
+        });
         let after = random.between(700.0, 1_700.0) as usize;
-        let (mut arm, mut rig) = held(&model, friction, pose);
+        let mut arm = Plant::of(file, &model, friction, pose);
+        let mut rig = arm.holding_arm(file);
+        arm.brakes = false;
+        arm.run(&mut rig, 1_000);
         if moving {
             begin(&mut rig, &motion(&pose, &to, 2.5));
             arm.run(&mut rig, after);
         }
         let before = arm.q;
-        let about = format!("trial {trial}: joint {}, {push:.0} N·m for {ms} ms", joint + 1);
+        let about = format!("{}, trial {trial}: joint {}, {push:.1} N·m for {ms} ms", file.name, joint + 1);
         arm.push[joint] = push;
         for k in 0..ms + 3_000 {
             if k == ms {
                 arm.push[joint] = 0.0;
             }
+            let torque = rig.torque[joint];
             arm.tick(&mut rig);
-            assert_ne!(rig.state(), ControllerState::Error, "{about}, after {k} ms");
+            if rig.state() == ControllerState::Error {
+                let found = rig.controller.telemetry().joints.map(|joint| joint.internal);
+                let loads = standing(&model, &arm.q)[joint];
+                println!(
+                    "{about}: released after {k} ms with {torque:.1} N·m, of which the load needs {loads:.1}"
+                );
+                assert_eq!(found[joint], joint_error::VELOCITY, "{about}: {found:?}");
+                released += 1;
+                break;
+            }
             let others = (0..6).filter(|other| *other != joint);
             let aside = others.map(|j| (arm.q[j] - before[j]).abs()).fold(0.0, f64::max);
             assert!(moving || aside < 0.1, "{about}: another joint by {aside} rad");
         }
+        if rig.state() == ControllerState::Error {
+            continue;
+        }
         assert_eq!(rig.state(), ControllerState::HoldPos, "{about}");
         assert!(fastest(&arm) < 0.03, "{about}: {} rad/s", fastest(&arm));
         assert!(rig.last.safety_output);
-        // What has moved the arm is shown, and nothing else.
+        // The joint that was pushed is found first.
         let way = (arm.q[joint] - before[joint]).abs();
-        let shown: Vec<_> = rig.status().joints.iter().map(|joint| joint.internal != 0).collect();
         if !moving && way > 0.02 {
-            assert_eq!(shown.iter().position(|shown| *shown), Some(joint), "{about}: {way} rad");
+            assert_ne!(rig.status().joints[joint].internal, 0, "{about}: {way} rad");
+            let told = rig.controller.reactions().stop.map(|(cause, _)| usize::from(cause.joint));
+            assert_eq!(told, Some(joint + 1), "{about}: {way} rad");
         }
         assert_eq!(rig.errors() & !error::INTERNAL_JOINTS, 0, "{about}");
     }
+    released
 }
 
 #[test]
 fn j66_j68_a_held_arm_that_is_pushed_yields_and_stays_held() {
-    push_at_random(7, false);
+    assert_eq!(push_at_random(&ArmFile::avena(), 7, false), 0);
 }
 
 #[test]
 fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
-    push_at_random(9, true);
+    assert_eq!(push_at_random(&ArmFile::avena(), 9, true), 0);
+}
+
+/// Arms as they are imported: their gains are weak, because nobody has measured their rotors. A push of 100 to 180 rad/s² takes such a joint to
+/// its over-speed within 12 ms, before its drive has told of it. Without an eye on the speed more than 80 of these 192 pushes release the arm.
+#[test]
+fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
+    let released = [ArmFile::ur5(), ArmFile::z1()]
+        .map(|arm| [(7, false), (9, true)].map(|(seed, moving)| push_at_random(&arm, seed, moving)));
+    println!("of 48 each, UR5 and Z1, held and moving: {released:?}");
+    assert!(released.iter().flatten().sum::<usize>() <= 20, "{released:?}");
 }
 
 /// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after it is noticed on the drive presses the joint against it with

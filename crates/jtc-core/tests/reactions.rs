@@ -1,8 +1,6 @@
 //! Which error does what (J-21, J-66, J-68, J-69): the arm yields or stops where the controller can still act, else its torque goes. The
 //! table in docs/safety.md is what these runs show; `UPDATE_DOCS=1` writes it again.
-mod rig;
-
-use std::path::Path;
+use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
@@ -294,18 +292,5 @@ fn j21_j66_which_error_does_what_is_what_the_table_says() {
         table += &format!("| {} | {held} | {moving} |\n", row.error);
     }
     println!("{table}");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/safety.md");
-    let text = std::fs::read_to_string(&path).expect("docs/safety.md is there");
-    let mark = |mark: &str| text.find(mark).unwrap_or_else(|| panic!("safety.md has no mark {mark}"));
-    let begin = mark("<!-- reactions begin -->\n") + "<!-- reactions begin -->\n".len();
-    let end = mark("<!-- reactions end -->");
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        let new = format!("{}{table}{}", &text[..begin], &text[end..]);
-        std::fs::write(&path, new).expect("docs/safety.md can be written");
-    } else {
-        assert!(
-            text[begin..end] == table,
-            "docs/safety.md differs from the code: look, then `cargo xtask docs`"
-        );
-    }
+    test_kit::page::part("safety.md", "reactions", &table);
 }

@@ -1,5 +1,5 @@
 //! The flight recorder on the bench: what it keeps, when it stops, and that its memory is readable whatever a reset leaves (J-56).
-mod rig;
+use crate::rig;
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -1,5 +1,5 @@
 //! Which frame gets which record, in which order, and what waits for what (J-04).
-mod rig;
+use crate::rig;
 
 use jtc_core::{ControllerState, RECORDS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, FrameType, RawPoint, Response, UrgentCommand};
@@ -130,7 +130,11 @@ fn j04_each_stop_has_one_record_that_says_what_it_did() {
 #[test]
 fn j04_a_command_that_is_not_short_waits_for_its_own_tick() {
     let mut rig = Rig::holding();
-    let long = [FrameType::PidParamUseDefault, FrameType::ClearOccurredErrors, FrameType::ArmModelUseDefault];
+    let long = [
+        FrameType::PidParamUseDefault,
+        FrameType::ClearOccurredErrors,
+        FrameType::FrictionPolynomialUseDefault,
+    ];
     for _ in 0..10 {
         long.iter().for_each(|t| rig.send(*t, &[]));
     }

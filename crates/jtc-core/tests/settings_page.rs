@@ -1,4 +1,4 @@
-//! docs/settings.md is the table of settings (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page` writes it.
+//! docs/settings.md is the table of settings (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test suite settings_page::` writes it.
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -49,6 +49,6 @@ fn j53_the_page_of_settings_says_what_the_table_does() {
     let now = std::fs::read_to_string(file).unwrap_or_default();
     assert!(
         now == page(),
-        "docs/settings.md is old: UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page"
+        "docs/settings.md is old: UPDATE_DOCS=1 cargo test -p jtc-core --test suite settings_page::"
     );
 }

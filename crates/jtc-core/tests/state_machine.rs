@@ -1,5 +1,5 @@
 //! Errors and the way back (sections 3 and 4).
-mod rig;
+use crate::rig;
 
 use jtc_bus::{Frame, NodeState, Request, Target, warning};
 use jtc_core::{Config, ControllerState, TrajectoryState, error};

@@ -1,6 +1,5 @@
 //! Holding joints with stiction, which an integral can make hunt for ever (J-41).
-mod plant;
-mod rig;
+use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};
 use jtc_wire::{FrameType, RawPoint};

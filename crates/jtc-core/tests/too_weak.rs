@@ -1,5 +1,5 @@
 //! An arm in a pose in which its torque limits do not hold it (J-06, J-20, J-43).
-mod rig;
+use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, joint_error};
 use jtc_dynamics::Dynamics;

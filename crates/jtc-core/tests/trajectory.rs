@@ -1,5 +1,5 @@
 //! The trajectory: segments, execution, pause and stop (section 5).
-mod rig;
+use crate::rig;
 
 use jtc_core::{Config, ControllerState, POINTS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};

@@ -152,6 +152,31 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     x
 }
 
+/// Inertia that each joint feels, kg·m²: one over the diagonal of the inverse mass matrix with rotors.
+pub(crate) fn felt_inertia(chain: &Chain, q: &JointVec, rotor: &JointVec) -> JointVec {
+    let m = with_rotors(chain, q, rotor);
+    core::array::from_fn(|k| felt(m, k))
+}
+
+/// The same of one joint.
+pub(crate) fn felt_inertia_of(chain: &Chain, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
+    felt(with_rotors(chain, q, rotor), joint)
+}
+
+fn with_rotors(chain: &Chain, q: &JointVec, rotor: &JointVec) -> JointMat {
+    let mut m = lower(chain, &JointSinesCosines::new(chain, q));
+    for k in 0..JOINTS {
+        m[k][k] += rotor[k];
+    }
+    m
+}
+
+fn felt(m: JointMat, joint: usize) -> f64 {
+    let unit: JointVec = core::array::from_fn(|k| if k == joint { 1.0 } else { 0.0 });
+    let acceleration = solve(m, unit);
+    1.0 / unit.iter().zip(&acceleration).map(|(u, a)| u * a).sum::<f64>()
+}
+
 /// Joint accelerations, rad/s²: the solution of M·qdd = tau − bias torques.
 #[inline(always)]
 pub(crate) fn forward(

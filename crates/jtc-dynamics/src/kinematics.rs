@@ -3,7 +3,7 @@
 use crate::chain::Chain;
 use crate::model::JointVec;
 use crate::rotation::{Mat3, apply};
-use crate::trig::sin_cos;
+use crate::trig::{sin_cos, sqrt};
 
 /// A pose in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +31,30 @@ pub(crate) fn forward_kinematics(chain: &Chain, q: &JointVec) -> [Pose; 7] {
         *out = pose;
     }
     poses
+}
+
+/// Speed of the flange, m/s, at joint velocities `qd` (rad/s).
+pub(crate) fn flange_speed(chain: &Chain, q: &JointVec, qd: &JointVec) -> f64 {
+    // Velocity of the origin and angular velocity, each in the present frame.
+    let (mut v, mut w) = ([0.0; 3], [0.0; 3]);
+    for (k, place) in chain.placements.iter().enumerate() {
+        let [x, y, z] = place.xyz;
+        let reach = [v[0] + w[1] * z - w[2] * y, v[1] + w[2] * x - w[0] * z, v[2] + w[0] * y - w[1] * x];
+        // The seventh frame is the flange, whose rotation does not change a speed.
+        let (Some(&q), Some(&qd)) = (q.get(k), qd.get(k)) else { return sqrt(dot(&reach, &reach)) };
+        let (s, c) = sin_cos(q);
+        let back = |u: [f64; 3]| {
+            let r = row_product(&u, &place.rotation);
+            [c * r[0] + s * r[1], c * r[1] - s * r[0], r[2]]
+        };
+        (v, w) = (back(reach), back(w));
+        w[2] += qd;
+    }
+    sqrt(dot(&v, &v))
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// A row of a rotation times a rotation.

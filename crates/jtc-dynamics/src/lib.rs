@@ -78,12 +78,30 @@ impl Dynamics {
         forward::mass_matrix(&self.chain, q)
     }
 
+    /// Inertia (kg·m²) that each joint feels at the positions `q` (rad) while all others are free to move: the least that a torque of
+    /// this joint alone accelerates. `rotor` as for [`Dynamics::forward`]. Infinite for a joint without any inertia.
+    pub fn felt_inertia(&self, q: &JointVec, rotor: &JointVec) -> JointVec {
+        forward::felt_inertia(&self.chain, q, rotor)
+    }
+
+    /// The same of one joint, counted from 0.
+    #[inline(never)]
+    pub fn felt_inertia_of(&self, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
+        forward::felt_inertia_of(&self.chain, q, rotor, joint)
+    }
+
     /// Joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m); `rotor`, the
     /// inertias of the rotors about their joint axes (kg·m²), is added to the diagonal of the mass matrix.
     ///
     /// A joint without any inertia (its row of the mass matrix is lost in rounding) gets the acceleration 0.
     pub fn forward(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {
         forward::forward(&self.chain, q, qd, tau, rotor)
+    }
+
+    /// Speed of the origin of the flange (m/s) at positions `q` (rad) and velocities `qd` (rad/s).
+    #[inline(never)]
+    pub fn flange_speed(&self, q: &JointVec, qd: &JointVec) -> f64 {
+        kinematics::flange_speed(&self.chain, q, qd)
     }
 
     /// Poses in the base frame (m) of the joint frames, base to wrist, and of the flange, at the positions `q` (rad). Joint frames

@@ -1,5 +1,5 @@
 //! Properties that hold for every arm (J-40), and known values of the default one.
-mod arms;
+use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -268,6 +268,39 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
+/// Against that of all joints, and against positions a moment apart.
+#[test]
+fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
+    let mut random = random_from(11);
+    for model in [arms::avena(), ArmModel { joints: core::array::from_fn(skew), ..arms::avena() }] {
+        let dynamics = Dynamics::new(&model, DOWN);
+        for _ in 0..50 {
+            let q: JointVec = core::array::from_fn(|_| 6.0 * random() - 3.0);
+            let qd: JointVec = core::array::from_fn(|_| 3.0 * random() - 1.5);
+            let rotor: JointVec = core::array::from_fn(|_| random());
+            let felt = dynamics.felt_inertia(&q, &rotor);
+            for j in 0..JOINTS {
+                let one = dynamics.felt_inertia_of(&q, &rotor, j);
+                assert!((one - felt[j]).abs() < 1e-12 * felt[j], "joint {}", j + 1);
+            }
+            let at = |t: f64| {
+                let q = core::array::from_fn(|j| q[j] + t * qd[j]);
+                dynamics.forward_kinematics(&q)[6].position
+            };
+            let (after, before) = (at(1e-6), at(-1e-6));
+            let way: [f64; 3] = core::array::from_fn(|i| (after[i] - before[i]) / 2e-6);
+            let speed = dynamics.flange_speed(&q, &qd);
+            assert!((speed - dot(way, way).sqrt()).abs() < 1e-7, "{speed} m/s, {way:?}");
+        }
+    }
+}
+
+/// A joint that is parallel to none, and meets none.
+fn skew(k: usize) -> Origin {
+    let k = k as f64;
+    Origin { xyz: [0.1 + 0.02 * k, 0.2 - 0.03 * k, 0.1 * k], rpy: [0.3 + 0.2 * k, -0.4, 0.5 * k] }
+}
+
 /// Numbers from 0 to 1 out of a seed.
 fn random_from(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
@@ -361,4 +394,28 @@ fn j40_a_joint_without_inertia_stays_finite() {
     let qdd = d.forward(&q, &NONE, &[1.0; JOINTS], &NONE);
     assert!(qdd.iter().all(|a| a.is_finite()), "{qdd:?}");
     assert_eq!(Dynamics::new(&ArmModel::default(), DOWN).forward(&q, &NONE, &[1.0; JOINTS], &NONE), NONE);
+}
+
+proptest! {
+    /// It is the largest inertia that can be taken from the joint before the arm has a motion without kinetic energy.
+    #[test]
+    fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
+        model in arms::model(),
+        q in arms::vector(3.2),
+        rotor in prop::array::uniform6(0.01..2.0f64),
+    ) {
+        let dynamics = Dynamics::new(&model, DOWN);
+        let felt = dynamics.felt_inertia(&q, &rotor);
+        for j in 0..JOINTS {
+            let mut mass = dynamics.mass_matrix(&q);
+            (0..JOINTS).for_each(|k| mass[k][k] += rotor[k]);
+            prop_assert!(felt[j] >= rotor[j] * (1.0 - 1e-9) && felt[j] <= mass[j][j] * (1.0 + 1e-9));
+            let without = |share: f64| {
+                let mut rest = mass;
+                rest[j][j] -= share * felt[j];
+                positive_definite(&rest)
+            };
+            prop_assert!(without(1.0 - 1e-6) && !without(1.0 + 1e-6), "joint {}: {} kg·m²", j + 1, felt[j]);
+        }
+    }
 }

@@ -1,5 +1,5 @@
 //! What makes an arm model physical (J-06).
-mod arms;
+use crate::arms;
 
 use jtc_dynamics::{ArmModel, Field, ModelError};
 use proptest::prelude::*;

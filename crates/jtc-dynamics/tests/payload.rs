@@ -1,5 +1,5 @@
 //! A payload at the flange (J-60): against the same body written as a link, against energies, and what there cannot be.
-mod arms;
+use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
 

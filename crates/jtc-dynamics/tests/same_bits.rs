@@ -1,5 +1,5 @@
 //! The same bits on every processor and at every optimisation level (J-40): what a board records replays on a PC.
-mod arms;
+use crate::arms;
 
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 

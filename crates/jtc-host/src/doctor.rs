@@ -5,8 +5,9 @@ use std::time::Duration;
 use host_kit::Findings;
 pub use host_kit::{Finding, Severity};
 use jtc_bus::warning;
-use jtc_wire::{ControllerState, Joint, NodeState, Status, error};
+use jtc_wire::{ControllerState, Joint, NodeState, Reactions, Status, StopCause, StopKind, error};
 
+use crate::held_stop::{self, HeldStop};
 use crate::port::Port;
 use crate::{Error, Session, words};
 
@@ -37,6 +38,8 @@ pub struct Observation {
     pub other_baud: Option<u32>,
     /// Joints that are set absent (J-53).
     pub absent: Vec<Joint>,
+    /// What the controller tells of held stops and encoders (J-69); `None`: it was not asked, or does not tell.
+    pub reactions: Option<Reactions>,
 }
 
 impl<P: Port> Session<P> {
@@ -76,6 +79,7 @@ impl<P: Port> Session<P> {
             confirmed: None,
             other_baud: None,
             absent: Vec::new(),
+            reactions: None,
         })
     }
 }
@@ -86,7 +90,9 @@ pub fn findings(seen: &Observation) -> Vec<Finding> {
     link(seen, &mut all);
     if let Some(status) = &seen.status {
         absent(status, &seen.absent, &mut all);
-        errors(status, &mut all);
+        let cause = cause(status, seen.reactions.as_ref());
+        held(status, cause, seen.reactions.as_ref(), &mut all);
+        errors(status, cause.is_some(), &mut all);
         set_up(status, &mut all);
         temperatures(status, &mut all);
     }
@@ -176,7 +182,38 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     }
 }
 
-fn errors(s: &Status, all: &mut Findings) {
+/// A held stop with its cause, and joints whose encoder has jumped.
+fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactions>, all: &mut Findings) {
+    if let Some((cause, ago_ms)) = cause {
+        all.add(
+            Severity::Problem,
+            format!("held stop: {}", HeldStop::new(cause, ago_ms).line()),
+            held_stop::usual_cause(cause.kind),
+            held_stop::next_step(s, Some(cause)),
+        );
+    }
+    // The cause has said it of its joint.
+    let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
+    let said = said.and_then(|(cause, _)| held_stop::joint(cause));
+    let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
+    for joint in jumped.into_iter().filter(|joint| Some(*joint) != said) {
+        all.add(
+            Severity::Problem,
+            format!("{joint}: the encoder has jumped"),
+            "no trajectory is executed until its drive was reset",
+            held_stop::AFTER_ENCODER_JUMP,
+        );
+    }
+}
+
+/// The cause of the held stop that the arm is in, and its age, ms.
+fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCause, u32)> {
+    let (cause, ago_ms) = reactions?.stop.as_ref()?;
+    s.is_held_stop().then_some((cause, *ago_ms))
+}
+
+/// `told`: the cause of a held stop has its own finding, which says more than the joints' errors.
+fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {
         all.add(
@@ -198,6 +235,9 @@ fn errors(s: &Status, all: &mut Findings) {
         let who = words::node(j);
         for word in words::joint_errors(joint.internal) {
             let what = format!("{who}: {word}");
+            if told {
+                continue;
+            }
             if s.is_held_stop() {
                 let why = "held stop: the arm met something, or its model lacks a load";
                 all.add(Problem, what, why, "remove the cause or give the payload, then `jtc clear`");
@@ -322,6 +362,37 @@ mod tests {
             t.contains("friction, arm model") && t.contains("joint 2 is not ready") && t.contains("4 s"),
             "{t}"
         );
+    }
+
+    /// Each kind of a held stop says what to do about it.
+    #[test]
+    fn j69_a_held_stop_is_found_with_its_cause_and_what_to_do() {
+        let mut status = Status {
+            state: ControllerState::HoldPos.into(),
+            errors: error::INTERNAL_JOINTS,
+            ..Default::default()
+        };
+        status.joints[1].internal = jtc_wire::joint_error::TORQUE;
+        let find = |kind, jumped| {
+            let stop = Some((StopCause { kind, joint: 2, value: 61.5, limit: 54.0 }, 12_000));
+            let reactions = Some(Reactions { stop, jumped, ..Reactions::default() });
+            text(&Observation { reactions, ..seen(status) })
+        };
+        for (kind, helps) in [
+            (StopKind::Push, "remove what pushes"),
+            (StopKind::Overload, "give the payload"),
+            (StopKind::Unstable, "gains"),
+            (StopKind::EncoderJump, "`jtc reset --joints JOINT`"),
+            (StopKind::SpeedScale, "velocity_full_scale_rad_s"),
+            (StopKind::Approach, "nearer"),
+        ] {
+            let t = find(kind, 0);
+            assert!(t.contains("held stop: ") && t.contains("12 s ago") && t.contains(helps), "{t}");
+            assert!(!t.contains("torque over limit"), "the cause says more: {t}");
+        }
+        assert!(find(StopKind::EncoderJump, 0b100).contains("joint 3: the encoder has jumped"));
+        let untold = text(&seen(status));
+        assert!(untold.contains("joint 2: torque over limit") && untold.contains("`jtc clear`"), "{untold}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub mod frame;
 #[cfg(any(test, feature = "fuzzing"))]
 #[doc(hidden)]
 pub mod fuzzing;
+pub mod held_stop;
 pub mod log;
 pub mod plan;
 pub mod port;

@@ -2,7 +2,9 @@
 
 pub use jtc_bus::GRIPPER;
 use jtc_bus::{NODES, NodeState, warning};
-use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, can_flag, error};
+use jtc_wire::{
+    ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, StopCause, can_flag, error,
+};
 
 /// Velocities of a joint that is at rest, rad/s (J-36).
 const AT_REST_RAD_S: std::ops::RangeInclusive<f64> = -0.02..=0.02;
@@ -110,10 +112,14 @@ pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
 }
 
+/// Whether the arm is under torque.
+pub fn has_torque(s: &Status) -> bool {
+    s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
+}
+
 /// Whether joint `j` (from 0) is set absent: under torque no other is in Start (J-20, J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
-    let powered = [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
-    s.state.is_in(&powered) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
+    has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
 
 /// The joints that are set absent, where torque is on.
@@ -183,9 +189,17 @@ pub fn causes(s: &Status) -> Vec<String> {
     all
 }
 
+/// What helps out of a held stop whose cause is not known.
+pub(crate) const REMOVE_THE_CAUSE: &str = "remove the cause";
+
 /// Causes of a held stop, in one line.
 pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
+}
+
+/// Why the arm is held: what the device has found, or else the causes that its status has.
+pub fn why_held(s: &Status, cause: Option<&StopCause>) -> String {
+    cause.map_or_else(|| held_stop(s), ToString::to_string)
 }
 
 /// What nodes warn of and is no error.

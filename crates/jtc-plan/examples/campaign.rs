@@ -10,6 +10,7 @@ use std::time::Instant;
 use jtc_plan::{PlanError, point_to_point, through};
 
 #[path = "../tests/judge/mod.rs"]
+#[allow(dead_code, reason = "the tests use more")]
 mod judge;
 
 use judge::Case;

@@ -12,6 +12,7 @@ mod subproblems;
 mod target;
 #[cfg(test)]
 #[path = "../tests/robots/mod.rs"]
+#[allow(dead_code, reason = "the tests in tests/ use more")]
 mod test_arms;
 mod trace;
 mod turns;

@@ -7,7 +7,7 @@ use jtc_plan::{
     along, point_to_point, through,
 };
 
-mod judge;
+use crate::judge;
 
 /// A closed curve of sines, with another frequency in every joint.
 struct Lissajous {

@@ -3,7 +3,7 @@ use jtc_core::Config;
 use jtc_plan::{JOINTS, JointVec, LimitKind, Limits, Motion, Waypoint, through};
 use proptest::prelude::*;
 
-mod judge;
+use crate::judge;
 
 use judge::Case;
 

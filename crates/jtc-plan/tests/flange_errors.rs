@@ -1,6 +1,5 @@
 //! Lines of the flange that the arm cannot follow: what is wrong, and where.
-mod lines;
-mod robots;
+use crate::{lines, robots};
 
 use std::f64::consts::PI;
 

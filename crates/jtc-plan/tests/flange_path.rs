@@ -1,6 +1,5 @@
 //! Lines and arcs of the flange, by forward kinematics that share no code with the paths.
-mod lines;
-mod robots;
+use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, JOINTS, JointVec};
@@ -200,10 +199,21 @@ proptest! {
                     FlangePath::new(&Kinematics::new(&model, &limits), &q, &[Leg::Line { to }], 0.0)
                 };
                 prop_assert!(with(top + 1e-6).is_ok(), "{:?}", with(top + 1e-6));
-                let (_, distance, source) = on_leg(with(top - 1e-6).unwrap_err());
+                let refused = match with(top - 1e-6) {
+                    Ok(other) => {
+                        // Near a singular pose there may be another way of the joints, which stays inside.
+                        let at = |k: u32| sign * other.at(other.end() * f64::from(k) / 1000.0).position[joint];
+                        prop_assert!((0..=1000).all(|k| at(k) < top));
+                        continue;
+                    }
+                    Err(error) => error,
+                };
+                let (_, distance, source) = on_leg(refused);
                 let PoseError::OutsideLimits { joint: named, .. } = source else { panic!("{source}") };
                 prop_assert_eq!(named.index(), joint);
-                prop_assert!((distance - low * free.end()).abs() < 0.006, "{distance} {low}");
+                // Where it turns, or where another turn comes as far.
+                let short = top - at(distance / free.end());
+                prop_assert!((distance - low * free.end()).abs() < 0.006 || short < 3e-6, "{distance} {low}");
             }
         }
     }

@@ -1,5 +1,5 @@
 //! Inverse kinematics against forward kinematics that share no code with it.
-mod robots;
+use crate::robots;
 
 use std::f64::consts::{PI, TAU};
 

@@ -3,7 +3,7 @@
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 
-mod judge;
+use crate::judge;
 
 use judge::Case;
 

@@ -1,6 +1,5 @@
 //! Routes through waypoints, by forward kinematics that share no code with the paths.
-mod lines;
-mod robots;
+use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{JOINTS, JointVec, Pose};

@@ -3,7 +3,7 @@ use jtc_core::Config;
 use jtc_plan::{LimitKind, Limits, PlanError, Waypoint, through};
 use proptest::prelude::*;
 
-mod judge;
+use crate::judge;
 
 use judge::Case;
 

@@ -2,6 +2,7 @@
 //! table for the docs.
 use core::fmt;
 
+mod contact;
 mod rows;
 mod standstill;
 mod stopping;
@@ -16,6 +17,7 @@ use crate::operator::{Operator, OperatorError};
 
 use rows::{LASTING_MS, ROWS, Row};
 
+pub use contact::contact_table;
 pub use standstill::standstill_table;
 pub use stopping::stopping_table;
 
@@ -112,6 +114,11 @@ pub enum MatrixError {
         /// How long it took, ms; `None`: it ended in an error, or the motion was not begun.
         ms: Option<u64>,
     },
+    /// The arm was released by what it can be held in.
+    Released {
+        /// State before.
+        state: ControllerState,
+    },
     /// Nothing happened where something should have.
     NoReaction {
         /// Row of the table.
@@ -128,6 +135,7 @@ impl fmt::Display for MatrixError {
             Self::Invariant(violation) => violation.fmt(f),
             Self::NoStop { ms: Some(ms) } => write!(f, "the arm stands after {ms} ms only"),
             Self::NoStop { ms: None } => f.write_str("the arm was not stopped"),
+            Self::Released { state } => write!(f, "the arm was released in {state:?}"),
             Self::NoReaction { row, state } => {
                 write!(f, "{row} in {state:?}: no reaction, and no reason why")
             }
@@ -166,7 +174,7 @@ pub fn fault_matrix() -> Result<String, MatrixError> {
          *clearing* means that no error is left, and that the nodes are being cleared. Where nothing happens within\n\
          {WATCH_MS} ms, the cell shows why:\n\n\
          - *bridged*: up to four missing or impossible answers running are allowed, the motion is predicted meanwhile\n  \
-           (J-63). The fifth is the error, so that an encoder that jumps for 10 ms is one.\n\
+           (J-63). The fifth is the error.\n\
          - *controlled*: the control law makes up for it, no limit is reached.\n\
          - *latched*: the arm is in Error because of the very same thing, until the host clears it (J-21).\n\
          - *no torque*: it matters, and is looked at, while there is torque only.\n\
@@ -226,12 +234,23 @@ fn world_in(
     support: Support,
     host_timeout_ms: u16,
 ) -> Result<Operator, OperatorError> {
+    bring_to(config_for(support, host_timeout_ms), state)
+}
+
+/// What such a world is made of.
+fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
         // Alignment takes seconds in which nothing else happens.
         drive.first_enable_ms = 60;
     }
+    config
+}
+
+/// Brings a controller to `state`.
+fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, OperatorError> {
+    let host_timeout_ms = config.controller.host_timeout_ms;
     let mut operator = Operator::new(config);
     if state == ControllerState::Init {
         operator.run(400);

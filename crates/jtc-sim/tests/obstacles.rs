@@ -1,8 +1,10 @@
 //! The controller and an arm that meets walls, takes up loads, has gears that yield and drives that trip at their own speed.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, error, joint_error};
-use jtc_sim::{Fault, FaultKind, Gear, ModelError, Operator, Side, SimConfig, Support, Trigger, host};
-use jtc_wire::ExecCommand;
+use jtc_sim::{
+    EncoderPlace, Fault, FaultKind, Gear, ModelError, Operator, Side, SimConfig, Support, Trigger, host,
+};
+use jtc_wire::{ExecCommand, StopKind};
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
@@ -180,4 +182,57 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
         })
         .collect();
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
+}
+
+/// Gears that yield twist between the encoder of the joint and that of the motor. Whatever the arm does and meets, that is taken neither for
+/// an encoder that has jumped nor for a speed of another scale, wherever the drives have their encoder.
+#[test]
+fn j35_gears_that_yield_are_no_false_alarm() {
+    for (trial, place) in
+        (0..24).flat_map(|trial| [(trial, EncoderPlace::Link), (trial, EncoderPlace::Motor)])
+    {
+        let mut rng = fastrand::Rng::with_seed(3_500 + trial);
+        let mut config = SimConfig { support: Support::Stand, ..config() };
+        config.arm.gears = [Gear::new(10_000.0); 6];
+        for drive in &mut config.drives {
+            (drive.encoder, drive.over_speed) = (place, 50.0);
+        }
+        let limits = config.controller.joints.map(|joint| joint.torque_max);
+        let mut operator = held(config);
+        if trial % 3 > 0 {
+            operator.upload(&host::there_and_back(&FROM, &TO, 2.5, 1, 10), 10).unwrap();
+            operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+            operator.run(300 + (900.0 * rng.f64()) as u64);
+        }
+        let joint = Joint::ALL[(6.0 * rng.f64()) as usize % 6];
+        let torque =
+            limits[joint.index()] * (0.3 + 1.2 * rng.f64()) * if rng.f64() < 0.5 { 1.0 } else { -1.0 };
+        if trial % 2 == 0 {
+            inject(&mut operator, FaultKind::Push { joint, torque }, Some(20 + (500.0 * rng.f64()) as u64));
+        } else {
+            // Where the joint is, on the side that it moves to.
+            let speed = operator.world.truth().qd[joint.index()];
+            let side = if speed >= 0.0 { Side::Above } else { Side::Below };
+            let rad = operator.world.truth().q[joint.index()] + 0.05 * speed.signum();
+            let wall = FaultKind::JointWall { joint, rad, side, stiffness: 20_000.0, damping: 0.0 };
+            inject(&mut operator, wall, Some(1_000));
+        }
+        for ms in 0..1_500 {
+            operator.step();
+            let what = format!("seed {}, {place:?}, {joint}, {torque:.0} N·m, {ms} ms", 3_500 + trial);
+            let controller = operator.world.controller();
+            let stop = controller.reactions().stop.map(|(cause, _)| cause);
+            let alarm =
+                stop.filter(|cause| matches!(cause.kind, StopKind::EncoderJump | StopKind::SpeedScale));
+            assert_eq!(alarm, None, "{what}");
+            let telemetry = operator.world.telemetry();
+            assert_eq!(telemetry.errors & error::EXTERNAL_JOINTS, 0, "{what}");
+            if operator.state() == ControllerState::Error {
+                // A shove that no joint can stop: it is over its speed.
+                let fast = telemetry.joints.iter().any(|joint| joint.internal & joint_error::VELOCITY != 0);
+                assert!(fast, "{what}: {:?}", telemetry.joints.map(|j| (j.internal, j.velocity, j.torque)));
+                break;
+            }
+        }
+    }
 }

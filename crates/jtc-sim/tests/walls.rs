@@ -1,5 +1,6 @@
 //! Walls that the arm meets, and loads that it takes up and drops, against what mechanics says.
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
+#[allow(dead_code, reason = "the tests of jtc-plan use more")]
 mod robots;
 
 use jtc_bus::Joint;

@@ -10,10 +10,12 @@ use crate::segment::RawPoint;
 mod image;
 mod info;
 mod log;
+mod reactions;
 
 pub use image::{ArmImage, FrictionImage, Hash, IMAGE_MAX, field as image_field};
 pub(crate) use log::LOG_HEAD_LEN;
 pub use log::{LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState};
+pub use reactions::{Reactions, StopCause, StopKind};
 
 pub use info::{BootCause, INFO_LEN, INFO_WRITTEN, Info, Program, SIMULATOR, StoreState, capability};
 

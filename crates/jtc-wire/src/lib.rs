@@ -44,7 +44,8 @@ pub use jtc_bus::{Joint, NodeState};
 pub use extension::{
     ANSWER_MAX, Answer, ArmImage, BootCause, EXTENSION_VERSION, FrictionImage, Hash, IMAGE_MAX, INFO_WRITTEN,
     Info, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, NAME_LEN, Name, PAGE_BYTES, PAGE_POINTS, PAGE_VALUES,
-    Points, Program, SET_VALUES_MAX, SIMULATOR, SettingValue, StoreState, VALUE_LEN, Values, capability,
+    Points, Program, Reactions, SET_VALUES_MAX, SIMULATOR, SettingValue, StopCause, StopKind, StoreState,
+    VALUE_LEN, Values, capability,
 };
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,

@@ -2,8 +2,10 @@
 
 use host_kit::{Diagnose, ErrorKind};
 use jtc_host::error::Facts;
+use jtc_host::held_stop::HeldStop;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// An error on its way to Python: what `openjtc.Error` has.
 #[derive(Clone, Debug)]
@@ -168,7 +170,17 @@ fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
     let joint = facts.joint.map(|joint| joint.number());
     let next = in_python(next);
     let arguments = (message, code, joint, facts.point, facts.value, facts.limit, facts.cause, next);
-    let instance = class.call1(arguments)?;
+    let instance = match &facts.stop {
+        Some(cause) if kind == "HeldStopError" => {
+            let stop = HeldStop::new(cause, 0);
+            let more = PyDict::new(py);
+            more.set_item("kind", stop.kind)?;
+            more.set_item("unit", stop.unit)?;
+            more.set_item("text", stop.text)?;
+            class.call(arguments, Some(&more))?
+        }
+        _ => class.call1(arguments)?,
+    };
     if !instance.is_instance_of::<pyo3::exceptions::PyException>() {
         return Err(PyRuntimeError::new_err(message.clone()));
     }

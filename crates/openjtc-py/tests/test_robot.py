@@ -439,6 +439,29 @@ def test_a_controller_recovers_and_says_how(robot):
     assert all(found.severity == "good" for found in robot.doctor())
 
 
+def test_a_held_stop_says_what_was_found(robot):
+    """J-69: status, info, doctor and error have joint, value and limit of the push."""
+    robot.move(HOME)
+    robot.push(5, 38, 0.5)
+    until(lambda: robot.status.held_stop is not None)
+    status = robot.status
+    stop = status.held_stop
+    assert (stop.kind, stop.joint, stop.unit) == ("push", 5, "N·m")
+    assert stop.limit == pytest.approx(0.3 * 40, abs=1e-3) and abs(stop.value) > stop.limit
+    assert stop.text.startswith("joint 5 was pushed") and stop.remedy in status.next and 0 <= stop.ago_s < 600
+    assert robot.info["reactions"]["last_held_stop"]["text"] == stop.text
+    assert stop.text in robot.doctor()[0].what
+    with pytest.raises(openjtc.HeldStopError) as caught:
+        robot.move(HOME + 0.1)
+    error = caught.value
+    assert (error.kind, error.joint, error.unit, error.text) == ("push", 5, "N·m", stop.text)
+    assert error.value == pytest.approx(stop.value) and error.limit == pytest.approx(stop.limit)
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), again.kind, again.text, str(again)) == (type(error), error.kind, error.text, str(error))
+    robot.recover()
+    assert robot.status.held_stop is None and robot.info["reactions"]["encoder_jumped"] == []
+
+
 def test_an_arm_is_pushed_while_it_moves(live):
     motion = live.start(openjtc.example("motion"), approach=True)
     until(lambda: motion.progress[0] == "motion" and motion.progress[1] > 0.3)

@@ -91,13 +91,21 @@ impl Page {
         let first = lines.find(|(_, (old, new))| old != new);
         let (line, (old, new)) = first.unwrap_or((0, ("", "one is longer than the other")));
         panic!(
-            "{} does not say what the commands print, first at line {line} of the part `{}`:\n  document: {old}\n  command:  {new}\n\
+            "{} does not say what the tests have found, first at line {line} of the part `{}`:\n  document: {old}\n  found:    {new}\n\
              look at the difference, then write it again with UPDATE_DOCS=1\n{}",
             self.file.display(),
             self.name,
             self.text
         );
     }
+}
+
+/// Compares the part `name` of `docs/FILE` with this text, or writes it with `UPDATE_DOCS=1`.
+///
+/// # Panics
+/// As [`Page::new`] and [`Page::finish`].
+pub fn part(file: &str, name: &'static str, text: &str) {
+    Page { text: text.to_owned(), ..Page::new(file, name) }.finish();
 }
 
 /// Compares `docs/FILE` with this text, or writes it with `UPDATE_DOCS=1`.

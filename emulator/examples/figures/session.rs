@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use std::error::Error;
 
 use jtc_core::{ControllerState, TrajectoryState};
-use jtc_sim::host as frames;
-use jtc_wire::{Code, ExecCommand, FrameType, RawPoint, fixed, trajectory};
+use jtc_sim::{FaultKind, host as frames};
+use jtc_wire::{Code, ExecCommand, FrameType, Joint, RawPoint, fixed, trajectory};
 use openjtc_emulator::clock::MILLISECOND;
 use openjtc_emulator::{FIRST_LINE, Machine, Port, RegisterARM};
 
@@ -108,6 +108,10 @@ impl Session {
         self.write(&fixed::TEACHING_MODE_ENABLE);
         self.until("teaching", 2_000, |rig| rig.state() == ControllerState::Teaching);
         self.run_ms(1_000);
+        self.lead_too_fast();
+        self.write(&fixed::TEACHING_MODE_ENABLE);
+        self.until("teaching again", 12_000, |rig| rig.state() == ControllerState::Teaching);
+        self.run_ms(100);
         self.write(&fixed::TEACHING_MODE_DISABLE);
         self.until("no teaching", 2_000, |rig| rig.state() == ControllerState::HoldPos);
         self.rig.board.set_safety_input(Some(false));
@@ -115,6 +119,17 @@ impl Session {
         self.rig.board.set_safety_input(Some(true));
         self.write(&frames::clear_all());
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
+    }
+
+    /// Somebody shoves a joint of the arm that is taught: the controller brings it to rest in the midst of its motion, without a command (J-25).
+    fn lead_too_fast(&mut self) {
+        let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
+        self.rig.board.inject(push);
+        self.until("the end of Teaching", 100, |rig| rig.state() == ControllerState::HoldPos);
+        self.rig.board.heal(push);
+        self.run_ms(1_000);
+        self.write(&frames::clear_all());
+        self.run_ms(200);
     }
 
     /// From power-on to every joint enabled and held.

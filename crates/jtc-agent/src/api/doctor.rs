@@ -74,6 +74,11 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         Some(status) => absent(&agent, status).await?,
         None => Vec::new(),
     };
+    // A stop and a jump of an encoder are under torque only.
+    let reactions = match &status {
+        Some(status) if words::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
+        _ => None,
+    };
     let time_s = (ended - began).as_secs_f64();
     let seen = Observation {
         baud: agent.line.baud(),
@@ -83,6 +88,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         statuses,
         status,
         absent,
+        reactions,
         ..Observation::default()
     };
     let found = findings(&seen);

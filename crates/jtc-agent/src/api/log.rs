@@ -70,8 +70,10 @@ impl LogValues {
     /// The samples of the last start of the controller that lie within `last_s` of the last one.
     fn of(samples: &[Sample], last_s: f64) -> Self {
         let end = samples.last().map_or(0.0, |sample| sample.time_s);
+        // Half a tick more: the difference of two times in seconds is not exact.
+        let from = end - last_s - 0.5e-3;
         let rows: Vec<&Sample> =
-            samples.iter().filter(|sample| (0.0..=last_s).contains(&(end - sample.time_s))).collect();
+            samples.iter().filter(|sample| (from..=end).contains(&sample.time_s)).collect();
         let joint = |j: usize| {
             // Seven digits are more than an encoder has.
             let column = |value: fn(&JointSample) -> f64| {

@@ -8,6 +8,7 @@ mod error;
 mod events;
 mod explain;
 mod foxglove;
+mod held_stop;
 mod identity;
 mod jog;
 mod lease;
@@ -57,11 +58,13 @@ use crate::jobs::{Happening, Jobs};
 use crate::owner::Line;
 
 pub use error::ErrorObject;
+pub use held_stop::{HeldStopObject, ReactionsObject};
 pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
 pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
 
 use events::EventObject;
 use identity::Identity;
+use objects::Found;
 
 /// Longest body that is read.
 const BODY_MAX: usize = 64 << 10;
@@ -221,8 +224,11 @@ impl Agent {
             at_ms: at.as_millis() as u64,
             lost,
             age_ms: status.as_ref().map(|(age, _)| age.as_millis() as u64),
-            controller: status
-                .map(|(_, status)| ControllerObject::new(&status, self.line.commanded(&status))),
+            controller: status.map(|(_, status)| {
+                let stops = &self.jobs.stops;
+                let found = Found { stop: stops.cause(&status, at), jumped: stops.jumped(&status) };
+                ControllerObject::new(&status, self.line.commanded(&status), &found)
+            }),
             lease,
             clients,
             role: caller.role,

@@ -1,11 +1,13 @@
 //! What the API sends: one type for each object, from which its description is made.
 use jtc_host::explain::{self, Family};
+use jtc_host::held_stop::{self, HeldStop};
 use jtc_host::sample::is_measured;
 use jtc_host::session::Payload;
 use jtc_host::words;
-use jtc_wire::{Joint, Status};
+use jtc_wire::{Joint, Status, StopCause};
 use utoipa::ToSchema;
 
+use super::held_stop::HeldStopObject;
 use crate::line::Role;
 
 /// The controller, as its last status has it.
@@ -57,6 +59,12 @@ pub struct ControllerObject {
     /// What is wrong, the most particular first, with the joint of each: also what its drive reports. `GET /api/explain/{code}` takes them as
     /// they are.
     pub causes: Vec<String>,
+    /// The held stop that the arm is in, with its cause (J-69); missing where it is in none, or the controller has not told its cause yet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_stop: Option<HeldStopObject>,
+    /// Joints from 1 whose encoder had jumped at the last held stop: no trajectory is executed until their drives were reset; missing: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub encoder_jumped: Vec<u8>,
     /// Errors since they were cleared last.
     pub errors_occurred: Vec<String>,
     /// Where the joints are commanded to be, rad, from the base; missing where the agent does not know: no trajectory that was sent through
@@ -139,6 +147,25 @@ impl From<Payload> for PayloadObject {
     }
 }
 
+/// What the controller has told of a held stop and of its encoders.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    /// Cause of the held stop that the arm is in, and its age, ms.
+    pub stop: Option<(StopCause, u32)>,
+    /// Joints whose encoder has jumped, a bit for each.
+    pub jumped: u8,
+}
+
+impl Found {
+    /// What leads on from here.
+    fn next_step(&self, status: &Status) -> String {
+        if self.jumped != 0 && !status.is_held_stop() {
+            return held_stop::AFTER_ENCODER_JUMP.to_owned();
+        }
+        held_stop::next_step(status, self.stop.as_ref().map(|(cause, _)| cause))
+    }
+}
+
 /// A command that was handed to the line.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct SentObject {
@@ -150,7 +177,7 @@ pub struct SentObject {
 
 impl ControllerObject {
     /// What a status reports, with where the joints are commanded to be, as far as that is known.
-    pub(super) fn new(status: &Status, commanded_rad: Option<[f64; 6]>) -> Self {
+    pub(super) fn new(status: &Status, commanded_rad: Option<[f64; 6]>, found: &Found) -> Self {
         let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
         let codes = |family, word: u16| texts(explain::names(family, word.into()));
         let joints = Joint::ALL.into_iter().zip(&status.joints).map(|(joint, values)| {
@@ -173,10 +200,12 @@ impl ControllerObject {
             errors: texts(words::errors(status.errors)),
             error_codes: codes(Family::Jtc, status.errors),
             causes: words::causes(status),
+            held_stop: found.stop.as_ref().map(|(cause, ago_ms)| HeldStop::new(cause, *ago_ms).into()),
+            encoder_jumped: held_stop::joints(found.jumped).into_iter().map(Joint::number).collect(),
             errors_occurred: texts(words::errors(status.occurred)),
             commanded_rad,
             joints: joints.collect(),
-            next: words::next_step(status).replace('`', ""),
+            next: found.next_step(status).replace('`', ""),
         }
     }
 }

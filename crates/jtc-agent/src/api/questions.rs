@@ -2,10 +2,12 @@
 use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;
+use jtc_host::held_stop::Reacting;
 use jtc_host::{Error, Session, words};
 use utoipa::ToSchema;
 
 use super::error::Denials;
+use super::held_stop::ReactionsObject;
 use super::objects::PayloadObject;
 use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
@@ -37,6 +39,9 @@ pub struct InfoObject {
     pub uptime_s: f64,
     /// Records lost because too many waited.
     pub lost_records: u32,
+    /// What it does about what it has found; missing where it does not report that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reactions: Option<ReactionsObject>,
 }
 
 impl Agent {
@@ -71,6 +76,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
         boot_cause: info.boot_cause.name().to_owned(),
         uptime_s: info.uptime_ms as f64 / 1000.0,
         lost_records: info.lost_records,
+        reactions: Reacting::of(&info).map(ReactionsObject::from),
     }))
 }
 

@@ -153,6 +153,15 @@ impl Commander {
         result.await.map_err(|_| Unable::Gone)
     }
 
+    /// Does something in its turn that nobody waits for; nothing where the line is gone.
+    pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
+        let work: Work = Box::new(move |session| {
+            act(session);
+            drop(turn);
+        });
+        drop(self.work.try_send(work));
+    }
+
     /// Begins a job, which is given what is wished of it on the way; `then` is called when the next thing can be asked for.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ mod poses;
 mod recover;
 mod report;
 mod run;
+mod stops;
 mod store;
 mod task;
 
@@ -24,6 +25,7 @@ pub use poses::{POSES_MAX, PoseStore, PoseStoreError};
 pub use recover::{Numbers, recover};
 pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};
+pub use stops::Stops;
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
 
 use crate::api::ErrorObject;
@@ -101,6 +103,8 @@ pub struct Jobs {
     arm: Arm,
     /// Asks questions for all who may look.
     asker: Arc<Commander>,
+    /// Held stops and their causes.
+    pub stops: Stops,
     kept: Mutex<Kept>,
 }
 
@@ -110,8 +114,15 @@ impl Jobs {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
         let asker = Commander::new(&line, introduction);
-        let jobs =
-            Arc::new(Self { line, journal: Journal::default(), store, arm, asker, kept: Mutex::default() });
+        let jobs = Arc::new(Self {
+            line,
+            journal: Journal::default(),
+            store,
+            arm,
+            asker,
+            stops: Stops::default(),
+            kept: Mutex::default(),
+        });
         let watched = Arc::downgrade(&jobs);
         std::thread::spawn(move || watch(&watched));
         jobs
@@ -311,15 +322,18 @@ fn watch(jobs: &Weak<Jobs>) {
 
 fn see(jobs: &Jobs, seen: &mut Seen) {
     let lost = jobs.line.lost();
-    let (holder, halt, by, state) = jobs.line.with(|line, _| {
+    let (holder, halt, by, status) = jobs.line.with(|line, _| {
         let holder = line.lease().and_then(|lease| line.introduction(lease.holder)).map(|c| c.name.clone());
         let (by, command) = line.last_halt_by();
         let by = (by.to_owned(), command.name().to_owned());
-        let state = line.status().map(|(_, status)| {
-            let errors = jtc_host::words::causes(status);
-            (status.state.name().to_owned(), status.trajectory.name().to_owned(), errors)
-        });
-        (holder, line.last_halt(), by, state)
+        (holder, line.last_halt(), by, line.status().map(|(_, status)| *status))
+    });
+    if let Some(status) = &status {
+        jobs.stops.see(status, &jobs.asker);
+    }
+    let state = status.as_ref().map(|status| {
+        let errors = jtc_host::words::causes(status);
+        (status.state.name().to_owned(), status.trajectory.name().to_owned(), errors)
     });
     if holder != seen.holder {
         seen.holder.clone_from(&holder);

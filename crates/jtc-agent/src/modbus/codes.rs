@@ -135,6 +135,7 @@ pub const ERRORS: &[(u16, &str, &str)] = &[
     (30, "gone", "the line is gone"),
     (31, "fault", "the agent has a fault"),
     (32, "motion-ended", "the motion had ended before this was done"),
+    (33, "encoder-jumped", "an encoder has jumped (`encoder_jumped`): its drive is to be reset first"),
 ];
 
 /// The number of an error.

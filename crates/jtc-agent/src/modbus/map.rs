@@ -1,9 +1,10 @@
 //! The register map: one table for what is served and for the page that describes it.
 use std::time::Duration;
 
+use jtc_host::held_stop;
 use jtc_host::sample::is_measured;
 use jtc_host::words;
-use jtc_wire::{ControllerState, JOINTS, Status, TrajectoryState};
+use jtc_wire::{ControllerState, JOINTS, Status, StopCause, TrajectoryState};
 
 use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
@@ -43,6 +44,10 @@ pub struct View {
     pub lost: bool,
     /// What the controller reported last, and how long ago.
     pub status: Option<(Duration, Status)>,
+    /// Cause of the held stop that the arm is in, and its age, ms.
+    pub stop: Option<(StopCause, u32)>,
+    /// Joints whose encoder has jumped, a bit for each.
+    pub jumped: u8,
     /// Speed override, %.
     pub speed: Option<u16>,
     /// Who commands.
@@ -75,6 +80,17 @@ impl View {
             joint.map_or(f32::NAN, read)
         };
         self.status(f32::NAN, known).to_bits()
+    }
+
+    /// Something of the cause of the held stop that the arm is in; 0 where it is in none, or its cause is not known.
+    fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
+        self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
+    }
+
+    /// One of its figures; not a number where it has none.
+    fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
+        let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
+        known.unwrap_or(f32::NAN).to_bits()
     }
 
     /// Of the last job; 0 where there was none.
@@ -234,6 +250,15 @@ pub const INPUTS: &[Input] = &[
     joints(68, Form::U16, "joint_errors", "errors that the controller finds at the joint now, bits of the table below; 65535: not known", |v, n| v.joint(n, |j| j.internal.into())),
     joints(74, Form::U16, "joint_errors_occurred", "the same since they were cleared", |v, n| v.joint(n, |j| j.internal_occurred.into())),
     joints(80, Form::U16, "drive_state", "state of the drive: 3 enabled, 255 fault, others on the way; 65535: not known", |v, n| v.joint(n, |j| j.state.code().into())),
+    one(86, Form::U16, "held_stop_cause", "cause of the held stop that the arm is in: a number of the table of causes; 0: it is in none, or the cause is not known",
+        |v, _| v.stop(|cause| u32::from(cause.kind as u8))),
+    one(87, Form::U16, "held_stop_joint", "joint that the cause was found at first, 1 to 6 from the base; 0: none", |v, _| v.stop(|cause| cause.joint.into())),
+    one(88, Form::F32, "held_stop_value", "value that was found, in the unit of the table of causes; NaN: none", |v, _| v.figure(|(value, _)| value)),
+    one(90, Form::F32, "held_stop_limit", "limit of that value; NaN: none", |v, _| v.figure(|(_, limit)| limit)),
+    one(92, Form::U16, "held_stop_since_s", "s since the held stop began, 65534 at most; 65535: it is in none, or that is not known",
+        |v, _| v.stop.map_or(UNKNOWN.into(), |(_, ms)| (ms / 1000).min(u32::from(UNKNOWN) - 1))),
+    one(93, Form::U16, "encoder_jumped", "joints whose encoder had jumped at the last held stop, joint 1 is bit 0: no trajectory starts until their drives were reset",
+        |v, _| v.jumped.into()),
 ];
 
 /// The discrete inputs, from address 0.
@@ -252,6 +277,7 @@ pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
     DiscreteInput { name: "job_running", meaning: "the last job of a PLC goes on", value: |v| v.job.as_ref().is_some_and(|j| j.stage == Stage::Running) },
     DiscreteInput { name: "job_finished", meaning: "it came to its end", value: |v| v.job.as_ref().is_some_and(|j| j.stage == Stage::Finished) },
     DiscreteInput { name: "pump", meaning: "the pump of the gripper is on", value: |v| v.reports(|s| s.gripper.is_some_and(|g| g.pump == 1)) },
+    DiscreteInput { name: "held_stop", meaning: "the arm is in a held stop: it is held, and nothing is executed until `command` 9 has cleared it", value: |v| v.reports(Status::is_held_stop) },
 ];
 
 /// Addresses of the holding registers.
@@ -331,6 +357,8 @@ pub fn span<T: Clone>(all: &[T], at: u16, count: usize) -> Result<Vec<T>, Except
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::StopKind;
+
     use super::*;
 
     #[test]
@@ -359,6 +387,32 @@ mod tests {
         assert_eq!(image[9..11], [0x0001, 0x1170]);
         assert_eq!(image[26 + 2..26 + 4], [0x3FC0, 0x0000]);
         assert_eq!(image[4], 7);
+    }
+
+    #[test]
+    fn j69_a_held_stop_has_its_cause_in_registers() {
+        let cause = StopCause { kind: StopKind::Push, joint: 2, value: 61.5, limit: 54.0 };
+        let status = Status {
+            state: ControllerState::HoldPos.into(),
+            errors: jtc_wire::error::INTERNAL_JOINTS,
+            ..Status::default()
+        };
+        let view = View {
+            status: Some((Duration::ZERO, status)),
+            stop: Some((cause, 12_300)),
+            jumped: 0b100,
+            ..View::default()
+        };
+        // 61.5 is 42760000, 54 is 42580000.
+        assert_eq!(inputs(&view)[86..94], [2, 2, 0x4276, 0, 0x4258, 0, 12, 0b100]);
+        let bit = |view: &View| (DISCRETE_INPUTS[13].value)(view);
+        assert!(bit(&view) && !view.is_ready());
+        let none = View::default();
+        assert_eq!(inputs(&none)[86..94], [0, 0, 0x7FC0, 0, 0x7FC0, 0, UNKNOWN, 0]);
+        assert!(!bit(&none));
+        let approach = StopCause { kind: StopKind::Approach, ..StopCause::default() };
+        let view = View { stop: Some((approach, 0)), ..view };
+        assert_eq!(inputs(&view)[86..93], [11, 0, 0x7FC0, 0, 0x7FC0, 0, 0]);
     }
 
     #[test]

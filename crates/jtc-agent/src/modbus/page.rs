@@ -1,6 +1,8 @@
 //! The tables of docs/modbus.md, made from those of the code.
 use std::fmt::Write as _;
 
+use jtc_host::held_stop;
+use jtc_wire::StopKind;
 use jtc_wire::words::{JOINT_INTERNAL, JTC_ERRORS};
 
 use super::codes::{Command, ERRORS, OTHER_ERROR, Outcome};
@@ -33,6 +35,13 @@ pub fn tables() -> String {
         let rows = named.map(|(bit, name)| vec![format!("{:#06x}", 1 << bit), (*name).into()]);
         table(&format!("Bits of `{name}`"), &["bit", "error"], rows.collect());
     }
+    let causes = StopKind::ALL.iter().map(|kind| {
+        let meaning = held_stop::page(*kind).map_or("", |page| page.meaning);
+        let unit = if kind.unit().is_empty() { "–" } else { kind.unit() };
+        vec![(*kind as u8).to_string(), kind.name().into(), unit.into(), meaning.into()]
+    });
+    let head = ["`held_stop_cause`", "cause", "unit", "meaning"];
+    table("Causes of a held stop", &head, causes.collect());
     let bits =
         |(at, name, meaning): (usize, &str, &str)| vec![at.to_string(), format!("`{name}`"), meaning.into()];
     let discrete = DISCRETE_INPUTS.iter().enumerate().map(|(at, row)| bits((at, row.name, row.meaning)));

@@ -221,7 +221,24 @@ impl Plc {
         });
         let (acknowledged, outcome, error) = state.handshake.last();
         let (simulated, speed) = (self.simulated, state.speed);
-        View { now, simulated, lost, status, speed, holder, wanted, job, acknowledged, outcome, error }
+        let stops = &self.jobs.stops;
+        let stop = status.as_ref().and_then(|(_, status)| stops.cause(status, now));
+        let jumped = status.as_ref().map_or(0, |(_, status)| stops.jumped(status));
+        View {
+            now,
+            simulated,
+            lost,
+            status,
+            stop,
+            jumped,
+            speed,
+            holder,
+            wanted,
+            job,
+            acknowledged,
+            outcome,
+            error,
+        }
     }
 
     /// Runs that a job has finished, while it goes on.

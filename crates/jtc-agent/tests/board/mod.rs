@@ -140,7 +140,6 @@ impl Board {
     }
 
     /// Records that a client has got, and the reasons of what was denied.
-    #[allow(dead_code, reason = "not every test reads them")]
     pub fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
         let (mut records, mut denied) = (Vec::new(), Vec::new());
         for delivery in self.line.take_deliveries(client).expect("it is there") {

@@ -30,6 +30,10 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Some(status) => jtc_host::words::absent(status),
         None => Vec::new(),
     };
+    // A stop and a jump of an encoder are under torque only.
+    if seen.status.as_ref().is_some_and(jtc_host::words::has_torque) {
+        seen.reactions = session.reactions();
+    }
     drop(session);
     if seen.bytes > 0 && seen.statuses == 0 {
         seen.other_baud = other_rate(&name, link.baud, out);

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use cli_kit::{Failure, Output};
+use jtc_host::held_stop::{Reacting, age};
 use jtc_host::words;
-use jtc_wire::{ControllerState, Info, LogState, Status, StoreState};
+use jtc_wire::{ControllerState, Info, Joint, LogState, Status, StoreState};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -22,12 +23,15 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Some(info) => {
             let payload = session.payload()?;
             let mut value = as_json(&info);
+            let reacting = Reacting::of(&info);
+            value["reactions"] = json!(reacting);
             let absent = session.absent()?;
             value["payload"] = super::payload::as_json(&payload);
             value["absent"] = super::bench::as_json(&absent)["absent"].take();
             out.result(&value, || {
                 let (payload, absent) = (super::payload::words(&payload), super::bench::words(&absent));
-                format!("{}\npayload:   {payload}\nabsent:    {absent}", as_text(&info))
+                let reacting = reacting.as_ref().map(reacting_words).unwrap_or_default();
+                format!("{}\npayload:   {payload}\nabsent:    {absent}{reacting}", as_text(&info))
             });
         }
         None => out.result(&without_extensions_json(&status), || without_extensions(&status)),
@@ -87,7 +91,7 @@ fn as_text(info: &Info) -> String {
         info.version,
         if info.boots == 1 { "once".into() } else { format!("{} times", info.boots) },
         info.boot_cause,
-        span(info.uptime_ms / 1000),
+        age(info.uptime_ms as f64 * 1e-3),
         info.lost_records,
         recorder(info.log),
         info.program.map_or(String::new(), |program| format!("\nin flash:  {program}")),
@@ -104,14 +108,29 @@ fn recorder(state: LogState) -> String {
     }
 }
 
-/// A time in the unit that fits.
-fn span(s: u64) -> String {
-    match s {
-        0..120 => format!("{s} s"),
-        120..7_200 => format!("{} min", s / 60),
-        7_200..172_800 => format!("{} h", s / 3600),
-        _ => format!("{} days", s / 86_400),
+/// The last held stop and what goes on of its kind: a line each, with a line break before it.
+fn reacting_words(reacting: &Reacting) -> String {
+    let mut lines = Vec::new();
+    let joints = |joints: &[u8]| {
+        let joints: Vec<Joint> = joints.iter().filter_map(|n| Joint::from_number((*n).into())).collect();
+        words::joints(&joints)
+    };
+    if let Some(stop) = &reacting.last_held_stop {
+        lines.push(format!("held stop: {}", stop.line()));
     }
+    if !reacting.yields.is_empty() {
+        lines.push(format!("yields:    {}", joints(&reacting.yields)));
+    }
+    if !reacting.encoder_jumped.is_empty() {
+        lines.push(format!("jumped:    the encoder of {}", joints(&reacting.encoder_jumped)));
+    }
+    if reacting.held_back_s > 0.0 {
+        lines.push(format!(
+            "held back: {:.1} s of this run, because a torque was at its limit",
+            reacting.held_back_s
+        ));
+    }
+    lines.iter().map(|line| format!("\n{line}")).collect()
 }
 
 fn without_extensions_json(s: &Status) -> Value {
@@ -162,11 +181,25 @@ pub fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> 
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::{Reactions, StopCause, StopKind};
+
     use super::*;
 
     #[test]
-    fn a_time_is_written_in_its_unit() {
-        let spans = [0, 119, 120, 7_199, 7_200, 172_799, 172_800].map(span);
-        assert_eq!(spans, ["0 s", "119 s", "2 min", "119 min", "2 h", "47 h", "2 days"]);
+    fn j69_the_last_held_stop_and_what_goes_on_are_shown() {
+        assert_eq!(reacting_words(&Reacting::default()), "");
+        let cause = StopCause { kind: StopKind::Push, joint: 2, value: 61.5, limit: 54.0 };
+        let reactions = Reactions {
+            stop: Some((cause, 12_300)),
+            yields: 0b10,
+            jumped: 0b101,
+            rate: 0.5,
+            held_back_ms: 1500,
+        };
+        let lines = format!(
+            "\nheld stop: {cause}; 12 s ago\nyields:    joint 2\njumped:    the encoder of joint 1, joint 3\n\
+             held back: 1.5 s of this run, because a torque was at its limit"
+        );
+        assert_eq!(reacting_words(&Reacting::from(&reactions)), lines);
     }
 }

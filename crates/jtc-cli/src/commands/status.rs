@@ -1,17 +1,26 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
 use cli_kit::{Failure, Output, figure, table};
+use jtc_host::held_stop::{self, HeldStop};
 use jtc_host::sample::is_measured;
 use jtc_host::words::{self, GRIPPER};
-use jtc_wire::{Joint, NodeState, Status};
+use jtc_wire::{Joint, NodeState, Reactions, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
 
 /// Prints one status.
 pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let status = link.session()?.fresh_status()?;
-    out.result(&as_json(&status), || as_text(&status));
+    let mut session = link.session()?;
+    let status = session.fresh_status()?;
+    let reactions = if status.is_held_stop() { session.reactions() } else { None };
+    let stop = reactions.as_ref().and_then(HeldStop::last);
+    let mut value = as_json(&status);
+    value["held_stop"] = json!(stop);
+    if let Some((cause, _)) = reactions.as_ref().and_then(|reactions| reactions.stop.as_ref()) {
+        value["next"] = held_stop::next_step(&status, Some(cause)).replace('`', "").into();
+    }
+    out.result(&value, || text(&status, reactions.as_ref()));
     Ok(())
 }
 
@@ -100,8 +109,9 @@ pub fn gripper_state(s: &Status) -> &'static str {
     }
 }
 
-/// A status as text.
-pub fn as_text(s: &Status) -> String {
+/// A status as text, with the cause of a held stop where the controller tells it.
+fn text(s: &Status, reactions: Option<&Reactions>) -> String {
+    let stop = reactions.filter(|_| s.is_held_stop()).and_then(|reactions| reactions.stop.as_ref());
     let mut text = format!(
         "state {}   trajectory {}   point {} ({:.3} s)   friction {}\n",
         s.state.name(),
@@ -143,21 +153,43 @@ pub fn as_text(s: &Status) -> String {
             format!("gripper   {}\n", gripper_state(s))
         };
     }
-    if s.errors != 0 {
+    if let Some((cause, ago_ms)) = stop {
+        text += &format!("held stop: {}\n", HeldStop::new(cause, *ago_ms).line());
+    } else if s.errors != 0 {
         text += &format!("errors: {}\n", words::errors_line(s));
     }
     if s.is_coming_up() {
         text += &format!("{}\n", words::waiting_for(s));
     }
-    text += &format!("next: {}\n", words::next_step(s).replace('`', ""));
+    let next = held_stop::next_step(s, stop.map(|(cause, _)| cause));
+    text += &format!("next: {}\n", next.replace('`', ""));
     text
 }
 
 #[cfg(test)]
 mod tests {
-    use jtc_wire::ControllerState;
+    use jtc_wire::{ControllerState, StopCause, StopKind};
 
     use super::*;
+
+    #[test]
+    fn j69_a_held_stop_has_its_cause_and_age() {
+        let mut s = Status {
+            state: ControllerState::HoldPos.into(),
+            errors: jtc_wire::error::INTERNAL_JOINTS,
+            ..Status::default()
+        };
+        s.joints[1].internal = jtc_wire::joint_error::TORQUE;
+        let cause = StopCause { kind: StopKind::Push, joint: 2, value: 61.5, limit: 54.0 };
+        let reactions = Reactions { stop: Some((cause, 12_300)), ..Reactions::default() };
+        let told = text(&s, Some(&reactions));
+        assert!(told.contains(&format!("held stop: {cause}; 12 s ago\n")), "{told}");
+        assert!(told.contains("next: remove what pushes the joint"), "{told}");
+        let untold = text(&s, None);
+        assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
+        // A stop that was cleared is none any more.
+        assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
+    }
 
     #[test]
     fn a_joint_that_does_not_answer_is_at_no_position() {
@@ -176,7 +208,7 @@ mod tests {
         assert!(json["joints"][2]["position_rad"].is_null() && json["joints"][2]["torque_nm"].is_null());
         assert_eq!(json["joints"][1]["position_rad"], 0.5);
         assert_eq!(json["joints"][0]["position_rad"], 0.0);
-        let text = as_text(&s);
+        let text = text(&s, None);
         let row = text.lines().find(|line| line.starts_with("joint 3")).unwrap();
         assert!(row.contains("does not answer") && !row.contains("0.0"), "{row}");
     }

@@ -1,5 +1,4 @@
 //! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
-#![allow(dead_code)]
 
 pub mod agent;
 

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::cell::{Cell, trajectory};
+use super::cell::{Cell, trajectory};
 
 /// An upload of the long motion, which takes five seconds, is going on so long behind the check.
 pub const IN_UPLOAD: Duration = Duration::from_millis(700);
@@ -190,9 +190,8 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // An upload, of which it has seen nothing but the beginning.
-    let mut job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
-    job.reports("checked");
+    // A check or an upload, of which it has seen nothing but the beginning: which of them depends on how fast this machine is.
+    let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");
     assert!(is_held(&cell.rests(CALM)), "{ended}");

@@ -4,8 +4,8 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use test_kit::patience::{Patience, until};
 
-use crate::cell::{Cell, moves, trajectory};
-use crate::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
+use super::cell::{Cell, moves, trajectory};
+use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
 /// The file is there before anybody kills the agent, and says what moves: it is written by a thread of its own.
 fn is_left(cell: &Cell, policy: &str, what: &str) {

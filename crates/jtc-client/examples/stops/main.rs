@@ -3,6 +3,7 @@
 //! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller behind it. Whoever looks is in a process of its own.
 #[cfg(unix)]
 #[path = "../../tests/common/mod.rs"]
+#[allow(dead_code, reason = "the tests use more")]
 mod common;
 #[cfg(unix)]
 mod crowd;

@@ -1,5 +1,4 @@
 //! An agent of a simulated controller in this process, and requests to it as anybody could send them.
-#![allow(dead_code)]
 
 pub mod program;
 
@@ -33,6 +32,7 @@ pub fn simulated(baud: u32) -> LivePort {
 }
 
 /// A socket of somebody who looks: `stream`, `line`, or `foxglove` with all its channels.
+#[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
 pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
     if path != "foxglove" {

@@ -101,6 +101,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
+            // Its parts may have come one by one, each without the others (J-71).
+            _ if !self.parameters.gains_are_borne(&self.config) => {
+                return SliceOutcome::Refused(DataStatus::IncorrectValue);
+            }
             _ => 0,
         };
         let Self { extensions, config, parameters, .. } = self;
@@ -133,7 +137,5 @@ fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Confi
             })
         }
     };
-    friction
-        && parameters.take_pid(&arm.pid, config).is_ok()
-        && parameters.take_model(&arm.model, None, config).is_ok()
+    friction && parameters.load(&arm.pid, &arm.model, config).is_ok()
 }

@@ -92,13 +92,17 @@ impl Bench {
     }
 
     fn use_defaults(&mut self) {
-        for frame in [
+        assert_eq!(self.asks_for_defaults(), [DataStatus::NoError; 3]);
+    }
+
+    /// Sends the three UseDefault frames, and returns how each was taken.
+    fn asks_for_defaults(&mut self) -> [DataStatus; 3] {
+        let frames = [
             fixed::FRICTION_POLYNOMIAL_USE_DEFAULT,
             fixed::PID_PARAM_USE_DEFAULT,
             fixed::ARM_MODEL_USE_DEFAULT,
-        ] {
-            assert_eq!(self.send(1, &frame), DataStatus::NoError);
-        }
+        ];
+        frames.map(|frame| self.send(1, &frame))
     }
 
     /// The whole arm image, page by page.

@@ -14,6 +14,8 @@ pub(crate) enum SliceProgress {
     TableCheck(usize),
     /// Joints whose table is copied.
     TableCopy(usize),
+    /// Poses in which the inertia of the joints was looked at.
+    Pose(usize),
     /// Bytes of the arm image that are written.
     Image(usize),
 }

@@ -11,15 +11,15 @@ use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::pid::{Pid, PidTorque};
 use crate::remembered::remembered;
-use crate::teach::Payload;
-use crate::yielding::{DAMPING_RATE, Joint, Yield, Yielded};
-use crate::{JOINTS, friction, joint_error};
+use crate::teach::{LedJoint, Taught};
+use crate::yielding::{Joint, Yield, Yielded};
+use crate::{JOINTS, friction, gains, joint_error};
 
 /// Speed below which what the integral finds in motion may be friction that the model has wrong, rad/s: no load is learned from it.
 const CREEPS: f64 = 0.05;
 
-/// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
-const UNKNOWN_ROTOR: f64 = 0.7;
+/// Share of a torque limit below which friction of the joint holds what is missing beside the load found.
+const LITTLE: f64 = 0.04;
 
 /// Which parts of the control law act: the control mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +31,24 @@ pub(crate) enum ControlMode {
     /// The same while the arm approaches the path. The limits of the path do not apply: the approach begins at the measured
     /// position.
     Approach,
-    /// Gravity and a brake above the speed limit.
+    /// An arm that a hand has led comes to rest and is held: as `Hold`, with friction and inertia at the commanded velocity and acceleration.
+    Rest,
+    /// Gravity, and what lets a hand lead the arm (J-25).
     Teach,
 }
 
 impl ControlMode {
+    /// The arm is held, or comes to be.
+    pub(crate) fn holds(self) -> bool {
+        matches!(self, Self::Hold | Self::Rest)
+    }
+
     /// The commanded velocity and acceleration act.
+    pub(crate) fn commands_motion(self) -> bool {
+        self.moves() || self == Self::Rest
+    }
+
+    /// A motion is commanded.
     pub(crate) fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
@@ -61,6 +73,8 @@ pub(crate) struct ControlParameters<'a> {
     pub pid: &'a [PidGains; JOINTS],
     pub polynomial: &'a [[f64; 6]; JOINTS],
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
+    /// The gains are on trial: swings are looked for (J-71).
+    pub on_trial: bool,
 }
 
 /// The state of the control law.
@@ -69,7 +83,8 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
-    pub(super) payload: Payload,
+    /// In Teaching. Outside of it nothing of it is remembered, and the flight recorder does not keep it.
+    pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// Joints that yield (J-68, J-70).
     yields: [Option<Yield>; JOINTS],
@@ -82,16 +97,16 @@ pub(crate) struct ControlLaw {
     pub(super) unwinds_ms: u16,
 }
 
-remembered!(ControlLaw { pid, torque, payload, transfer, yields, yielded, loads, observed, unwinds_ms });
+remembered!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms });
 
 impl ControlLaw {
     /// No torque is remembered.
     pub fn release(&mut self) {
-        let Self { pid, torque, payload, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
+        let Self { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
         (*unwinds_ms, *observed) = (0, 0);
         *pid = Default::default();
         *torque = Default::default();
-        *payload = Payload::default();
+        *taught = None;
         *transfer = Transfer::default();
         forget_yields(yields);
         *yielded = Yielded::default();
@@ -103,18 +118,35 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// The model changes under the holding arm: bumpless transfer without any step.
-    pub fn change_model(&mut self) {
-        // What was missing was missing in the last one.
-        self.payload.forget();
-        self.forget_loads();
+    /// The same, without any step: the torque that decelerates an arm is part of the model's afterwards.
+    pub fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
-    /// The gains change: no step but that of the model.
-    pub fn change_gains(&mut self) {
-        self.forget_loads();
+    /// The model changes under the holding arm: bumpless transfer without any step.
+    pub fn change_model(&mut self) {
+        // What was missing was missing in the last one, and the integral has to give it back.
+        self.payload_comes();
+        self.transfer.change_model();
+    }
+
+    /// The gains become these: the integral keeps what torque it can, and what it cannot is blended out.
+    pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
+        for j in 0..JOINTS {
+            if !self.yields(j) {
+                self.pid[j].keep(&gains[j], self.torque[j].pid.i);
+            }
+        }
         self.transfer.change_mode();
+    }
+
+    /// These gains hold what is held now (J-71).
+    pub fn hold_on(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
+        let holds = |j: usize| {
+            let PidTorque { p, i, .. } = self.torque[j].pid;
+            config.absent[j] || gains::hold_on(&gains[j], p, i, &config.joints[j])
+        };
+        (0..JOINTS).all(holds)
     }
 
     /// Forgets the loads: each joint has to find what it carries again.
@@ -137,15 +169,25 @@ impl ControlLaw {
                 self.pid[j].reset(0.0);
                 self.loads[j].forget();
                 self.yields[j] = None;
+                // It has no integral that could give anything back.
+                self.unwinds_ms = 0;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m².
+    /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m²; `led`:
+    /// it comes to rest out of Teaching.
     // Inlined, so that its index is known to be that of a joint.
     #[inline(always)]
-    pub fn begin_yield(&mut self, joint: usize, lowers: bool, set: f64, inertia: f64, limits: &JointConfig) {
+    pub fn begin_yield(
+        &mut self,
+        joint: usize,
+        (lowers, led): (bool, bool),
+        set: f64,
+        inertia: f64,
+        limits: &JointConfig,
+    ) {
         let (torque, limit) = (&mut self.torque[joint], limits.torque_max);
         if let Some(yields) = &mut self.yields[joint] {
             if lowers {
@@ -157,9 +199,14 @@ impl ControlLaw {
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // The integral of a joint that was pushed has not found a load.
-        let load =
-            if lowers { Load::bounded(load.torque(torque.pid.i), limits) } else { load.known_torque() };
+        // The integral of a joint that was pushed has not found a load; that of one that was led has what Teaching carried.
+        let load = if lowers {
+            Load::bounded(load.torque(torque.pid.i), limits)
+        } else if led {
+            load.torque(torque.pid.i)
+        } else {
+            load.known_torque()
+        };
         let stays = self.yielded.count(joint);
         self.yields[joint] = Some(Yield::begin(lowers, stays, set, inertia, load));
     }
@@ -205,9 +252,10 @@ impl ControlLaw {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
             let Some(yields) = self.yields[j].as_ref().filter(|yields| yields.is_over()) else { continue };
-            self.pid[j].take_over(&gains[j], yields.load());
-            if yields.lowers() {
-                self.loads[j].set(yields.load());
+            let (load, left) = (yields.load(), yields.left(self.torque[j].pid.p));
+            self.pid[j].take_over(&gains[j], left);
+            if yields.has_learned() {
+                self.loads[j].set(if left.abs() > load.abs() { left } else { load });
             }
             self.yields[j] = None;
             self.transfer.change_mode();
@@ -216,20 +264,36 @@ impl ControlLaw {
         ended
     }
 
-    /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25), unless it may be a `contact`.
-    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics, contact: bool) {
-        if contact {
-            // What the integral has may be the contact; what was found before it is a load.
-            let load = |j: usize| match &self.yields[j] {
-                Some(yields) => yields.load(),
+    /// What every joint that is held carries is known: Teaching can carry it. Beside that the position controller makes next to no torque: an
+    /// integral that is still on its way, or gives back what is in the model now, has not found the load, and a hand that leans on the arm will
+    /// let go.
+    ///
+    /// Where a `contact` may be against the arm, what presses on it is not waited for, but a load that was known before has to be known again.
+    pub fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
+        let known = |j: usize| {
+            let little = LITTLE * config.joints[j].torque_max;
+            self.loads[j].is_known() && (contact || self.feedback(j).abs() <= little)
+        };
+        (contact || self.unwinds_ms == 0) && (0..JOINTS).all(|j| !held[j] || known(j))
+    }
+
+    /// As if every joint had found that it carries nothing.
+    #[cfg(test)]
+    pub fn find_loads_for_test(&mut self) {
+        self.loads.iter_mut().for_each(|load| load.set(0.0));
+    }
+
+    /// Teaching begins: it carries the loads that were found (J-25), and nothing that may be a contact.
+    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
+        let mut loads = [0.0; JOINTS];
+        for j in 0..JOINTS {
+            loads[j] = match &self.yields[j] {
+                Some(yields) => yields.taught_load(self.torque[j].pid.p),
                 None => self.loads[j].known_torque(),
             };
-            self.payload.know(core::array::from_fn(load));
-        } else if self.unwinds_ms > 0 {
-            self.payload.forget();
         }
+        self.taught = Some(Taught::begin(nodes.positions(), &loads, config));
         forget_yields(&mut self.yields);
-        self.payload.fit(dynamics, nodes.positions(), config);
     }
 
     /// The payload of the arm comes into the model under the holding arm: what is missing says nothing until the integral has given
@@ -239,16 +303,32 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// The payload of the arm was given in Teaching, and so much more of it (kg) comes into the model with this tick (J-60).
+    /// The payload of the arm was given in Teaching, and the model takes over this mass (kg) with this tick (J-60).
     pub fn give_way_to_payload(&mut self, mass: f64) {
-        self.payload.give_way(mass);
+        if let Some(taught) = &mut self.taught {
+            taught.give_way(mass);
+        }
     }
 
-    /// Teaching ends: the integral takes over what teaching carried.
-    pub fn end_teaching(&mut self, gains: &[PidGains; JOINTS]) {
-        for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
-            pid.take_over(gains, torque.payload);
+    /// Each tick of Teaching, which is so `late`, ms: what has come of the joints. Returns the speeds that their positions make, rad/s.
+    pub fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
+        let (q, mut speeds) = (nodes.positions(), [0.0; JOINTS]);
+        let Some(taught) = &mut self.taught else { return speeds };
+        for j in 0..JOINTS {
+            speeds[j] = taught.hear(j, nodes.node(j).fresh(), q[j], late);
         }
+        speeds
+    }
+
+    /// Teaching ends: the integral takes over what held each joint.
+    pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
+        let q = nodes.positions();
+        if let Some(taught) = &self.taught {
+            for j in 0..JOINTS {
+                self.pid[j].take_over(&gains[j], taught.held(j, q[j], &config.joints[j], config));
+            }
+        }
+        self.taught = None;
         self.forget_loads();
     }
 
@@ -260,6 +340,7 @@ impl ControlLaw {
     }
 
     /// One tick: computes its torque, before any limit; returns joint errors found on the way (friction table).
+    #[inline(always)]
     pub fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -270,6 +351,10 @@ impl ControlLaw {
         self.unwinds_ms = self.unwinds_ms.saturating_sub(1);
         self.yielded.step();
         let before = self.transfer.begin(&self.torque);
+        if before.is_some() && mode != ControlMode::Teach {
+            // Only Teaching has these.
+            self.torque.iter_mut().for_each(|torque| (torque.load, torque.brake) = (0.0, 0.0));
+        }
         let q = nodes.positions();
         let v = nodes.velocities();
         // J-62: what is measured is compared with what was due then.
@@ -285,15 +370,14 @@ impl ControlLaw {
         };
         let zero = [0.0; JOINTS];
         let (qd, qdd) =
-            if mode.moves() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
-        let model = parameters.dynamics.inverse(&now, &qd, &qdd);
-        let payload = if mode == ControlMode::Teach {
-            self.payload.torque(parameters.dynamics, q, v, config)
+            if mode.commands_motion() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
+        let model = if mode == ControlMode::Teach {
+            parameters.dynamics.gravity_torque(&now)
         } else {
-            [0.0; JOINTS]
+            parameters.dynamics.inverse(&now, &qd, &qdd)
         };
         let (friction, errors) =
-            if mode.moves() { compensation(inputs, &qd) } else { ([0.0; JOINTS], [0; JOINTS]) };
+            if mode.commands_motion() { compensation(inputs, &qd) } else { ([0.0; JOINTS], [0; JOINTS]) };
         for j in 0..JOINTS {
             let limit = &config.joints[j];
             let model = model[j] + limit.rotor_inertia * qdd[j];
@@ -316,20 +400,19 @@ impl ControlLaw {
             } else {
                 PidTorque::default()
             };
-            let (payload, friction) = (payload[j], friction[j]);
-            self.torque[j] = JointTorque { model, pid, friction, payload, brake: 0.0, blend: 0.0 };
+            let torque = &mut self.torque[j];
+            (torque.model, torque.pid, torque.blend) = (model, pid, 0.0);
+            if mode != ControlMode::Teach {
+                torque.friction = friction[j];
+            }
         }
+        let computed = mode == ControlMode::Teach && self.teach(nodes, config, parameters);
         self.transfer.blend(before, &mut self.torque, nodes, config);
         if mode != ControlMode::Teach {
             self.observe_load(set, config);
         }
-        if mode == ControlMode::Hold && !any_yields && set.all_holding() {
-            self.payload.observe(&self.torque.map(|t| t.correction()));
-        } else {
-            self.payload.forget();
-        }
-        if mode == ControlMode::Teach {
-            self.brake(nodes, config, parameters);
+        if computed {
+            self.bound_brakes(nodes, config);
         }
         errors
     }
@@ -342,25 +425,63 @@ impl ControlLaw {
         let creeps = speed > 0.0 && speed < CREEPS;
         // While the integral gives back what is in the model now, it says nothing of a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
-            self.loads[j].observe(self.torque[j].pid.i, set.settled(j), &config.joints[j]);
+            let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
+            // An integral that is still on its way to what it has to hold has not found it.
+            let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
+            load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// Teaching brakes joints above the speed limit (J-25).
-    fn brake(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) {
-        let limit = config.teach_velocity_max;
-        let excess = nodes.velocities().map(|v| v - v.max(-limit).min(limit));
-        if excess == [0.0; JOINTS] {
-            return;
+    /// What Teaching adds to the torque of the model (J-25). What changes slowly is computed in turns, and in the tick
+    /// that computes it the rest stays as it was. Returns whether all of it was computed.
+    #[inline(never)]
+    fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
+        let (q, v) = (nodes.positions(), nodes.velocities());
+        let friction = |j: usize, v: f64| {
+            let celsius = friction::celsius(nodes.node(j).report.temperature);
+            let of = match parameters.table {
+                Some(tables) => tables.get(j).map(|table| {
+                    let moving = friction::table(table, v, celsius);
+                    (friction::coulomb_of_table(table, celsius), moving.unwrap_or(0.0))
+                }),
+                None => parameters.polynomial.get(j).map(|c| {
+                    let moving = friction::polynomial(c, v, celsius, config.friction_sign_width);
+                    (friction::coulomb_of_polynomial(c, celsius), moving)
+                }),
+            };
+            of.unwrap_or_default()
+        };
+        let Some(taught) = &mut self.taught else { return false };
+        let begins = taught.begins();
+        if taught.look(q, v, parameters.dynamics, config, friction) {
+            if begins {
+                for j in 0..JOINTS {
+                    self.torque[j].load = taught.first_load(j);
+                }
+            }
+            return false;
         }
-        let mass = parameters.dynamics.mass_matrix(nodes.positions());
+        for j in 0..JOINTS {
+            let torque = &mut self.torque[j];
+            let led = LedJoint {
+                position: q[j],
+                velocity: v[j],
+                limits: &config.joints[j],
+                range: config.position_range(j),
+            };
+            let added = taught.step(j, &led, config);
+            (torque.load, torque.brake, torque.friction) = (added.load, added.brake, added.friction);
+        }
+        true
+    }
+
+    /// Brakes of Teaching use what the rest leaves of the limit, and not more: they are no overload.
+    #[inline(never)]
+    fn bound_brakes(&mut self, nodes: &Nodes, config: &Config) {
         for (j, torque) in self.torque.iter_mut().enumerate() {
-            let joint = &config.joints[j];
-            // A drive has a rotor also where the configuration gives none.
-            let rotor = if joint.rotor_inertia > 0.0 { joint.rotor_inertia } else { UNKNOWN_ROTOR };
-            let damping = config.teach_damping.min(DAMPING_RATE * (mass[j][j] + rotor));
+            let brake = core::mem::take(&mut torque.brake);
             if nodes.node(j).enabled() {
-                torque.brake = within(-damping * excess[j], torque.sum(), joint.torque_max);
+                torque.brake = within(brake, torque.sum(), config.joints[j].torque_max);
             }
         }
     }
@@ -393,7 +514,7 @@ pub(super) fn compensation(
     for j in 0..JOINTS {
         let (slowest, fastest) = friction::velocities(&tables[j]);
         let nearest = velocity[j].max(slowest).min(fastest);
-        let v = if mode == ControlMode::Approach { nearest } else { velocity[j] };
+        let v = if mode != ControlMode::Follow { nearest } else { velocity[j] };
         torque[j] = friction::table(&tables[j], v, celsius(j)).unwrap_or_else(|| {
             errors[j] |= joint_error::FRICTION_TABLE;
             0.0

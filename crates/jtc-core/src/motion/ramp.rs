@@ -2,18 +2,22 @@
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
-use crate::JOINTS;
 use crate::config::Config;
-use crate::deceleration::moves;
+use crate::deceleration::{STEEPEST_LED, moves};
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::path::{Bounds, PathClock, SlopeBounds};
 use crate::remembered::remembered;
+use crate::{DT, JOINTS};
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
 /// a tick and for the controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
+/// Share of the torque that is left for a stop of an arm that a hand has led: the position controller, which makes the torque, swings over.
+const STOP_TORQUE: f64 = 0.5;
+/// Share of the torque limit that is used where hardly anything is left.
+const LEAST_LEFT: f64 = 0.1;
 
 /// The inertia of the arm at the start of a ramp.
 #[derive(Clone, Debug, Default)]
@@ -41,6 +45,20 @@ impl PathRamp {
     /// Inertia that joint `j` feels when joint `k` accelerates, kg·m².
     pub fn coupling(&self, j: usize, k: usize) -> f64 {
         self.inertia[j][k]
+    }
+
+    /// Time that a smooth stop of all joints from these velocities (rad/s) takes at least, ms, where it uses [`STOP_TORQUE`] of what the last
+    /// torques of the `law` leave of the limits.
+    pub fn shortest_stop_ms(&self, law: &ControlLaw, velocity: &[f64; JOINTS], config: &Config) -> f64 {
+        let mut longest = 0.0_f64;
+        for j in 0..JOINTS {
+            let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
+            let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
+            // What is held helps to stop the joint, or takes of what can.
+            let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
+            longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
+        }
+        longest
     }
 
     /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.

@@ -29,21 +29,24 @@ pub(crate) struct SetValues {
     pub(super) catch: [Catch; JOINTS],
     /// Joints that decelerate to rest.
     pub(super) deceleration: [Option<Deceleration>; JOINTS],
+    /// They do so because a hand has led them.
+    led: bool,
     /// The arm is jogged (J-58).
     jog: Option<Jog>,
 }
 
-remembered!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, jog });
+remembered!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { point, commanded, holding, absent, found_moving, catch, deceleration, jog } = self;
+        let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         commanded.rest(nodes.positions());
         (*holding, *absent, *found_moving) = ([false; JOINTS], [false; JOINTS], [true; JOINTS]);
         *catch = [Catch::default(); JOINTS];
         *deceleration = [None; JOINTS];
+        *led = false;
         *jog = None;
     }
 
@@ -54,6 +57,7 @@ impl SetValues {
         // J-63: joints do not stop because the set values begin anew, least of all one that had not followed them.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
+        self.led = false;
         self.jog = None;
     }
 
@@ -122,8 +126,9 @@ impl SetValues {
         self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
     }
 
-    /// Begin to hold where the arm is, coming to rest first if it moves.
-    pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
+    /// Begin to hold where the arm is. One that moves, because a hand has led it, comes to rest within `length_ms` first, and is caught like a
+    /// falling load.
+    pub fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
         let moving = velocity.iter().any(|&v| moves(v));
@@ -131,10 +136,28 @@ impl SetValues {
             // Joints that are enabled later begin on their own.
             self.deceleration[j] = None;
             if moving && self.holding[j] {
-                let led = Deceleration::led(from[j], velocity[j], config, &config.joints[j]);
+                let led = Deceleration::led(from[j], velocity[j], length_ms, &config.joints[j]);
                 self.decelerate(j, led, config);
+                self.led = true;
             }
         }
+        if self.led {
+            self.catch = [Catch::begin(config); JOINTS];
+        }
+    }
+
+    /// Whether what a hand has led has come to rest. From then on what swings may have to be caught like a load.
+    pub fn led_to_rest(&mut self, config: &Config) -> bool {
+        self.led = self.deceleration.iter().any(Option::is_some);
+        if !self.led {
+            self.catch = [Catch::begin(config); JOINTS];
+        }
+        !self.led
+    }
+
+    /// The arm comes to rest because a hand has led it.
+    pub fn is_led(&self) -> bool {
+        self.led
     }
 
     /// A joint comes to rest from where it was measured.
@@ -145,13 +168,6 @@ impl SetValues {
         deceleration.shift(self.commanded.position(0)[j] - from);
         self.deceleration[j] = Some(deceleration);
         self.found_moving[j] = true;
-    }
-
-    /// A joint that comes to rest because a hand has led it is stopped like one with a falling load.
-    pub fn catch_decelerating(&mut self, config: &Config) {
-        for (catch, deceleration) in self.catch.iter_mut().zip(&self.deceleration) {
-            *catch = if deceleration.is_some() { Catch::begin(config) } else { *catch };
-        }
     }
 
     /// Joints that move, by their set values or as measured.
@@ -222,8 +238,9 @@ impl SetValues {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
         for j in 0..JOINTS {
             let Some(deceleration) = &mut self.deceleration[j] else { continue };
-            let (position, velocity, rests) = deceleration.step(&config.joints[j]);
+            let ([position, velocity, acceleration], rests) = deceleration.step(&config.joints[j]);
             (self.point.position[j], self.point.velocity[j]) = (position, velocity);
+            self.point.acceleration[j] = if self.led { acceleration } else { 0.0 };
             if rests {
                 self.deceleration[j] = None;
             }

@@ -35,7 +35,8 @@ fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
     let nodes = Nodes::new(&config);
     motion.set.hold_for_test();
-    motion.hold_measured(&nodes, &config);
+    motion.set.hold_measured(&nodes, 200.0, &config);
+    motion.law.begin();
     assert!(motion.set.all_holding());
 }
 
@@ -67,7 +68,7 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     let config = Config::avena();
     for j in 0..JOINTS {
         let mut decelerates = motion.clone();
-        decelerates.set.deceleration[j] = Some(Deceleration::led(0.0, 0.3, &config, &config.joints[j]));
+        decelerates.set.deceleration[j] = Some(Deceleration::led(0.0, 0.3, 200.0, &config.joints[j]));
         let mut catches = motion.clone();
         catches.set.catch[j] = Catch::begin(&config);
         let mut off = motion.clone();
@@ -80,22 +81,29 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching finds what the arm carries while it is held; only an arm that may have a contact against it does not have to know.
+/// Teaching finds what the arm carries while it is held; only an arm that may have a contact against it does not have to know for longer than
+/// it takes to find out.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
-    for (held, contact, known, may) in [
-        (true, false, false, false),
-        (true, false, true, true),
-        (true, true, false, true),
-        (false, false, true, false),
-        (false, true, false, false),
-        (false, true, true, false),
+    for (held, contact, waits_ms, known, may) in [
+        (true, false, 9_000, false, false),
+        (true, false, 0, true, true),
+        (true, true, KNOWN_MS - 1, false, false),
+        (true, true, KNOWN_MS, false, true),
+        (true, true, 0, true, true),
+        (false, false, 9_000, true, false),
+        (false, true, 9_000, false, false),
+        (false, true, 9_000, true, false),
     ] {
         let mut motion = holding([held; JOINTS]);
         if known {
-            motion.law.payload.observe(&[0.0; JOINTS]);
+            motion.law.find_loads_for_test();
         }
-        assert_eq!(motion.may_be_taught(&Config::avena(), contact), may, "{held} {contact} {known}");
+        assert_eq!(
+            motion.may_be_taught(&Config::avena(), contact, waits_ms),
+            may,
+            "{held} {contact} {waits_ms} {known}"
+        );
     }
 }
 
@@ -147,22 +155,30 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
         // One that moves is enough for all.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
-        motion.hold_measured(&nodes, &Config::avena());
+        motion.set.hold_measured(&nodes, 200.0, &Config::avena());
         assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
         let found: [bool; JOINTS] = core::array::from_fn(|j| motion.set.deceleration[j].is_some());
         assert_eq!(found, core::array::from_fn(|j| decelerates && j != 3), "{velocity}");
     }
 }
 
-/// What a hand has led is stopped as a load is; an arm that stands is held at once.
+/// What a hand has led comes to rest, and is caught as a load is; an arm that stands is held at once.
 #[test]
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
-    for (velocity, catches) in [(0.0, false), (0.02, false), (0.3, true)] {
-        let nodes = Nodes::enabled_at([0.3; JOINTS], [velocity; JOINTS]);
+    for (velocity, moves) in [(0.0, false), (0.02, false), (0.3, true)] {
+        let (nodes, config) = (Nodes::enabled_at([0.3; JOINTS], [velocity; JOINTS]), Config::avena());
         let mut motion = holding([true; JOINTS]);
-        motion.end_teaching(&nodes, &Config::avena(), &[PidGains::default(); JOINTS]);
-        assert_eq!(motion.set.catch.map(|catch| catch.busy()), [catches; JOINTS], "{velocity}");
-        assert_eq!(motion.set.all_holding(), !catches);
+        motion.end_teaching(&nodes, &config, &[PidGains::default(); JOINTS]);
+        assert_eq!((motion.set.is_led(), motion.set.all_holding()), (moves, !moves), "{velocity} rad/s");
+        let mut ms = 0;
+        while motion.set.is_led() {
+            motion.hold(&config);
+            motion.set.led_to_rest(&config);
+            ms += 1;
+        }
+        assert_eq!(ms > 0, moves);
+        assert!(ms <= 501, "{ms} ms");
+        assert_eq!(motion.set.catch.map(|catch| catch.busy()), [moves; JOINTS], "{velocity} rad/s");
     }
 }
 

@@ -8,21 +8,21 @@ pub(crate) struct JointTorque {
     pub model: f64,
     pub pid: PidTorque,
     pub friction: f64,
-    /// What teaching carries besides the model.
-    pub payload: f64,
-    /// Brake of teaching.
+    /// Load that Teaching carries.
+    pub load: f64,
+    /// Brakes of Teaching.
     pub brake: f64,
     /// What is left of a step that is being blended out.
     pub blend: f64,
 }
 
-remembered!(JointTorque { model, pid, friction, payload, brake, blend });
+remembered!(JointTorque { model, pid, friction, load, brake, blend });
 
 impl JointTorque {
     /// All but the model.
     pub fn correction(&self) -> f64 {
         // In two sums: shorter to wait for than one.
-        (self.pid.sum() + self.friction) + (self.payload + self.brake + self.blend)
+        (self.pid.sum() + self.friction) + (self.load + self.brake + self.blend)
     }
 
     pub fn sum(&self) -> f64 {

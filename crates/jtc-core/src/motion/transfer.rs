@@ -90,6 +90,7 @@ impl Transfer {
     }
 
     /// Adds what is left of the steps to `torque`, and clears that of joints that are not enabled.
+    #[inline(always)]
     pub fn blend(
         &mut self,
         before: Before,

@@ -10,13 +10,20 @@
 //! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
 //! stays closed however often answers are lost.
 mod history;
+mod jump;
 mod lateness;
+
+use core::f64::consts::{PI, TAU};
+
+use jtc_wire::StopKind;
 
 use crate::config::Config;
 use crate::motion::Commanded;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 use history::{Answered, History};
+pub(super) use jump::Ways;
+use jump::{Jumps, Seen};
 use lateness::Lateness;
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
@@ -28,6 +35,8 @@ const UNEXPECTED: f64 = 0.1;
 const IN_ITS_PLACE: f64 = 2.0;
 /// The coarsest encoder for which that counts, rad: what is used as it is may be a step of so much.
 const COARSEST: f64 = 1e-4;
+/// Distance from the prediction, as a share of the implausible one, within which an answer is without what its encoder has jumped by.
+const NEAR: f64 = 0.5;
 /// Most that the rate carried on differs from the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
 /// Most that is carried on, in velocity limits.
@@ -63,6 +72,36 @@ pub(crate) struct Tick {
     pub elapsed_ms: u32,
     /// Velocity limit of the joint, rad/s.
     pub velocity_max: f64,
+    /// The drive is enabled.
+    pub enabled: bool,
+    /// Index of the joint.
+    pub joint: usize,
+}
+
+/// What came of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// The answer is usable.
+    Used,
+    /// It is not, or there is none.
+    Predicted,
+    /// It is usable, and has shown that the encoder has jumped (J-35).
+    Jumped,
+}
+
+/// An answer that is far from where it was expected.
+struct Unexpected {
+    answer: Reading,
+    /// How far the prediction is beyond it, rad.
+    off: f64,
+    /// The implausible distance, rad.
+    reach: f64,
+    /// When it was due, ms.
+    at_ms: u32,
+    /// The encoder may have jumped.
+    looked_at: bool,
+    /// Index of the joint.
+    joint: usize,
 }
 
 /// An answer that is late, and what was commanded since it was due.
@@ -99,6 +138,8 @@ pub(crate) struct Measurement {
     history: History,
     /// How late the answers are.
     lateness: Lateness,
+    /// Jumps of the encoder.
+    jumps: Jumps,
     /// An answer has been missing since the last usable one.
     missing: bool,
     /// Prediction less answer, as much as has not faded.
@@ -131,6 +172,7 @@ remembered!(Measurement {
     carried,
     history,
     lateness,
+    jumps,
     missing,
     position_offset,
     velocity_offset,
@@ -196,6 +238,29 @@ impl Measurement {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
+    /// What is taken off an answer, because the encoder has jumped by it, rad.
+    pub fn taken_off(&self) -> f64 {
+        self.jumps.taken_off()
+    }
+
+    /// What of the two encoders does not fit, since the drive was configured: a jump and its size (rad), or the factor of a speed.
+    pub fn misfit(&self) -> Option<(StopKind, f64)> {
+        self.jumps.found()
+    }
+
+    /// Positions move `factor` times as fast as the speed says.
+    pub fn find_factor(&mut self, factor: f32) {
+        self.jumps.find_factor(factor);
+    }
+
+    /// The ways of an answer of this tick; `None` where there is none, or nothing is known of them.
+    pub fn ways(&self, config: &Config) -> Option<Ways> {
+        let window_ms = config.drive_speed_window_ms;
+        let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
+        let Answered { position, .. } = self.history.newest();
+        Ways::of(&Reading { position, ..self.answer }, from, config)
+    }
+
     /// The next answer is taken as it is.
     pub fn forget(&mut self) {
         self.known = false;
@@ -206,8 +271,8 @@ impl Measurement {
         self.commanded = commanded;
     }
 
-    /// One tick; false when the answer is not usable, or there is none. `past`: what was commanded since so many ticks ago.
-    pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> bool {
+    /// One tick. The answer is without what the encoder has jumped by. `past`: what was commanded since so many ticks ago.
+    pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
         self.answer.position += (self.carried + change) * (f64::from(tick.elapsed_ms) * DT);
@@ -227,7 +292,7 @@ impl Measurement {
     /// The rest of a tick whose answer may be late. `tick` is a copy: where it is in memory, every tick is slower.
     #[cold]
     #[inline(never)]
-    fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> bool {
+    fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
         // Younger than the last one: a frame that comes twice counts as evidence, too, and may have been counted wrongly.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
@@ -238,7 +303,7 @@ impl Measurement {
 
     /// The answer of a tick, if it has one that is usable. Inlined: without a late answer half of it falls away.
     #[inline(always)]
-    fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> bool {
+    fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         let predicted = Reading { velocity: self.answer.velocity + change, ..self.answer };
         let at_ms = self.clock_ms.wrapping_sub(late.map_or(0, |late| late.ms));
@@ -246,13 +311,29 @@ impl Measurement {
         let reach = (IMPLAUSIBLE * DT) * tick.velocity_max * f64::from(age_ms);
         // Where a late answer has led meanwhile.
         let since = |carried: f64| late.map_or(0.0, |late| late.way(carried));
-        let off = |answer: &Reading| predicted.position - (answer.position + since(self.carried));
-        let usable = tick.answer.filter(|answer| !self.known || off(answer).abs() <= reach);
+        let way = since(self.carried);
+        let off_of = |answer: &Reading| predicted.position - (answer.position + way);
+        let known = self.known;
+        let (usable, off, outcome) = match tick.answer {
+            None => (None, 0.0, Outcome::Predicted),
+            Some(answer) => {
+                let off = off_of(&answer);
+                if !known || off.abs() <= UNEXPECTED * reach {
+                    self.jumps.as_expected();
+                    (tick.answer, off.abs(), Outcome::Used)
+                } else {
+                    let looked_at = tick.enabled && late.is_none_or(|late| late.ms == 0);
+                    let unexpected = Unexpected { answer, off, reach, at_ms, looked_at, joint: tick.joint };
+                    let (usable, outcome) = self.unexpected(unexpected, config);
+                    (usable, usable.map_or(off, |usable| off_of(&usable)).abs(), outcome)
+                }
+            }
+        };
         if let Some(answer) = usable {
-            let (off, known) = (off(&answer).abs(), self.known);
             if !known {
-                *self =
-                    Self { known: true, clock_ms: self.clock_ms, lateness: self.lateness, ..Self::default() };
+                let Self { clock_ms, lateness, jumps, .. } = *self;
+                let history = History::of(&Answered { position: answer.position, at_ms });
+                *self = Self { known: true, clock_ms, lateness, jumps, history, ..Self::default() };
             }
             self.take_rate(&answer, at_ms, off <= UNEXPECTED * reach, tick.velocity_max);
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
@@ -263,7 +344,8 @@ impl Measurement {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            self.missing = false;
+            // What was taken for a jump, and was none, leaves a difference like a missing answer.
+            self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
         }
@@ -273,7 +355,38 @@ impl Measurement {
             position: self.answer.position + self.position_offset.left,
             velocity: self.answer.velocity + change + self.velocity_offset.left,
         };
-        usable.is_some()
+        outcome
+    }
+
+    /// What is to be made of an answer that is far from where it was expected.
+    #[cold]
+    #[inline(never)]
+    fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
+        let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
+        // A position less its jump may be on the other side of where the drive's positions wrap around.
+        let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
+        let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
+        let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
+            Seen::Motion
+        } else {
+            let torque_max = config.joints.get(joint).map_or(0.0, |limits| limits.torque_max);
+            let twist = torque_max / config.gear_stiffness;
+            self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
+        };
+        // Without the jump it is where the motion leads. Otherwise its speed is wrong, too.
+        let near = |way: f64| (off + way).abs() <= NEAR * reach;
+        let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
+        match seen {
+            Seen::Perhaps(way) if near(way) => (without(way), Outcome::Used),
+            Seen::Jump(way) if near(way) => {
+                self.jumps.take_off(way);
+                (without(way), Outcome::Jumped)
+            }
+            _ => {
+                self.jumps.as_expected();
+                if off.abs() <= reach { (Some(answer), Outcome::Used) } else { (None, Outcome::Predicted) }
+            }
+        }
     }
 
     /// What the answer of this tick differs by from what was `predicted` is not to be a step. One that is in its place makes none;
@@ -318,8 +431,7 @@ impl Measurement {
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;
         let answered = Answered { position, at_ms };
-        let rate = self.history.rate_to(&answered);
-        self.history.push(answered, as_predicted);
+        let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
         // Where a joint has jumped on the way, its own report counts alone.
         let carried = match rate {

@@ -1,7 +1,7 @@
 //! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
 //! which frame each tick sends (J-12).
 use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
-use jtc_wire::can_flag;
+use jtc_wire::{StopKind, can_flag};
 
 use crate::config::Config;
 use crate::io::Inputs;
@@ -11,13 +11,15 @@ use crate::{JOINTS, NODES};
 mod bring_up;
 mod measure;
 mod node;
+mod speed_check;
 mod supervision;
 #[cfg(test)]
 mod tests;
 
 use crate::remembered::remembered;
-use measure::{Late, Reading, Tick};
+use measure::{Late, Outcome, Reading, Tick};
 pub(crate) use node::{Goal, Node};
+use speed_check::SpeedCheck;
 
 /// Node number of the gripper.
 pub(crate) const GRIPPER: usize = 6;
@@ -54,6 +56,10 @@ pub(crate) struct Nodes {
     /// Moves since the last frame that took the place of one.
     moves: u8,
     configured_last: bool,
+    /// Whether positions and speeds of the drives fit (J-35).
+    speed_check: SpeedCheck,
+    /// Joints whose two encoders were found in this tick not to fit (J-35): a mask.
+    misfits: u8,
 }
 
 remembered!(Nodes {
@@ -73,6 +79,8 @@ remembered!(Nodes {
     sent_move,
     moves,
     configured_last,
+    speed_check,
+    misfits,
 });
 
 impl Nodes {
@@ -98,6 +106,8 @@ impl Nodes {
             sent_move: false,
             moves: 0,
             configured_last: false,
+            speed_check: SpeedCheck::default(),
+            misfits: 0,
         }
     }
 
@@ -176,6 +186,22 @@ impl Nodes {
     /// The positions, once that of every joint counts.
     pub fn known_positions(&self) -> Option<&[f64; JOINTS]> {
         (!self.fallen_back()).then_some(&self.position)
+    }
+
+    /// Joints whose two encoders were found in this tick not to fit (J-35): a mask.
+    pub fn misfits(&self) -> u8 {
+        self.misfits
+    }
+
+    /// What of the two encoders of the joint with this index does not fit, since its drive was configured, with the size of a jump (rad) or the
+    /// factor of a speed (J-35).
+    pub fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
+        self.node(joint).measured.misfit()
+    }
+
+    /// Joints of which something does not fit, until their drives are configured again (J-35): a mask.
+    pub fn untrusted(&self) -> u8 {
+        (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
 
     /// Measured velocities, rad/s, alike.
@@ -295,8 +321,10 @@ impl Nodes {
         let asked = self.sent_move && inputs.bus_state.acknowledged;
         let velocity = commanded.due_velocity(config);
         let (mut usable, mut still) = (answered, true);
+        self.misfits = 0;
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
-            let reading = Reading { position: node.report.position, velocity: node.report.velocity };
+            let position = node.report.position - node.measured.taken_off();
+            let reading = Reading { position, velocity: node.report.velocity };
             let tick = Tick {
                 answer: (answered & (1 << j) != 0).then_some(reading),
                 expected: self.sent_move,
@@ -305,16 +333,23 @@ impl Nodes {
                 commanded: velocity[j],
                 elapsed_ms,
                 velocity_max: config.joints[j].velocity_max,
+                enabled: node.report.state == NodeState::ENABLED,
+                joint: j,
             };
             let past = |ticks| Late::new(ticks, j, commanded, config);
-            if node.valid && !node.measured.step(&tick, past, config) {
-                usable &= !(1 << j);
+            if node.valid {
+                match node.measured.step(&tick, past, config) {
+                    Outcome::Used => {}
+                    Outcome::Predicted => usable &= !(1 << j),
+                    Outcome::Jumped => self.misfits |= 1 << j,
+                }
             }
             node.fresh = usable & (1 << j) != 0;
             let Reading { position, velocity } = node.measured.used();
             (self.position[j], self.velocity[j]) = (position, velocity);
             still &= node.valid && node.measured.speed() < config.enable_speed_max;
         }
+        self.misfits |= self.speed_check.step(&mut self.nodes, config);
         self.still_ms = if still { self.still_ms.saturating_add(1) } else { 0 };
         usable
     }
@@ -393,7 +428,11 @@ impl Nodes {
                 node.restart(config);
             }
         }
-        let bits = |config: &Config| (config.joint_config_bits, config.gripper_config_bits, config.gripper);
+        // With another scale the speeds may fit.
+        let bits = |config: &Config| {
+            let Config { joint_config_bits, gripper_config_bits, gripper, velocity_full_scale, .. } = *config;
+            (joint_config_bits, gripper_config_bits, gripper, velocity_full_scale)
+        };
         let changed = bits(config) != bits(before);
         if changed {
             for node in &mut self.nodes {

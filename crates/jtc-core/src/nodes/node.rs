@@ -182,6 +182,11 @@ impl Node {
         }
     }
 
+    /// It is configured and enabled, and neither to be cleared nor reset: no change is requested of it for [`Goal::Enabled`].
+    pub fn wants_nothing_enabled(&self) -> bool {
+        self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)
+    }
+
     pub fn wants_configuration(&self) -> bool {
         self.seen
             && !self.configured
@@ -193,6 +198,25 @@ impl Node {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The short way says what the long one does.
+    #[test]
+    fn j12_j16_an_enabled_node_wants_nothing() {
+        for bits in 0..16u8 {
+            let flag = |bit: u8| bits & 1 << bit != 0;
+            for state in (0..=20).map(NodeState::new) {
+                let (seen, configured, reset, clear) = (flag(0), flag(1), flag(2), flag(3));
+                let mut node = Node { seen, configured, reset, clear, ..Node::default() };
+                node.report.state = state;
+                if node.wants_nothing_enabled() {
+                    assert!(!node.reset && node.request(Goal::Enabled) == Target::NoChange, "{node:?}");
+                    assert!(!node.wants_configuration());
+                }
+                let enabled = state == NodeState::ENABLED && bits == 3;
+                assert_eq!(node.wants_nothing_enabled(), enabled, "{node:?}");
+            }
+        }
+    }
 
     /// A drive that was enabled before the controller began keeps its state, but nothing is known of its configuration.
     #[test]

@@ -2,38 +2,34 @@
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{DataStatus, Floats};
 
-use super::{NO_TABLE, ReceivedParameters, TABLE_FLOATS};
+use super::{NO_TABLE, ReceivedParameters, TABLE_FLOATS, check_model};
 use crate::JOINTS;
 use crate::config::Config;
 use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::parameters::{PidGains, TableOf};
 
 impl ReceivedParameters {
-    pub fn take_pid(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
-        let mut gains = [PidGains::default(); JOINTS];
-        for (j, gain) in gains.iter_mut().enumerate() {
-            let at = |i: usize| finite(floats, 5 * j + i);
-            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
-        }
-        self.set_pid(gains, config)
-    }
-
-    /// `at`: measured positions (rad), once all are known.
+    /// A model in slices, as [`set_model`](Self::set_model).
     pub fn take_model(
         &mut self,
         floats: &Floats<'_>,
+        progress: SliceProgress,
         at: Option<&[f64; JOINTS]>,
         config: &Config,
-    ) -> Result<(), DataStatus> {
-        let mut next = Reader { floats, next: 0 };
-        let mut model = ArmModel::default();
-        for joint in &mut model.joints {
-            *joint = next.origin()?;
+    ) -> SliceOutcome {
+        match read_model(floats) {
+            Ok(model) => self.set_model(&model, progress, at, config),
+            Err(status) => SliceOutcome::Refused(status),
         }
-        for link in &mut model.links {
-            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
-        }
-        self.set_model(&model, at, config)
+    }
+
+    /// Gains and model of a stored arm, whose gains are looked at when a host asks for them.
+    pub fn load(&mut self, pid: &Floats<'_>, model: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
+        let (pid, model) = (read_pid(pid)?, read_model(model)?);
+        self.check_pid(&pid, config)?;
+        self.put_pid(&pid);
+        check_model(&model, config)?;
+        self.put_model(&model, None, config)
     }
 
     pub fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
@@ -57,6 +53,28 @@ impl ReceivedParameters {
     ) -> SliceOutcome {
         self.take_tables(|j| read_table(floats, j), progress, config)
     }
+}
+
+/// Gains in the order of the wire.
+pub(crate) fn read_pid(floats: &Floats<'_>) -> Result<[PidGains; JOINTS], DataStatus> {
+    let mut gains = [PidGains::default(); JOINTS];
+    for (j, gain) in gains.iter_mut().enumerate() {
+        let at = |i: usize| finite(floats, 5 * j + i);
+        *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
+    }
+    Ok(gains)
+}
+
+fn read_model(floats: &Floats<'_>) -> Result<ArmModel, DataStatus> {
+    let mut next = Reader { floats, next: 0 };
+    let mut model = ArmModel::default();
+    for joint in &mut model.joints {
+        *joint = next.origin()?;
+    }
+    for link in &mut model.links {
+        *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
+    }
+    Ok(model)
 }
 
 /// Float `i`, refused when it is NaN, infinite or not there (J-06).

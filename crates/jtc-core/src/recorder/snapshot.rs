@@ -10,6 +10,7 @@ use crate::config::Config;
 use crate::controller::Controller;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
+use crate::held_stop::LastStop;
 use crate::host::overtaking::Overtaking;
 use crate::host::upload::LineUpload;
 use crate::late::LateTicks;
@@ -84,6 +85,7 @@ pub(crate) struct Dynamic {
     phase: Phase,
     braking_ms: Option<u16>,
     motion: Motion,
+    last_stop: LastStop,
     overtaking: [Overtaking; HOST_LINES],
     uploads: [LineUpload; HOST_LINES],
     late_ticks: LateTicks,
@@ -107,6 +109,7 @@ remembered!(Dynamic {
     phase,
     braking_ms,
     motion,
+    last_stop,
     overtaking,
     uploads,
     late_ticks,
@@ -181,6 +184,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             phase,
             braking_ms,
             motion,
+            last_stop,
             slice_progress: _,
             overtaking,
             uploads,
@@ -205,6 +209,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         phase.write(to);
         braking_ms.write(to);
         motion.write(to);
+        last_stop.write(to);
         overtaking.write(to);
         uploads.write(to);
         late_ticks.write(to);
@@ -230,6 +235,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             phase,
             braking_ms,
             motion,
+            last_stop,
             overtaking,
             uploads,
             late_ticks,
@@ -244,7 +250,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (self.teaching, self.teaching_waits_ms, self.pump) = (teaching, teaching_waits_ms, pump);
         self.store.restore(&store);
         (self.trajectory, self.clock, self.phase) = (trajectory, clock, phase);
-        (self.braking_ms, self.motion) = (braking_ms, motion);
+        (self.braking_ms, self.motion, self.last_stop) = (braking_ms, motion, last_stop);
         (self.overtaking, self.uploads) = (overtaking, uploads);
         (self.late_ticks, self.observed) = (late_ticks, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;

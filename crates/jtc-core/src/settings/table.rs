@@ -1,5 +1,6 @@
 //! The table of settings: number on the wire, name, unit, range, meaning, and where each is (J-53). Docs, arm files and
-//! `jtc arm show` are made from it. Numbers are never given anew.
+//! `jtc arm show` are made from it. No number is used a second time: 59 to 63
+//! belonged to an earlier Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 
@@ -67,6 +68,7 @@ settings! {
     Joint 6 "position_error_max_rad" ["rad"] 0.0001..=1.0 No "largest difference of commanded and measured position" (position_error_max);
     Joint 7 "rotor_inertia_kg_m2" ["kg·m²"] 0.0..=100.0 No "inertia of the drive's rotor at the joint" (rotor_inertia);
     Joint 8 "torque_gain" [""] 0.1..=10.0 No "what the drive is asked for, as a multiple of the joint's torque" (torque_gain);
+    Joint 9 "teach_damping_nm_s_rad" ["N·m·s/rad"] 0.0..=1000.0 No "damping in Teaching (J-25)" (teach_damping);
     EachSwitch 16 "absent" [""] 0.0..=1.0 Unpowered "the joint is not there, for work on a bench: no motion is executed" (absent);
     Each 17 "absent_position_rad" ["rad"] -6.2832..=6.2832 Unpowered "where the model has a joint that is not there" (absent_position);
     Number 32 "gravity_x_m_s2" ["m/s²"] -30.0..=30.0 No "gravity along x of the base frame" (gravity[0]);
@@ -96,16 +98,16 @@ settings! {
     Whole 56 "torque_over_ms" ["ms"] 0.0..=100.0 No "time at the torque limit, within any 100 ms, that is not yet an overload" (torque_over_ms: u16);
     Whole 57 "catch_ms_max" ["ms"] 0.0..=10000.0 No "time for catching the load of a joint that was just enabled" (catch_ms_max: u16);
     Whole 58 "blend_ms" ["ms"] 1.0..=5000.0 No "time over which steps of torque are blended out" (blend_ms: u16);
-    Number 59 "teach_velocity_max_rad_s" ["rad/s"] 0.01..=5.0 No "speed above which teaching brakes" (teach_velocity_max);
-    Number 60 "teach_damping_nm_s_rad" ["N·m·s/rad"] 0.0..=1000.0 No "brake of teaching per speed in excess" (teach_damping);
-    Number 61 "teach_payload_max_kg" ["kg"] 0.0..=50.0 No "largest mass at the flange that teaching carries" (teach_payload_max);
-    Number 62 "teach_payload_velocity_rad_s" ["rad/s"] 0.001..=5.0 No "speed from which on the torque for it fades" (teach_payload_velocity);
-    Whole 63 "teach_fade_ms" ["ms"] 1.0..=10000.0 No "time over which the rest of the missing torque fades" (teach_fade_ms: u16);
     Number 64 "friction_sign_width_rad_s" ["rad/s"] 0.0001..=1.0 No "speed around zero in which the sign of friction is smoothed" (friction_sign_width);
     Whole 65 "host_timeout_ms" ["ms"] 0.0..=60000.0 No "silence of all hosts that pauses a motion and ends teaching (J-59); 0: none does" (host_timeout_ms: u16);
     Switch 66 "torque_reaction" [""] 0.0..=1.0 No "an overloaded joint releases the arm (1), or is held (0)" (torque_release);
     Switch 67 "protective_stop_latches" [""] 0.0..=1.0 No "a held stop is over only when the host has cleared it" (protective_stop_latches);
+    Whole 68 "drive_speed_window_ms" ["ms"] 0.0..=15.0 No "time that the drives' speed is the mean over; 0: it is not compared with their position" (drive_speed_window_ms: u8);
+    Number 69 "gear_stiffness_nm_rad" ["N·m/rad"] 10.0..=1e9 No "stiffness of a gear: how far a torque twists it" (gear_stiffness);
     Whole 72 "delay_ticks" [""] 0.0..=7.0 No "age of a measurement when what is commanded because of it acts, in ticks" (delay_ticks: u8);
+    Number 77 "teach_stiction" [""] 0.0..=0.3 No "torque that holds a joint at standstill in Teaching, its own friction included, as a share of the limit" (teach_stiction);
+    Number 78 "teach_friction" [""] 0.0..=0.7 No "share of the Coulomb friction that Teaching takes away" (teach_friction);
+    Number 79 "tool_speed_max_m_s" ["m/s"] 0.0..=10.0 No "speed of the flange from which on Teaching brakes harder, at twice that fully; 0: any" (tool_speed_max);
     Number 96 "kp_max" ["N·m/rad"] 0.0..=1e6 No "highest Kp that is taken" (parameter_bounds.kp_max);
     Number 97 "ki_max" ["N·m/(rad·s)"] 0.0..=1e6 No "highest Ki that is taken" (parameter_bounds.ki_max);
     Number 98 "kd_max" ["N·m·s/rad"] 0.0..=1e5 No "highest Kd that is taken" (parameter_bounds.kd_max);

@@ -1,10 +1,13 @@
 //! An arm of metal behind the [`Rig`]: rigid bodies, rotors, LuGre friction, and drives with a coarse encoder and a late speed.
-#![allow(dead_code)]
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::rig::Rig;
+
+pub mod arms;
+
+pub use arms::ArmFile;
 
 /// rad of one step of the drives' 16-bit encoder.
 pub const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
@@ -100,10 +103,14 @@ pub const POSES: [[f64; 6]; 4] = [
     [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
 ];
 
-/// The share of its torque limit.
+/// The share of its torque limit, of the default arm.
 pub fn shares(torque: &[f64; 6]) -> [f64; 6] {
-    let limits = Config::avena().joints.map(|joint| joint.torque_max);
-    core::array::from_fn(|j| torque[j].abs() / limits[j])
+    shares_of(torque, &Config::avena())
+}
+
+/// The same of the arm of `config`.
+pub fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
+    core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
 
 /// The highest of all joints.
@@ -111,20 +118,9 @@ pub fn highest(shares: &[f64; 6]) -> f64 {
     shares.iter().fold(0.0, |most, share| share.max(most))
 }
 
-/// A pose inside the ranges, rad, in which standing with a payload at the flange (kg) takes less than `most` of each limit, and what it takes.
+/// [`ArmFile::pose`] of the default arm.
 pub fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
-    let config = Config::avena();
-    let model = loaded(Parameters::avena().model, mass);
-    loop {
-        let pose = core::array::from_fn(|j| {
-            let (low, high) = config.position_range(j);
-            random.between(low + 0.05, high - 0.05)
-        });
-        let standing = shares(&standing(&model, &pose));
-        if highest(&standing) < most {
-            return (pose, standing);
-        }
-    }
+    ArmFile::avena().pose(random, mass, most)
 }
 
 /// Torque that `model` needs to hold `q`, N·m.
@@ -146,6 +142,8 @@ pub struct Plant {
     pub speeds: [[f64; 10]; 6],
     /// Joints that a brake holds while their drive is not enabled.
     pub brakes: bool,
+    /// What the drives report for a speed, as a multiple of it.
+    pub speed_scale: f64,
     ticks: usize,
 }
 
@@ -183,8 +181,29 @@ impl Plant {
             push: [0.0; 6],
             speeds: [[0.0; 10]; 6],
             brakes: true,
+            speed_scale: 1.0,
             ticks: 0,
         }
+    }
+
+    /// The same of another arm, with this true model.
+    pub fn of(arm: &ArmFile, model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
+        Self {
+            dynamics: Dynamics::new(model, arm.config.gravity),
+            rotor: arm.config.joints.map(|j| j.rotor_inertia),
+            ..Self::new(model, friction, q)
+        }
+    }
+
+    /// A rig that holds another arm.
+    pub fn holding_arm(&mut self, arm: &ArmFile) -> Rig {
+        let mut rig = Rig::with_speeds(arm.config.clone());
+        rig.follow = false;
+        self.report(&mut rig);
+        arm.give(&mut rig);
+        self.run(&mut rig, 300);
+        assert_eq!(rig.state(), jtc_core::ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
+        rig
     }
 
     /// One millisecond of both. What the controller measures in a tick was so in the tick before, of whose torque it knows nothing.
@@ -212,7 +231,7 @@ impl Plant {
 
     /// A rig that holds this arm.
     pub fn holding(&mut self, config: Config) -> Rig {
-        let mut rig = Rig::new(config);
+        let mut rig = Rig::with_speeds(config);
         rig.follow = false;
         self.report(&mut rig);
         rig.defaults();
@@ -263,7 +282,7 @@ impl Plant {
         for j in 0..6 {
             let report = &mut rig.nodes[j].report;
             report.position = read(self.q[j]);
-            report.velocity = (self.speeds[j].iter().sum::<f64>() / 10.0).clamp(-2.0, 2.0);
+            report.velocity = (self.speed_scale * self.speeds[j].iter().sum::<f64>() / 10.0).clamp(-2.0, 2.0);
         }
     }
 }

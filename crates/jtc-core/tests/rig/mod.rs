@@ -1,5 +1,4 @@
 //! A bench without physics: nodes that answer at once and joints that are where the test puts them.
-#![allow(dead_code, unused_imports)]
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::recorder::{Block, Recorder};
@@ -8,8 +7,8 @@ use jtc_core::{
     TrajectoryState,
 };
 use jtc_wire::{
-    DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status,
-    UrgentCommand, UrgentCommands,
+    Answer as HostAnswer, DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, Info, LinkEvent,
+    RawPoint, Response, Status, UrgentCommand, UrgentCommands,
 };
 
 mod bodies;
@@ -80,7 +79,13 @@ impl Sent {
 }
 
 impl Rig {
+    /// The joints of the bench have no speed unless a test gives them one: it is not compared with their positions (J-35).
     pub fn new(config: Config) -> Self {
+        Self::with_speeds(Config { drive_speed_window_ms: 0, ..config })
+    }
+
+    /// For joints whose speeds fit their positions.
+    pub fn with_speeds(config: Config) -> Self {
         let last = Outputs {
             bus: None,
             safety_output: false,
@@ -232,6 +237,21 @@ impl Rig {
             }
         }
         panic!("no response to {frame_type:?}");
+    }
+
+    /// What GetInfo returns.
+    pub fn info(&mut self) -> Info {
+        self.send(FrameType::GetInfo, &[]);
+        for _ in 0..1000 {
+            self.tick();
+            if self.last.answer_line == Some(0)
+                && let Some(HostAnswer::Info(info)) =
+                    FrameRef::new_checked(self.controller.answer_frame()).and_then(HostAnswer::parse)
+            {
+                return info;
+            }
+        }
+        panic!("no Info");
     }
 
     pub fn exec(&mut self, command: ExecCommand) -> DataStatus {

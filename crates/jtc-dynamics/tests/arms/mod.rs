@@ -1,5 +1,4 @@
 //! Arms for the tests: the default one from its file, and random ones.
-#![allow(dead_code)]
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin};
 use proptest::prelude::*;
 

@@ -1,6 +1,7 @@
 //! Whether an arm is physical, complete, held by its drives and within what the controller takes: all that is wrong, not only the
 //! first.
 
+mod borne;
 mod limits;
 mod moving;
 mod stability;
@@ -19,7 +20,8 @@ use super::{Arm, PoseError, Source};
 /// One thing that was found out about an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
-    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `unit`, `pose` or `proposed`.
+    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
+    /// `unit`, `pose` or `proposed`.
     pub code: &'static str,
     /// How bad it is (a problem: the controller refuses it), what it is, its cause and what to do.
     #[serde(flatten)]
@@ -111,6 +113,9 @@ impl Arm {
         self.find_missing(&mut findings);
         let holding = if sound { self.find_holding(&mut findings) } else { Vec::new() };
         let rotor_margins = if sound { self.find_gains(&mut findings) } else { None };
+        if sound {
+            self.find_borne(&mut findings);
+        }
         self.find_poses(&mut findings);
         self.find_proposed(&mut findings);
         findings.sort_by_key(|f| f.finding.severity);

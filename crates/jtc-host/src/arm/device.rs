@@ -109,6 +109,7 @@ impl Arm {
                 position_error_max: own.position_error_max.min(device.position_error_max),
                 rotor_inertia: device.rotor_inertia,
                 torque_gain: device.torque_gain,
+                teach_damping: device.teach_damping,
             };
         }
         config

@@ -96,3 +96,47 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     assert!(coupled.up < margin.up || coupled.down <= margin.down, "{coupled:?}");
     assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
 }
+
+/// What a controller asks for has a reserve over what the loop needs, and not much more, whatever the delay is set to.
+#[test]
+fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
+    for delay in 0..=7u8 {
+        let position_ms = (f64::from(delay) + 0.5).max(1.0);
+        for share in [0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5] {
+            let kd = 70.0;
+            let gains = PidGains { kp: share * kd / (1e-3 * position_ms), kd, ..PidGains::default() };
+            let least = StableInertia::of(&gains, delay).expect("a stable range").least;
+            let reserve = jtc_core::inertia_needed(&gains, delay) / least;
+            let enough = if delay < 2 && share > 0.3 { 0.85 } else { 1.1 };
+            assert!((enough..1.7).contains(&reserve), "delay {delay}, share {share}: {reserve}");
+        }
+    }
+}
+
+/// Gain sets that are in use, on the arms they are for, in 300 poses with and without a load; and three and five times as much.
+#[test]
+fn j71_the_gains_in_use_are_taken_in_all_poses_with_all_loads() {
+    let plain = include_str!("../../tests/sessions/plain.urdf");
+    let plain = Arm::import_text(plain, &Default::default()).unwrap();
+    for (arm, factor, taken) in [
+        (Arm::avena(), 1.0, true),
+        (plain, 1.0, true),
+        (Arm::avena(), 3.0, false),
+        (Arm::avena(), 5.0, false),
+    ] {
+        let rotor = arm.joints.map(|j| j.rotor_inertia);
+        let gains = arm.pid.unwrap().map(|g| PidGains { kp: factor * g.kp, kd: factor * g.kd, ..g });
+        for mass in [0.0, 3.0, 5.0] {
+            let payload = jtc_dynamics::Payload { mass, ..jtc_dynamics::Payload::default() };
+            let dynamics = Dynamics::with_payload(&arm.model, [0.0; 3], &payload);
+            let borne = (0..300).all(|n| {
+                let felt = dynamics.felt_inertia(&pose(n, &arm.ranges()), &rotor);
+                felt.iter().zip(&gains).all(|(felt, gains)| *felt >= jtc_core::inertia_needed(gains, 2))
+            });
+            assert_eq!(borne, taken, "{}, times {factor}, {mass} kg", arm.name);
+        }
+        let felt = jtc_core::least_felt_inertia(&arm.model, &arm.config());
+        let borne = felt.iter().zip(&gains).all(|(felt, gains)| *felt >= jtc_core::inertia_needed(gains, 2));
+        assert_eq!(borne, taken, "{}, times {factor}: as the controller looks at it", arm.name);
+    }
+}

@@ -3,12 +3,14 @@
 //! They are there so that an arm can be simulated and brought up slowly; none of them is measured. An arm file marks them, and
 //! `jtc arm check` names them until somebody has replaced them.
 
+use jtc_core::settings::TOOL_SPEED;
 use jtc_core::{JOINTS, PidGains};
-use jtc_wire::{ACCELERATION_SCALE, Joint};
+use jtc_wire::{ACCELERATION_SCALE, Joint, SettingValue};
 
 use super::gains::{PROPOSED_RANGE, all_stable, is_heavy_enough, is_light_enough, mass_matrices};
 use super::source::JOINT_KEYS;
 use super::statics::{Inertia, Ranges, inertia, worst_gravity};
+use super::toml_form::TEACH_DAMPING_DEFAULT;
 use super::{Arm, Change, Source, Warning};
 
 /// How a number is proposed.
@@ -21,7 +23,7 @@ pub struct Rule {
 }
 
 /// The rules of all numbers that are proposed.
-pub const RULES: [Rule; 10] = [
+pub const RULES: [Rule; 11] = [
     Rule { name: "gravity_m_s2", rule: "9.81 m/s² down, z of the robot description being up" },
     Rule { name: "position_min_rad", rule: "the drives' working area" },
     Rule { name: "position_max_rad", rule: "the drives' working area" },
@@ -46,6 +48,11 @@ pub const RULES: [Rule; 10] = [
         rule: "torque_max_nm / (200 rad/s²), in the middle of geared drives that are known",
     },
     Rule {
+        name: "teach_damping_nm_s_rad",
+        rule: "torque_max_nm · 0.5 s/rad, at most 100/s times the least inertia over all poses (a fifth of the proposed rotor inertia, other \
+               joints free)",
+    },
+    Rule {
         name: "pid",
         rule: "with J, the least inertia over all poses (a fifth of the proposed rotor inertia, other joints free), and T, delay_ticks \
                and 3 ms: Kd = 0.7·J/T, less where joints move each other; Kp = 20/s·Kd; Ki = 2/s·Kp, at most a third of Kp·Kd over the \
@@ -57,6 +64,10 @@ pub const RULES: [Rule; 10] = [
     },
 ];
 
+/// Rate at which the damping of Teaching reduces a speed at most, 1/s (J-25).
+const TEACH_DAMPING_RATE: f64 = 100.0;
+/// Tool speed limit of an imported arm, m/s: that of robots next to people when they are set up (ISO 10218).
+const TOOL_SPEED_MAX: f64 = 0.25;
 /// Kd over the least inertia, times the age of the derivative (J-71).
 const DAMPING: f64 = 0.7;
 /// Half of the time over which the derivative is taken, and half of a tick for which a torque is held, s.
@@ -108,6 +119,7 @@ impl Arm {
             self.gravity = Some(gravity);
             self.sources.propose((None, "gravity_m_s2"));
         }
+        self.others.push(SettingValue { setting: TOOL_SPEED, joint: 0, value: TOOL_SPEED_MAX });
         let ranges = self.ranges();
         let worst = worst_gravity(&self.model, gravity, &ranges).map(|w| w.torque);
         self.propose_torques(&worst, &ranges);
@@ -124,7 +136,11 @@ impl Arm {
             self.pid = Some(self.proposed_gains(&ranges));
             Joint::ALL.into_iter().for_each(|joint| self.sources.fill_in((Some(joint), "pid")));
         }
+        let light = self.joints.map(|j| PROPOSED_RANGE.down * j.rotor_inertia);
+        let least = inertia(&self.model, &light, &ranges).map(|of| of.least);
         for (joint, to) in Joint::ALL.into_iter().zip(&mut self.joints) {
+            let bearable = TEACH_DAMPING_RATE * least[joint.index()];
+            to.teach_damping = rounded((TEACH_DAMPING_DEFAULT * to.torque_max).min(bearable), 3);
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];

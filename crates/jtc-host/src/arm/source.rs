@@ -37,7 +37,7 @@ pub type Key = (Option<Joint>, &'static str);
 /// Keys of the arm that can be proposed.
 pub(super) const ARM_KEYS: [&str; 1] = ["gravity_m_s2"];
 /// Keys of a joint that can be proposed, in the order of the file.
-pub(super) const JOINT_KEYS: [&str; 9] = [
+pub(super) const JOINT_KEYS: [&str; 10] = [
     "position_min_rad",
     "position_max_rad",
     "velocity_max_rad_s",
@@ -45,6 +45,7 @@ pub(super) const JOINT_KEYS: [&str; 9] = [
     "torque_max_nm",
     "position_error_max_rad",
     "rotor_inertia_kg_m2",
+    "teach_damping_nm_s_rad",
     "pid",
     "friction_polynomial",
 ];

@@ -12,7 +12,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 mod joint;
 
 use joint::JointForm;
-pub(super) use joint::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
+pub(super) use joint::{
+    ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, TEACH_DAMPING_DEFAULT, VELOCITY_DEFAULT,
+};
 
 use super::parameters::check_table;
 use super::source::{ARM_KEYS, JOINT_KEYS};
@@ -135,6 +137,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         position_error_max: 0.0,
         rotor_inertia: 0.0,
         torque_gain: 1.0,
+        teach_damping: 0.0,
     }; JOINTS];
     let mut sources = Sources::default();
     mark(&mut sources, None, &form.proposed)?;

@@ -83,6 +83,8 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
         "rotor_inertia_kg_m2" => Some(0.0),
         "torque_gain" => Some(1.0),
+        // It follows from the torque limit, which differs from joint to joint.
+        "teach_damping_nm_s_rad" => None,
         // An arm file has to give them.
         _ if row.of_joint() => None,
         _ => row.get(drives, 0),

@@ -3,10 +3,11 @@
 use jtc_core::ConfigError;
 use jtc_core::settings::SettingError;
 use jtc_plan::kinematics::PoseError;
-use jtc_wire::{Joint, Status};
+use jtc_wire::{Joint, Status, StopCause};
 
 use super::{CheckError, Error, ExtensionError, MotionError, StateError};
 use crate::check::{ProblemKind, Verdict};
+use crate::held_stop;
 use crate::plan::{ApproachError, MARGIN_PCT_MAX, PlanError};
 use crate::waypoints::WaypointError;
 use crate::{explain, words};
@@ -24,6 +25,8 @@ pub struct Facts {
     pub limit: Option<f64>,
     /// What usually causes it.
     pub cause: Option<&'static str>,
+    /// What was found first in a held stop (J-69), where the device tells it.
+    pub stop: Option<StopCause>,
 }
 
 /// The cause on the page of what a screen shows.
@@ -41,6 +44,7 @@ impl Facts {
             value: Some(worst.value),
             limit: Some(worst.limit),
             cause: cause(worst.kind.words()),
+            stop: None,
         }
     }
 
@@ -119,6 +123,21 @@ impl Facts {
         }
     }
 
+    /// Those of a held stop (J-69): what the device has found, or else what its status shows.
+    fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Self {
+        let Some(cause) = cause else { return Self::of_status(status) };
+        let (value, limit) = held_stop::figures(cause);
+        let joint = held_stop::joint(cause);
+        Self {
+            joint,
+            value: value.map(f64::from),
+            limit: limit.map(f64::from),
+            cause: held_stop::page(cause.kind).map(|page| page.cause),
+            stop: Some(*cause),
+            ..Self::default()
+        }
+    }
+
     /// Those of a setting that is not taken.
     fn of_setting(error: &SettingError) -> Self {
         let known =
@@ -172,15 +191,21 @@ impl Error {
                 | StateError::Timeout { status, .. }
                 | StateError::NotReady { status },
             ) => Facts::of_status(status),
-            Self::State(StateError::Absent { joints }) => {
+            Self::State(StateError::Absent { joints } | StateError::EncoderJumped { joints }) => {
                 Facts { joint: joints.first().copied(), ..Facts::default() }
             }
             Self::State(StateError::NotMeasured { joint }) => {
                 Facts { joint: Some(*joint), ..Facts::default() }
             }
-            Self::Motion(
-                MotionError::RunFault { point, status } | MotionError::HeldStop { point, status, .. },
-            ) => Facts { point: Some(*point), ..Facts::of_status(status) },
+            Self::State(StateError::HeldStop { status, cause }) => {
+                Facts::of_held_stop(status, cause.as_ref())
+            }
+            Self::Motion(MotionError::HeldStop { point, status, cause, .. }) => {
+                Facts { point: Some(*point), ..Facts::of_held_stop(status, cause.as_ref()) }
+            }
+            Self::Motion(MotionError::RunFault { point, status }) => {
+                Facts { point: Some(*point), ..Facts::of_status(status) }
+            }
             Self::Motion(MotionError::LinkLost { last: Some(last), .. }) if last.is_executing() => {
                 Facts { point: Some(last.point), ..Facts::default() }
             }

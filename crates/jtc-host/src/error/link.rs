@@ -103,8 +103,13 @@ impl Diagnose for LinkError {
                 let next = match request {
                     FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
                     FrameType::ArmModel | FrameType::ArmModelUseDefault if *code == DataStatus::IncorrectValue => Some(
-                        "a number is beyond its bounds (`jtc arm check FILE`), or a joint cannot hold this arm where it stands, with its \
-                         payload: `jtc payload show`, `jtc payload clear`",
+                        "a number is beyond its bounds, or a joint of this arm is too light for the gains that the controller has (`jtc arm \
+                         check FILE`), or a joint cannot hold this arm where it stands, with its payload: `jtc payload show`, `jtc payload \
+                         clear`",
+                    ),
+                    FrameType::PidParam | FrameType::PidParamUseDefault if *code == DataStatus::IncorrectValue => Some(
+                        "a gain is beyond its bounds, or a joint is too light for it (`jtc arm check FILE`); while the arm is held, also a Kp \
+                         that hardly holds it, and an integral that cannot hold any more what it holds",
                     ),
                     FrameType::ClearCurrentErrors | FrameType::ClearOccurredErrors
                         if *code == DataStatus::NotAllowed =>

@@ -21,7 +21,6 @@ pub(crate) use link::accepted;
 pub use motion::MotionError;
 pub use parameters::ParametersError;
 pub use state::StateError;
-pub(crate) use state::without_held_stop;
 pub use upload::UploadError;
 
 use crate::arm::ParameterError;

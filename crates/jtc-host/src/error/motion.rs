@@ -1,11 +1,11 @@
 //! Errors of an execution: before it begins, and on the way.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
+use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectoryState};
 
 use super::LinkError;
 use crate::plan::PlanError;
-use crate::words;
+use crate::{held_stop, words};
 
 /// Why a motion did not begin, or did not end as asked for.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ pub enum MotionError {
         status: Box<Status>,
     },
     /// The controller stopped the motion, and holds the arm (J-69).
-    #[error("the controller stopped the motion at point {point} ({:.3} s) and holds the arm: {}", f64::from(*point) * 1e-3, why_held(before, status))]
+    #[error("the controller stopped the motion at point {point} ({:.3} s) and holds the arm: {}", f64::from(*point) * 1e-3, why_held(before, status, cause.as_ref()))]
     HeldStop {
         /// Index of the 1 ms point where it is paused.
         point: u32,
@@ -50,6 +50,8 @@ pub enum MotionError {
         before: [u16; 6],
         /// The status with the errors.
         status: Box<Status>,
+        /// What was found first, with its value and limit, where the device tells it.
+        cause: Option<StopCause>,
     },
     /// The link was lost while the arm moves, or may move.
     #[error("{source}. {}", where_the_arm_is(last.as_deref(), *stop_sent))]
@@ -64,8 +66,26 @@ pub enum MotionError {
 }
 
 /// Why the arm is held, in one line; where that is not shown any more, what has occurred since.
-fn why_held(before: &[u16; 6], status: &Status) -> String {
-    if status.is_held_stop() { words::held_stop(status) } else { words::occurred_since(before, status) }
+fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
+    if status.is_held_stop() || cause.is_some() {
+        words::why_held(status, cause)
+    } else {
+        words::occurred_since(before, status)
+    }
+}
+
+/// What leads on from a held stop in a motion.
+fn after_held_stop(cause: Option<&StopCause>) -> String {
+    let remedy = match cause.map(|cause| cause.kind) {
+        None => "remove what the arm met, or give its payload".to_owned(),
+        // No trajectory goes on before the drive was reset.
+        Some(StopKind::EncoderJump) => return held_stop::AFTER_ENCODER_JUMP.to_owned(),
+        Some(kind) => held_stop::remedy(kind),
+    };
+    format!(
+        "{remedy}; then `jtc clear`. `jtc traj resume` goes on if each joint still stands within 0.02 rad of the path; otherwise \
+         `jtc traj stop`, then `jtc traj run FILE --approach`"
+    )
 }
 
 /// What is known about the motion when the link is gone.
@@ -102,6 +122,9 @@ fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
 impl Diagnose for MotionError {
     fn diagnosis(&self) -> Diagnosis {
         let (kind, code, next) = match self {
+            Self::HeldStop { cause, .. } => {
+                return Diagnosis::new(ErrorKind::Fault, "held-stop", after_held_stop(cause.as_ref()));
+            }
             Self::NotUploaded => (
                 ErrorKind::Refused,
                 "not-uploaded",
@@ -125,12 +148,6 @@ impl Diagnose for MotionError {
                 ErrorKind::Fault,
                 "run-fault",
                 "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos",
-            ),
-            Self::HeldStop { .. } => (
-                ErrorKind::Fault,
-                "held-stop",
-                "remove what the arm met, or give its payload; then `jtc clear`. `jtc traj resume` goes on if each joint still stands within \
-                 0.02 rad of the path; otherwise `jtc traj stop`, then `jtc traj run FILE --approach`",
             ),
             Self::LinkLost { .. } => (
                 ErrorKind::NoLink,

@@ -1,9 +1,9 @@
 //! Errors of waiting for a state.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use jtc_wire::{Code, ControllerState, Joint, Status};
+use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
 
-use crate::words;
+use crate::{held_stop, words};
 
 /// Why the controller did not come to the state that was waited for.
 #[derive(Debug, thiserror::Error)]
@@ -16,10 +16,12 @@ pub enum StateError {
         status: Box<Status>,
     },
     /// The arm is in a held stop (J-69): it is held, and nothing moves until the cause is cleared.
-    #[error("the arm is in a held stop: {}", words::held_stop(status))]
+    #[error("the arm is in a held stop: {}", words::why_held(status, cause.as_ref()))]
     HeldStop {
         /// The status with the causes.
         status: Box<Status>,
+        /// What was found first, with its value and limit, where the device tells it.
+        cause: Option<StopCause>,
     },
     /// A state was not reached.
     #[error("{what} not reached within {waited_s:.1} s: {}", words::waiting_for(status))]
@@ -36,6 +38,16 @@ pub enum StateError {
     NotReady {
         /// The status of then.
         status: Box<Status>,
+    },
+    /// The two encoders of joints do not fit (J-35): one has jumped, or the speed has another scale. No trajectory is executed until the
+    /// drives have been configured again.
+    #[error(
+        "{}: the position is not to be trusted, because the encoder has jumped or its speed does not fit; no trajectory is executed until its drive was reset",
+        words::joints(joints)
+    )]
+    EncoderJumped {
+        /// Which.
+        joints: Vec<Joint>,
     },
     /// The arm moves, and a pose is where it stands.
     #[error("{what}, and a pose is where the arm stands; nothing was saved")]
@@ -75,11 +87,6 @@ pub enum StateError {
     },
 }
 
-/// Fails where the arm is in a held stop (J-69).
-pub(crate) fn without_held_stop(status: &Status) -> Result<(), StateError> {
-    if status.is_held_stop() { Err(StateError::HeldStop { status: Box::new(*status) }) } else { Ok(()) }
-}
-
 impl Diagnose for StateError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
@@ -88,8 +95,11 @@ impl Diagnose for StateError {
                 "device-error",
                 "`jtc recover` leads back to HoldPos, `jtc explain CODE` explains each error",
             ),
-            Self::HeldStop { status } => {
-                Diagnosis::new(ErrorKind::Fault, "held-stop", words::next_step(status))
+            Self::HeldStop { status, cause } => {
+                Diagnosis::new(ErrorKind::Fault, "held-stop", held_stop::next_step(status, cause.as_ref()))
+            }
+            Self::EncoderJumped { .. } => {
+                Diagnosis::new(ErrorKind::Fault, "encoder-jumped", held_stop::AFTER_ENCODER_JUMP)
             }
             Self::Timeout { status, .. } => {
                 Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))

@@ -4,8 +4,9 @@ mod check;
 mod controller;
 mod link;
 mod nodes;
+mod stops;
 
-use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, TrajectoryState};
+use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKind, TrajectoryState};
 
 use crate::check::ProblemKind;
 use crate::words;
@@ -68,6 +69,8 @@ families! {
     Missing "missing", "word of missing parameters";
     /// Kinds of what the check of a trajectory finds.
     Check "check", "kind of a problem of a trajectory";
+    /// Kinds of what ends in a held stop.
+    Stop "stop", "cause of a held stop";
 }
 
 impl Family {
@@ -149,7 +152,7 @@ const fn page(family: Family, code: u32, name: &'static str, texts: [&'static st
 /// All pages.
 pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
     let own = controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES);
-    own.chain(check::MISSING).chain(check::FOUND)
+    own.chain(check::MISSING).chain(check::FOUND).chain(stops::HELD_STOP).chain(stops::CAUSES)
 }
 
 /// The page with this name.
@@ -188,6 +191,7 @@ fn own_words(page: &Page) -> Option<String> {
         Family::Frame => FrameStatus::from_byte(code).map(|code| words::frame_status(code).to_owned()),
         Family::Missing => at(&w::JTC_INIT),
         Family::Check => ProblemKind::ALL.get(page.code as usize).map(|kind| kind.words().to_owned()),
+        Family::Stop => StopKind::from_byte(code).map(|kind| kind.name().to_owned()),
     }
 }
 
@@ -205,6 +209,10 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
+    // A whole family, also one whose key is a word on a screen.
+    if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
+        return by_name_or_number(query);
+    }
     let as_shown = letters(query);
     let on_screen = |fits: fn(&str, &str) -> bool| -> Vec<&'static Page> {
         pages().filter(|p| shown(p).iter().any(|text| fits(&letters(text), &as_shown))).collect()
@@ -280,6 +288,10 @@ mod tests {
         assert_eq!(find("node-state:255")[0].name, "node-fault");
         assert!(find("friction table").iter().any(|p| p.family == Family::Joint));
         assert!(find("tes:").len() >= 5);
+        assert_eq!(find("stop:").len(), 1 + StopKind::ALL.len());
+        assert_eq!([find("held-stop"), find("held stop")].map(|found| found.len()), [1, 1]);
+        assert_eq!(find("encoder-jumped"), find("encoder jump"));
+        assert_eq!(find("stop:9")[0].name, "encoder-jumped");
         assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
     }
 
@@ -313,6 +325,9 @@ mod tests {
             // As JSON names it.
             let key = serde_json::to_value(kind).unwrap().as_str().unwrap().to_owned();
             has(&key, Family::Check, kind as usize);
+        }
+        for kind in StopKind::ALL {
+            has(kind.name(), Family::Stop, kind as usize);
         }
         for (bit, name) in w::JTC_INIT.iter().enumerate() {
             has(name, Family::Missing, bit);
@@ -363,6 +378,8 @@ mod tests {
         assert_eq!(count(Family::Tes), TrajectoryState::ALL.len());
         assert_eq!(count(Family::Missing), w::JTC_INIT.len());
         assert_eq!(count(Family::Check), ProblemKind::ALL.len());
+        // The held stop itself has a page, too.
+        assert_eq!(count(Family::Stop), 1 + StopKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
         for (i, p) in pages().enumerate() {
             assert!(

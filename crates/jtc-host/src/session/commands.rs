@@ -8,7 +8,7 @@ use jtc_wire::{
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
-use crate::error::{Error, LinkError, MotionError, StateError, accepted, without_held_stop};
+use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::port::Port;
 use crate::words;
 
@@ -171,7 +171,7 @@ impl<P: Port> Session<P> {
         let status = self.wait_for("teaching", TEACHING, |s| {
             s.state.is_in(&[ControllerState::Teaching, ControllerState::Error]) || ended()
         })?;
-        let taught = without_error(status)?.state == ControllerState::Teaching;
+        let taught = self.without_error(status)?.state == ControllerState::Teaching;
         if taught && !ended() { Ok(()) } else { Err(Error::Cancelled) }
     }
 
@@ -235,7 +235,8 @@ impl<P: Port> Session<P> {
     /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
-        let status = without_error(self.fresh_status()?)?;
+        let status = self.fresh_status()?;
+        let status = self.without_error(status)?;
         if status.trajectory != TrajectoryState::Pause {
             return Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into());
         }
@@ -320,7 +321,7 @@ impl<P: Port> Session<P> {
         let status = self.wait_for("HoldPos", timeout, |s| {
             s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error])
         })?;
-        without_error(status)
+        self.without_error(status)
     }
 
     /// Waits until the controller holds the arm in HoldPos with every drive enabled, but those of joints that are set absent; an error at once when it reports errors. The
@@ -345,15 +346,15 @@ impl<P: Port> Session<P> {
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
             s.state == ControllerState::Error || ready(s) || ended()
         })?;
-        let status = without_error(status)?;
+        let status = self.without_error(status)?;
         if ready(&status) { Ok(status) } else { Err(Error::Cancelled) }
     }
-}
 
-fn without_error(status: Status) -> Result<Status, Error> {
-    without_held_stop(&status)?;
-    if status.state == ControllerState::Error {
-        return Err(StateError::Device { status: Box::new(status) }.into());
+    fn without_error(&mut self, status: Status) -> Result<Status, Error> {
+        self.without_held_stop(&status)?;
+        if status.state == ControllerState::Error {
+            return Err(StateError::Device { status: Box::new(status) }.into());
+        }
+        Ok(status)
     }
-    Ok(status)
 }

@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use jtc_core::{Config, settings};
 use jtc_wire::{
-    Answer, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, SET_VALUES_MAX, SettingValue, StoreState,
-    fixed, floats, set_settings,
+    Answer, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, Reactions, SET_VALUES_MAX, SettingValue,
+    Status, StopCause, StoreState, fixed, floats, set_settings,
 };
 
 use super::limit::Limit;
 use super::{Session, frame_type, type_byte};
 use crate::arm::Arm;
-use crate::error::{Error, ExtensionError, LinkError};
+use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
 /// A device reports every reason to a host that sent an extension request within the last 2 s (J-51): it is repeated in time.
@@ -47,6 +47,24 @@ impl<P: Port> Session<P> {
             Err(LinkError::NoExtension { .. }) => Ok(None),
             Err(error) => Err(error),
         }
+    }
+
+    /// What the device does about what it has found (J-69); `None` where it does not tell, or the line does not answer.
+    pub fn reactions(&mut self) -> Option<Reactions> {
+        self.info().ok().flatten()?.reactions
+    }
+
+    /// What the device has found when it held the arm last (J-69); `None` where it does not tell, or the line does not answer.
+    pub fn stop_cause(&mut self) -> Option<StopCause> {
+        self.reactions()?.stop.map(|(cause, _)| cause)
+    }
+
+    /// Fails where the arm is in a held stop (J-69).
+    pub(super) fn without_held_stop(&mut self, status: &Status) -> Result<(), Error> {
+        if !status.is_held_stop() {
+            return Ok(());
+        }
+        Err(StateError::HeldStop { status: Box::new(*status), cause: self.stop_cause() }.into())
     }
 
     /// Asks the device who it is where that was not done of late: only then it reports each reason of a refusal (J-51).

@@ -86,7 +86,8 @@ impl<P: Port> Session<P> {
             let ended = status.trajectory.is_in(&[TrajectoryState::Stop, TrajectoryState::Finish]);
             if status.trajectory == TrajectoryState::Pause && held || begun && ended && status.is_held_stop()
             {
-                return Err(MotionError::HeldStop { point, before, status: Box::new(status) }.into());
+                let cause = self.stop_cause();
+                return Err(MotionError::HeldStop { point, before, status: Box::new(status), cause }.into());
             }
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),

@@ -3,7 +3,7 @@ use jtc_wire::{ControllerState, Name, SettingValue};
 
 use super::{PushReport, Session};
 use crate::arm::{Arm, ParameterSet};
-use crate::error::{Error, ExtensionError};
+use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
 /// What a device has got of an arm.
@@ -43,6 +43,7 @@ impl<P: Port> Session<P> {
         mut done: impl FnMut(ArmPart<'_>),
     ) -> Result<Vec<PushReport>, Error> {
         let (set, hash) = whole(arm)?;
+        self.withdraw_arm()?;
         self.push_settings(arm, &ended, &mut done)?;
         let pushed = self.push_until(&set, &ended, |report| done(ArmPart::Parameter(report)))?;
         self.has_arm(arm, hash)?;
@@ -82,21 +83,33 @@ impl<P: Port> Session<P> {
         if !state.is_in(&[ControllerState::Init, ControllerState::Error]) {
             return Err(ExtensionError::Powered { state }.into());
         }
-        // In Error nothing that is given powers the arm.
-        let withdraw =
-            |session: &mut Self| if state == ControllerState::Init { session.disable() } else { Ok(()) };
         let last = ParameterSet { pid: set.pid, ..ParameterSet::default() };
         let first = ParameterSet { pid: None, ..set };
-        withdraw(self)?;
+        self.withdraw_arm()?;
         self.push_settings(arm, &ended, &mut done)?;
         let mut pushed = self.push_until(&first, &ended, |report| done(ArmPart::Parameter(report)))?;
-        withdraw(self)?;
+        self.withdraw_arm()?;
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
         // As after a start: what is stored is in use when a host asks for it, all of it.
-        withdraw(self)?;
+        self.withdraw_arm()?;
         Ok((pushed, number))
+    }
+
+    /// Without torque, the device forgets its arm: parts of another one do not go with it (J-71).
+    fn withdraw_arm(&mut self) -> Result<(), Error> {
+        let state = self.fresh_status()?.state;
+        if state == ControllerState::Init {
+            self.disable()?;
+        } else if state == ControllerState::Error {
+            match self.disable() {
+                // Older firmware does not do that in Error, and takes each part by itself.
+                Err(LinkError::Refused { .. }) => {}
+                done => done?,
+            }
+        }
+        Ok(())
     }
 
     /// Settings and name, where they differ.

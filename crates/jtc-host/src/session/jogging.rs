@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Status, TrajectoryState};
 
 use super::Session;
-use crate::error::{Error, LinkError, StateError, without_held_stop};
+use crate::error::{Error, LinkError, StateError};
 use crate::port::halt::Halt;
 use crate::port::{Port, Standstill};
 
@@ -36,7 +36,9 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            self.last().map_or(Ok(()), without_held_stop)?;
+            if let Some(status) = self.last().copied() {
+                self.without_held_stop(&status)?;
+            }
             match self.jog(&[0.0; JOINTS]) {
                 Err(Error::Link(LinkError::Refused {
                     code: DataStatus::NotAllowed,
@@ -92,7 +94,7 @@ impl<P: Port> Session<P> {
             let late = self.now() > end;
             if late || standstill.is_reached() {
                 // A load may sink for longer than that; the controller has it.
-                without_held_stop(&status)?;
+                self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {
                 return Ok(Some(status));

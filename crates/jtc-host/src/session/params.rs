@@ -25,6 +25,9 @@ pub struct PushReport {
 impl<P: Port> Session<P> {
     /// Sends what `set` has, after all of it was checked; `done` is called after each.
     ///
+    /// Gains that are given while the arm is held are on trial for two seconds: the controller takes them back if the arm does not stand
+    /// them, and holds it in a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
+    ///
     /// # Errors
     ///
     /// [`ParametersError::Value`] before anything is sent, for numbers that no frame carries or that are not physical;

@@ -5,9 +5,9 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, Status};
 
 use super::Session;
-use crate::error::{Error, StateError, without_held_stop};
+use crate::error::{Error, StateError};
 use crate::port::Port;
-use crate::words;
+use crate::{held_stop, words};
 
 /// How long the drives may take: 4 s for their first enable.
 pub const BRING_UP: Duration = Duration::from_secs(15);
@@ -18,7 +18,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] where the cause of one is not cleared yet, [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent,
+    /// [`StateError::HeldStop`] where the cause of one is not cleared yet, [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent, [`StateError::EncoderJumped`] where an encoder has jumped,
     /// [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns true; those of the line.
     pub fn ready_to_move(
         &mut self,
@@ -37,13 +37,18 @@ impl<P: Port> Session<P> {
             }
         }
         let mut status = unless_ended(status)?;
-        without_held_stop(&status)?;
+        self.without_held_stop(&status)?;
         if status.state != ControllerState::HoldPos {
             return Err(StateError::NotReady { status: Box::new(status) }.into());
         }
         let joints = words::absent(&status);
         if !joints.is_empty() {
             return Err(StateError::Absent { joints }.into());
+        }
+        let jumped = self.info()?.and_then(|info| info.reactions).map_or(0, |reactions| reactions.jumped);
+        let joints = held_stop::joints(jumped);
+        if !joints.is_empty() {
+            return Err(StateError::EncoderJumped { joints }.into());
         }
         if !words::is_held(&status) {
             waits("all drives are enabled");

@@ -12,7 +12,7 @@ pub use source::ParameterSource;
 pub use step::RecoverStep;
 
 use super::Session;
-use crate::error::{Error, LinkError, StateError, without_held_stop};
+use crate::error::{Error, LinkError, StateError};
 use crate::port::Port;
 use crate::words;
 
@@ -169,7 +169,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 }
                 Some(ControllerState::HoldPos) => {
                     if self.held_clears >= HELD_CLEARS {
-                        without_held_stop(&status)?;
+                        self.session.without_held_stop(&status)?;
                     }
                     self.held_clears += 1;
                     self.clear(0)?;

@@ -11,7 +11,7 @@ use jtc_host::{
 };
 use jtc_sim::FaultKind;
 
-use crate::{Sim, fail, session};
+use super::{Sim, fail, session};
 
 /// In HoldPos at the zero pose, with the default parameters.
 fn ready() -> Sim {
@@ -23,7 +23,7 @@ fn ready() -> Sim {
 }
 
 fn motion(to: f64) -> Trajectory {
-    crate::motion(to, 60.0)
+    super::motion(to, 60.0)
 }
 
 fn check(trajectory: &Trajectory) -> Result<CheckedTrajectory, CheckError> {

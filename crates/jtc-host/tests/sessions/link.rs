@@ -15,7 +15,7 @@ use jtc_host::{
 };
 use jtc_sim::{Fault, FaultKind, Trigger};
 
-use crate::{Sim, inject, motion, ready, session};
+use super::{Sim, inject, motion, ready, session};
 
 /// There and back between two poses and then at rest, `points` in all.
 fn trajectory(points: usize) -> Trajectory {
@@ -245,7 +245,14 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.code(), error.kind()), ("held-stop", ErrorKind::Fault));
     let text = error.to_string();
-    assert!(text.contains("holds the arm: joint 5: torque over limit"), "{text}");
+    assert!(text.contains("holds the arm: joint 5 was pushed: the controller held "), "{text}");
+    let facts = error.facts();
+    let limit = 0.3 * 40.0;
+    assert_eq!(
+        (facts.joint, facts.limit.map(|found| (found - limit).abs() < 1e-3)),
+        (Joint::from_number(5), Some(true))
+    );
+    assert!(facts.value.is_some_and(|value| value.abs() > limit), "{facts:?}");
     assert!(error.hint().contains("jtc clear") && error.hint().contains("jtc traj resume"));
     s.pass(Duration::from_secs(2)).unwrap();
     let held = s.fresh_status().unwrap();
@@ -265,6 +272,22 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     s.clear(true, 0).unwrap();
     let cleared = s.fresh_status().unwrap();
     assert!(!cleared.is_held_stop() && cleared.errors == 0);
+}
+
+/// An encoder that jumps holds the arm; until its drive is reset nothing is executed, and that is the reason given.
+#[test]
+fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
+    let mut s = ready(None);
+    s.ready_to_move(|_| (), || false).unwrap();
+    inject(&mut s, FaultKind::EncoderJump { joint: Joint::ALL[2], rad: 0.02 }, Trigger::At(0), 60_000);
+    s.pass(Duration::from_secs(1)).unwrap();
+    let error = s.ready_to_move(|_| (), || false).unwrap_err();
+    assert_eq!((error.code(), error.kind()), ("held-stop", ErrorKind::Fault));
+    assert!(error.to_string().contains("the encoder of joint 3 jumped by 0.02"), "{error}");
+    s.clear(true, 0).unwrap();
+    let error = s.ready_to_move(|_| (), || false).unwrap_err();
+    assert_eq!((error.code(), error.facts().joint), ("encoder-jumped", Joint::from_number(3)));
+    assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
 /// An arm that gives way when nobody waits for it any more is nobody's wish.

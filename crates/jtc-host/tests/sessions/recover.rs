@@ -8,7 +8,7 @@ use jtc_host::session::{Flow, ParameterSource, RecoverStep};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError};
 use jtc_sim::FaultKind;
 
-use crate::{Sim, fail, motion, ready, session};
+use super::{Sim, fail, motion, ready, session};
 
 /// On a path of some seconds, from HoldPos.
 fn move_arm(s: &mut Sim) {

@@ -1,6 +1,5 @@
 //! Random arms and waypoints, and a judge of motions that knows nothing of how they are made: it samples positions and takes
 //! differences.
-#![allow(dead_code)]
 
 use std::fmt::Write as _;
 

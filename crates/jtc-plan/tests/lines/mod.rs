@@ -1,5 +1,4 @@
 //! Vectors and poses for the tests of lines.
-#![allow(dead_code)]
 use std::f64::consts::PI;
 
 use jtc_dynamics::{JOINTS, Pose};

@@ -1,5 +1,4 @@
 //! Arms for the tests: the default one, and others by published Denavit-Hartenberg parameters.
-#![allow(dead_code)]
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use jtc_core::{Config, Parameters};

@@ -1,6 +1,7 @@
 //! Who a device is, and what it runs (J-52).
 use core::fmt;
 
+use super::reactions::{REACTIONS_LEN, Reactions};
 use super::{ANSWER_MAX, EXTENSION_VERSION, LogState, NAME_LEN, Name};
 use crate::bits::missing_parameter;
 use crate::code::codes;
@@ -10,7 +11,7 @@ use crate::words::{self, Bits};
 /// Least bytes of an [`Info`]; later versions are longer.
 pub const INFO_LEN: usize = 136;
 /// Bytes of an [`Info`] as this version writes it.
-pub const INFO_WRITTEN: usize = 144;
+pub const INFO_WRITTEN: usize = 168;
 /// Board of a simulator: a device whose drives are simulated (J-52).
 pub const SIMULATOR: &str = "simulator";
 /// Bytes of the firmware's version, and of its revision.
@@ -41,6 +42,8 @@ mod field {
     // Added since (J-67).
     pub const PROGRAM_BYTES: Range<usize> = 136..140;
     pub const PROGRAM_CRC: Range<usize> = 140..144;
+    // Added since (J-69).
+    pub const REACTIONS: Range<usize> = 144..168;
 }
 
 /// What a device can do beyond version 1 of the extensions, one bit each.
@@ -57,6 +60,8 @@ pub mod capability {
     pub const PAYLOAD: u32 = 1 << 4;
     /// Flight recorder (J-56).
     pub const RECORDER: u32 = 1 << 5;
+    /// The cause of a held stop (J-69).
+    pub const STOP_CAUSE: u32 = 1 << 6;
 }
 
 codes! {
@@ -105,7 +110,7 @@ impl fmt::Display for Program {
 }
 
 /// What GetInfo returns (J-52).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
     /// Version of the extensions.
     pub version: u8,
@@ -143,6 +148,8 @@ pub struct Info {
     pub board: Name,
     /// Its program in flash; `None` where the device does not report it.
     pub program: Option<Program>,
+    /// Its reactions; `None` where the device does not report them (J-69).
+    pub reactions: Option<Reactions>,
 }
 
 impl Default for Info {
@@ -166,6 +173,7 @@ impl Default for Info {
             revision: [0; SHORT_TEXT],
             board: Name::default(),
             program: None,
+            reactions: None,
         }
     }
 }
@@ -232,6 +240,7 @@ impl Info {
             b[PROGRAM_BYTES].copy_from_slice(&program.bytes.to_be_bytes());
             b[PROGRAM_CRC].copy_from_slice(&program.crc32.to_be_bytes());
         }
+        b[REACTIONS].copy_from_slice(&self.reactions.unwrap_or_default().emit());
         b
     }
 
@@ -248,6 +257,8 @@ impl Info {
             b.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_be_bytes(*bytes))
         };
         let short = |at: core::ops::Range<usize>| b.get(at).and_then(|bytes| bytes.first_chunk()).copied();
+        let capabilities = word(CAPABILITIES);
+        let reactions = body.get(REACTIONS).and_then(<[u8]>::first_chunk::<REACTIONS_LEN>);
         Some(Self {
             version: b[VERSION],
             missing: b[MISSING],
@@ -257,7 +268,7 @@ impl Info {
             uptime_ms: long(UPTIME),
             lost_records: word(LOST),
             hash: long(HASH),
-            capabilities: word(CAPABILITIES),
+            capabilities,
             defaults_stored: b[STORED] != 0,
             store: StoreState::from_byte(b[STORE]).unwrap_or_default(),
             sequence: word(SEQUENCE),
@@ -267,7 +278,8 @@ impl Info {
             revision: short(REVISION)?,
             board: Name::parse(b.get(BOARD)?)?,
             program: Some(Program { bytes: word(PROGRAM_BYTES), crc32: word(PROGRAM_CRC) })
-                .filter(|program| body.len() >= INFO_WRITTEN && program.bytes != 0),
+                .filter(|program| body.len() >= PROGRAM_CRC.end && program.bytes != 0),
+            reactions: reactions.filter(|_| capabilities & capability::STOP_CAUSE != 0).map(Reactions::parse),
         })
     }
 }
@@ -302,11 +314,14 @@ impl fmt::Display for Info {
             if let Some(program) = self.program {
                 write!(f, "\n  program in flash: {program}")?;
             }
+            if let Some((cause, ms)) = self.reactions.and_then(|reactions| reactions.stop) {
+                write!(f, "\n  last held stop {:.1} s ago: {cause}", f64::from(ms) * 0.001)?;
+            }
             write!(f, "\n  capabilities: {:#x}", self.capabilities)?;
         }
         Ok(())
     }
 }
 
-const _: () = assert!(field::PROGRAM_CRC.end == INFO_WRITTEN && INFO_WRITTEN + FRAME_MIN <= ANSWER_MAX);
+const _: () = assert!(field::REACTIONS.end == INFO_WRITTEN && INFO_WRITTEN + FRAME_MIN <= ANSWER_MAX);
 const _: () = assert!(field::BOARD.end == INFO_LEN && field::NAME.end - field::NAME.start == NAME_LEN);

@@ -43,16 +43,54 @@ fn j67_an_info_of_before_has_no_program() {
     let program = Program { bytes: 0x0004_4328, crc32: 0x89AB_CDEF };
     let info = Info { program: Some(program), ..info() };
     let body = info.emit();
-    assert_eq!(body[136..], [0, 4, 0x43, 0x28, 0x89, 0xAB, 0xCD, 0xEF]);
+    assert_eq!(body[136..144], [0, 4, 0x43, 0x28, 0x89, 0xAB, 0xCD, 0xEF]);
     assert_eq!(Info::parse(&body), Some(info));
     let before = Info { program: None, ..info };
     assert_eq!(Info::parse(&before.emit()), Some(before));
     // A device of before sends 136 bytes. What ends within the new ones is no program either.
-    for end in INFO_LEN..INFO_WRITTEN {
+    for end in INFO_LEN..144 {
         assert_eq!(Info::parse(&body[..end]), Some(before), "{end}");
     }
     let shown = std::format!("{info:#}");
     assert!(shown.contains("program in flash: 279336 bytes, CRC-32 89abcdef"), "{shown}");
+}
+
+#[test]
+fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
+    let cause = StopCause { kind: StopKind::Push, joint: 2, value: -61.5, limit: 54.0 };
+    let reactions =
+        Reactions { stop: Some((cause, 1_250)), yields: 2, jumped: 8, rate: 0.5, held_back_ms: 70 };
+    let told = Info { capabilities: capability::STOP_CAUSE, reactions: Some(reactions), ..info() };
+    let body = told.emit();
+    let bytes =
+        [2, 2, 2, 8, 0xC2, 0x76, 0, 0, 0x42, 0x58, 0, 0, 0, 0, 0x04, 0xE2, 0x3F, 0, 0, 0, 0, 0, 0, 0x46];
+    assert_eq!(body[144..], bytes);
+    assert_eq!(Info::parse(&body), Some(told));
+    let shown = std::format!("{told:#}");
+    assert!(
+        shown.contains("last held stop 1.2 s ago: joint 2 was pushed: the controller held 61.5 N·m"),
+        "{shown}"
+    );
+    // A device that does not report it, and one that stopped for a cause that is not known here.
+    for end in INFO_LEN..INFO_WRITTEN {
+        assert_eq!(Info::parse(&body[..end]).unwrap().reactions, None, "{end}");
+    }
+    assert_eq!(Info::parse(&info().emit()), Some(info()));
+    let mut later = body;
+    later[144] = 200;
+    assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
+}
+
+/// Every cause says its joint or what happened, with value and limit in their unit.
+#[test]
+fn j69_every_cause_has_its_words() {
+    for kind in StopKind::ALL {
+        let text = std::format!("{}", StopCause { kind, joint: 4, value: 1.25, limit: 0.5 });
+        assert!(text.contains("joint 4") || kind == StopKind::Approach, "{text}");
+        assert!(kind.unit().is_empty() || kind == StopKind::Unstable || text.contains(kind.unit()), "{text}");
+        assert_eq!(StopKind::from_byte(kind as u8), Some(kind));
+    }
+    assert_eq!(StopKind::from_byte(0), None);
 }
 
 #[test]

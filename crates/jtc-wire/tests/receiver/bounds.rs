@@ -1,7 +1,7 @@
 //! The device's parser at its bounds: nothing pushed, a full buffer, the work of a call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
-use crate::{INTER_BYTE_TIMEOUT_US, ON, receiver};
+use super::{INTER_BYTE_TIMEOUT_US, ON, receiver};
 
 /// Time passes by itself: a call without bytes does not keep half a frame alive.
 #[test]

@@ -1,7 +1,7 @@
 //! Events that wait to be released, and what comes meanwhile.
 use jtc_wire::{Command, FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, Response};
 
-use crate::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
+use super::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
 
 #[test]
 fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {

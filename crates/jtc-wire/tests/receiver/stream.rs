@@ -4,7 +4,7 @@ use jtc_wire::{
     crc16, fixed,
 };
 
-use crate::{ON, receiver, segment};
+use super::{ON, receiver, segment};
 
 /// An event, short enough to write down.
 #[derive(Debug, PartialEq)]

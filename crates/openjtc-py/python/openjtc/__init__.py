@@ -35,7 +35,7 @@ from openjtc.payload import Payload
 from openjtc.planning import Planner
 from openjtc.results import Check, FlightLog, JointFigures, Plan, Run, Samples
 from openjtc.robot import Robot
-from openjtc.status import Finding, Status
+from openjtc.status import Finding, HeldStop, Status
 
 __all__ = [
     "Arm",
@@ -45,6 +45,7 @@ __all__ = [
     "FaultError",
     "Finding",
     "FlightLog",
+    "HeldStop",
     "HeldStopError",
     "JointFigures",
     "Motion",

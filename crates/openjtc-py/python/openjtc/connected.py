@@ -16,7 +16,7 @@ from openjtc._native import Arm, Trajectory
 from openjtc.errors import Error, UsageError
 from openjtc.payload import Payload
 from openjtc.results import FlightLog, Plan
-from openjtc.status import Finding, Status
+from openjtc.status import Finding, HeldStop, Status
 
 __all__ = ["Connected"]
 
@@ -83,7 +83,9 @@ class Connected:
     @property
     def status(self) -> Status:
         """A fresh status of the controller."""
-        return Status(**self._link.status())
+        status = self._link.status()
+        stop = status.pop("held_stop")
+        return Status(**status, held_stop=HeldStop(**stop) if stop else None)
 
     @property
     def position(self) -> Array:
@@ -100,7 +102,11 @@ class Connected:
 
     @property
     def info(self) -> dict[str, Any] | None:
-        """Who the controller is: board, firmware, arm, hash of its arm, boots, uptime (s); None for one without extensions."""
+        """Who the controller is: board, firmware, arm, hash of its arm, boots, uptime (s); None for one without extensions.
+
+        Under ``reactions``, None where it does not report them: ``last_held_stop``, joints that yield (``yields``) or whose encoder has
+        jumped (``encoder_jumped``), ``path_rate``, and for how long this run was held back (``held_back_s``).
+        """
         return self._link.info()
 
     def doctor(self) -> list[Finding]:

@@ -85,8 +85,39 @@ class FaultError(Error):
 class HeldStopError(FaultError):
     """The controller stopped the arm and holds it: it met something, or a load that its model lacks. Its code is ``held-stop``.
 
-    ``cause`` and ``joint`` name what the controller found. Nothing moves until ``robot.recover()``, which comes after a look at the arm.
+    ``text``, ``joint``, ``value`` and ``limit`` say what the controller found. Nothing moves until ``robot.recover()``, which comes after a
+    look at the arm.
+
+    Attributes:
+        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …; empty where the controller
+            does not tell it.
+        unit: Unit of ``value`` and ``limit``; empty where they have none.
+        text: What the controller found, in words; empty where it does not tell.
     """
+
+    def __init__(
+        self,
+        message: str,
+        code: str = "held-stop",
+        joint: int | None = None,
+        point: int | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        cause: str | None = None,
+        next: str = "",
+        board: int | None = None,
+        kind: str = "",
+        unit: str = "",
+        text: str = "",
+    ) -> None:
+        super().__init__(message, code, joint, point, value, limit, cause, next, board)
+        self.kind = kind
+        self.unit = unit
+        self.text = text
+
+    def __reduce__(self) -> tuple[type[Error], tuple[object, ...]]:
+        made, facts = super().__reduce__()
+        return (made, (*facts, self.kind, self.unit, self.text))
 
 
 class StoppedError(FaultError):

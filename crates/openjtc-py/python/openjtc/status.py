@@ -7,9 +7,38 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Finding", "Status"]
+__all__ = ["Finding", "HeldStop", "Status"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldStop:
+    """Why the controller holds the arm.
+
+    Attributes:
+        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …
+        number: Number of the kind, as Modbus has it.
+        code: Name of its page: ``jtc explain CODE``.
+        joint: Joint from 1 that the cause was found at first; None: at none in particular.
+        value: Value that was found; None where the kind has none.
+        limit: Limit of the value; None where there is none.
+        unit: Unit of value and limit; empty where they have none.
+        text: Cause in words.
+        remedy: What removes the cause.
+        ago_s: Time since the held stop began, s.
+    """
+
+    kind: str
+    number: int
+    code: str
+    joint: int | None
+    value: float | None
+    limit: float | None
+    unit: str
+    text: str
+    remedy: str
+    ago_s: float
 
 
 @dataclass(frozen=True)
@@ -29,6 +58,7 @@ class Status:
         warnings: What the drives warn of.
         waiting_for: What the controller does or waits for, in a line.
         next: What helps, or comes next.
+        held_stop: The held stop that the arm is in, with its cause; None: it is in none, or the controller does not tell.
     """
 
     state: str
@@ -43,6 +73,7 @@ class Status:
     warnings: list[str]
     waiting_for: str
     next: str
+    held_stop: HeldStop | None = None
 
 
 @dataclass(frozen=True)

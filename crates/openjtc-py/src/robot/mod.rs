@@ -303,12 +303,16 @@ impl Link {
                 && let Some(status) = *lock(&shared.status)
             {
                 self.worker.look_for_signals(py)?;
-                return questions::status(py, &status);
+                return questions::status(py, &status, None);
             }
             self.worker.pass(py, LOOK)?;
         }
-        let status = self.worker.call_always(py, |machine| Ok(machine.session.fresh_status()?))?;
-        questions::status(py, &status)
+        let (status, stop) = self.worker.call_always(py, |machine| {
+            let status = machine.session.fresh_status()?;
+            let reactions = if status.is_held_stop() { machine.session.reactions() } else { None };
+            Ok((status, reactions.and_then(|reactions| reactions.stop)))
+        })?;
+        questions::status(py, &status, stop)
     }
 
     /// Waits until the arm is held with all drives enabled, s at most.

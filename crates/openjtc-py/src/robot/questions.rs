@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jtc_core::{JOINTS, settings};
+use jtc_host::held_stop::{self, HeldStop, Reacting};
 use jtc_host::log::Account;
 use jtc_host::sample::is_measured;
 use jtc_host::session::ParameterSource;
 use jtc_host::{StateError, doctor, words};
 use jtc_sim::{HandPath, TypedEvent};
-use jtc_wire::{Joint, SettingValue, Status};
+use jtc_wire::{Joint, SettingValue, Status, StopCause};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -35,8 +36,13 @@ fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     }
 }
 
-/// A status as plain values; NaN where a joint does not report what it measures.
-pub fn status<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDict>> {
+/// A status as plain values; NaN where a joint does not report what it measures. `stop` is the held stop that the arm is in, where the
+/// controller has told it.
+pub fn status<'py>(
+    py: Python<'py>,
+    status: &Status,
+    stop: Option<(StopCause, u32)>,
+) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("state", status.state.name())?;
     all.set_item("trajectory", status.trajectory.name())?;
@@ -54,7 +60,9 @@ pub fn status<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDi
     all.set_item("errors", words::causes(status))?;
     all.set_item("warnings", words::warnings(status))?;
     all.set_item("waiting_for", words::waiting_for(status))?;
-    all.set_item("next", in_python(words::next_step(status)))?;
+    let cause = stop.as_ref().map(|(cause, _)| cause);
+    all.set_item("next", in_python(&held_stop::next_step(status, cause)))?;
+    all.set_item("held_stop", json::plain(py, &stop.map(|(cause, ago_ms)| HeldStop::new(&cause, ago_ms)))?)?;
     Ok(all)
 }
 
@@ -150,6 +158,7 @@ impl Link {
         all.set_item("boots", info.boots)?;
         all.set_item("uptime", info.uptime_ms as f64 * 1e-3)?;
         all.set_item("log", info.log.name())?;
+        all.set_item("reactions", json::plain(py, &Reacting::of(&info))?)?;
         Ok(Some(all))
     }
 
@@ -186,8 +195,12 @@ impl Link {
     /// What `jtc doctor` finds, the worst first.
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.call(py, |machine, asked| {
-            let seen = machine.session.examine_until(LOOK, || asked.is_halted())?;
+            let mut seen = machine.session.examine_until(LOOK, || asked.is_halted())?;
             asked.check()?;
+            // A stop and a jump of an encoder are under torque only.
+            if seen.status.as_ref().is_some_and(words::has_torque) {
+                seen.reactions = machine.session.reactions();
+            }
             Ok(doctor::findings(&seen))
         })?;
         Ok(json::plain(py, &found)?)

@@ -14,6 +14,7 @@ const STATUS_SCHEMA: &str = r#"{
     "trajectory": { "type": "string", "description": "What becomes of the trajectory" },
     "point": { "type": "integer", "description": "The 1 ms point that the controller is at" },
     "errors": { "type": "array", "items": { "type": "string" }, "description": "Errors now" },
+    "held_stop": { "type": "string", "description": "Cause of the held stop that the arm is in; empty where there is none" },
     "errors_occurred": { "type": "array", "items": { "type": "string" }, "description": "Errors since they were cleared" },
     "next": { "type": "string", "description": "What helps; empty where nothing is wrong" },
     "age_ms": { "type": "integer", "description": "Time since the controller reported that" },

@@ -315,13 +315,16 @@ impl Sender<'_> {
     }
 
     fn in_words(&self, age: Duration, status: &Status) -> Vec<u8> {
+        let stop = self.agent.jobs.stops.cause(status, self.agent.line.now());
+        let cause = stop.as_ref().map(|(cause, _)| cause);
         let words = json!({
             "state": status.state.name(),
             "trajectory": status.trajectory.name(),
             "point": status.point,
             "errors": words::causes(status),
+            "held_stop": cause.map(ToString::to_string).unwrap_or_default(),
             "errors_occurred": words::errors(status.occurred),
-            "next": words::next_step(status).replace('`', ""),
+            "next": jtc_host::held_stop::next_step(status, cause).replace('`', ""),
             "age_ms": age.as_millis() as u64,
             "commanded_by": self.agent.line.commander().unwrap_or_default(),
             "simulated": self.agent.simulated,

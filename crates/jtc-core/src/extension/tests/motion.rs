@@ -11,7 +11,7 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
         (ControllerState::Teaching, 0.0, false),
         (ControllerState::Init, 0.0, true),
         (ControllerState::Init, 0.1, true),
-        (ControllerState::Error, 0.0, false),
+        (ControllerState::Error, 0.1, true),
     ] {
         let mut bench = Bench::new();
         bench.use_defaults();
@@ -22,8 +22,13 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
         let all = missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL;
         assert_eq!(bench.controller.parameters.missing(), if taken { all } else { 0 });
         if taken {
+            let errors = state == ControllerState::Error;
+            if errors {
+                bench.controller.errors.raise_device();
+            }
             bench.controller.choose_state();
-            assert_eq!(bench.controller.state, ControllerState::Init);
+            let next = if errors { ControllerState::Error } else { ControllerState::Init };
+            assert_eq!(bench.controller.state, next);
         }
     }
     // What is jogged is not at rest.

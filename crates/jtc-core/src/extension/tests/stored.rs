@@ -84,7 +84,13 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
             let mut bench = Bench::new();
             let before = bench.info(0);
             if bench.controller.load_arm(&image) {
-                bench.use_defaults();
+                if bench.asks_for_defaults().contains(&DataStatus::IncorrectValue) {
+                    // Its joints are too light for its gains (J-71), and it is not held.
+                    let (own, config) = (&bench.controller.parameters, &bench.controller.config);
+                    assert!(own.gains_were_too_much(config), "byte {at}");
+                    assert_ne!(own.missing(), 0, "byte {at}");
+                    continue;
+                }
                 let info = bench.info(0);
                 // A value that is given twice, and left out elsewhere where it is the default, makes the same arm.
                 let same = bench.controller.config() == &Config::avena();

@@ -2,10 +2,10 @@
 use crate::DT;
 use crate::remembered::remembered;
 
-/// Answers that are looked at, and milliseconds over which a rate is taken at least.
+/// Answers that a rate is taken from, and milliseconds over which it is taken at least.
 const WINDOW: usize = 5;
 /// Slots of the ring: a power of two, so that an index needs no comparison.
-const SLOTS: usize = WINDOW.next_power_of_two();
+const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
 /// One over the time that it is taken over while no answer is lost, 1/s.
 const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
@@ -20,6 +20,12 @@ pub(super) struct Answered {
 }
 
 impl Answered {
+    /// Way to a younger one, rad; none at all where both are the same.
+    fn way_to(&self, now: &Self) -> f64 {
+        // Numbers so near to each other differ exactly.
+        f64::from(now.position as f32 - self.position as f32)
+    }
+
     /// Milliseconds after another one.
     fn since(&self, other: &Self) -> u32 {
         self.at_ms.wrapping_sub(other.at_ms)
@@ -35,50 +41,63 @@ pub(super) struct Rate {
     pub as_predicted: bool,
 }
 
+/// What is kept of an answer. A single number has a four hundredth of the step of a 16-bit encoder.
+#[derive(Clone, Copy, Debug, Default)]
+struct Kept {
+    /// rad.
+    position: f32,
+    /// When it came, ms.
+    at_ms: u32,
+}
+
 /// The last answers, in a ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
-    answers: [Answered; SLOTS],
+    answers: [Kept; SLOTS],
     /// Where the next one goes; it wraps around.
     next: u8,
-    /// How many there are, of those that are looked at.
-    known: u8,
+    /// How many answers before the newest came in turn, one in each millisecond: more than are kept, perhaps.
+    in_turn: u8,
     /// Which were about where they had been predicted; the newest is bit 0.
     as_predicted: u8,
 }
 
-remembered!(Answered { position, at_ms });
-remembered!(History { answers, next, known, as_predicted });
+remembered!(Kept { position, at_ms });
+remembered!(History { answers, next, in_turn, as_predicted });
 
 impl History {
-    /// Keeps an answer.
-    pub fn push(&mut self, answer: Answered, as_predicted: bool) {
-        self.answers[usize::from(self.next) % SLOTS] = answer;
-        self.next = self.next.wrapping_add(1);
-        self.known = (self.known + 1).min(WINDOW as u8);
-        self.as_predicted = self.as_predicted << 1 | u8::from(as_predicted);
+    /// Nothing is known but this answer.
+    pub fn of(answer: &Answered) -> Self {
+        let kept = Kept { position: answer.position as f32, at_ms: answer.at_ms };
+        Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// The rate from the youngest answer that is old enough to `now`; `None` when there is none.
-    pub fn rate_to(&self, now: &Answered) -> Option<Rate> {
+    /// Keeps an answer. Returns the rate from the youngest one that is old enough to it; `None` when there is none.
+    #[inline(always)]
+    pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
+        let turn = now.since(&self.nth(0)) == 1;
+        self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
         // Nearly always there is an answer in each millisecond, so that the oldest is old enough, and it alone.
-        let (oldest, next) = (self.nth(WINDOW - 1), self.nth(WINDOW - 2));
-        let calm =
-            self.known == WINDOW as u8 && now.since(oldest) == WINDOW_MS && now.since(next) < WINDOW_MS;
-        if !calm {
-            return self.rate_over_gaps(now);
-        }
-        let as_predicted = self.younger_as_predicted(WINDOW - 1);
-        Some(Rate { rad_s: (now.position - oldest.position) * PER_WINDOW, as_predicted })
+        let rate = if self.in_turn >= WINDOW as u8 {
+            let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
+            Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })
+        } else {
+            self.rate_over_gaps(now)
+        };
+        let kept = Kept { position: now.position as f32, at_ms: now.at_ms };
+        self.answers[usize::from(self.next) % SLOTS] = kept;
+        self.next = self.next.wrapping_add(1);
+        self.as_predicted = self.as_predicted << 1 | u8::from(as_predicted);
+        rate
     }
 
     /// The same where answers have been lost.
     #[cold]
     fn rate_over_gaps(&self, now: &Answered) -> Option<Rate> {
-        let n = (0..usize::from(self.known)).find(|&n| now.since(self.nth(n)) >= WINDOW_MS)?;
-        let way = now.position - self.nth(n).position;
-        let seconds = f64::from(now.since(self.nth(n))) * DT;
-        Some(Rate { rad_s: way / seconds, as_predicted: self.younger_as_predicted(n) })
+        let n = (0..WINDOW).find(|&n| now.since(&self.nth(n)) >= WINDOW_MS)?;
+        let from = self.nth(n);
+        let seconds = f64::from(now.since(&from)) * DT;
+        Some(Rate { rad_s: from.way_to(now) / seconds, as_predicted: self.younger_as_predicted(n) })
     }
 
     /// The `n` newest answers were about where they had been predicted.
@@ -87,9 +106,29 @@ impl History {
         self.as_predicted & younger == younger
     }
 
+    /// The position so many milliseconds before `now_ms`, rad, if an answer came in each millisecond since then, perhaps but the last.
+    pub fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
+        let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
+        let n = u32::from(ms).checked_sub(since_newest)?;
+        (since_newest <= 1 && n <= u32::from(self.in_turn).min(SLOTS as u32 - 1))
+            .then(|| self.nth(n as usize).position)
+    }
+
+    /// The last answer.
+    pub fn newest(&self) -> Answered {
+        self.nth(0)
+    }
+
+    /// The position of the answer that came at this time, rad, if it is kept.
+    pub fn at(&self, at_ms: u32) -> Option<f64> {
+        (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
+    }
+
     /// The answer before which `n` younger ones came.
-    fn nth(&self, n: usize) -> &Answered {
-        &self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS]
+    #[inline(always)]
+    fn nth(&self, n: usize) -> Answered {
+        let Kept { position, at_ms } = self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS];
+        Answered { position: position.into(), at_ms }
     }
 }
 
@@ -112,24 +151,28 @@ mod tests {
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),
             start in prop_oneof![Just(0), Just(u32::MAX - 9)],
         ) {
-            let mut history = History::default();
+            let mut history: Option<History> = None;
             let (mut all, mut at_ms): (Vec<(Answered, bool)>, u32) = (Vec::new(), start);
             for (gap, position, as_predicted) in answers {
                 at_ms = at_ms.wrapping_add(gap);
                 let now = Answered { position, at_ms };
                 let kept: Vec<_> = all.iter().rev().take(5).collect();
                 let from = kept.iter().position(|(answer, _)| at_ms.wrapping_sub(answer.at_ms) >= 5);
-                match (history.rate_to(&now), from) {
+                let as_predicted_now = as_predicted;
+                let rate = match &mut history {
+                    Some(history) => history.take(&now, as_predicted_now),
+                    None => history.insert(History::of(&now)).take(&now, as_predicted_now),
+                };
+                match (rate, from) {
                     (None, None) => {}
                     (Some(rate), Some(n)) => {
                         let before = &kept[n].0;
                         let seconds = f64::from(at_ms.wrapping_sub(before.at_ms)) * 0.001;
-                        prop_assert!((rate.rad_s - (position - before.position) / seconds).abs() < 1e-9);
+                        prop_assert!((rate.rad_s - (position - before.position) / seconds).abs() < 1e-4);
                         prop_assert_eq!(rate.as_predicted, kept[..n].iter().all(|(_, as_predicted)| *as_predicted));
                     }
                     (rate, from) => prop_assert!(false, "{rate:?}, but answer {from:?}"),
                 }
-                history.push(now, as_predicted);
                 all.push((now, as_predicted));
             }
         }

@@ -6,6 +6,8 @@ use super::*;
 mod late;
 
 const VELOCITY_MAX: f64 = 2.0;
+/// What the single numbers of the history make of a prediction, rad, or of a rate, rad/s.
+const ROUNDED: f64 = 1e-6;
 
 fn tick(answer: Option<f64>, velocity: f64) -> Tick {
     let answer = answer.map(|position| Reading { position, velocity });
@@ -17,6 +19,8 @@ fn tick(answer: Option<f64>, velocity: f64) -> Tick {
         commanded: velocity,
         elapsed_ms: 1,
         velocity_max: VELOCITY_MAX,
+        enabled: false,
+        joint: 0,
     }
 }
 
@@ -27,7 +31,7 @@ fn step(joint: &mut Measurement, tick: &Tick) -> bool {
         commanded: tick.commanded,
         commanded_way: tick.commanded * f64::from(ticks) * DT,
     };
-    joint.step(tick, past, &Config::avena())
+    joint.step(tick, past, &Config::avena()) == Outcome::Used
 }
 
 /// A joint that has moved at this velocity for a while; it is at 0 now.
@@ -45,7 +49,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
         let mut joint = moving(velocity);
         for k in 1..=4 {
             assert!(!step(&mut joint, &tick(None, velocity)));
-            assert!((joint.used().position - velocity * f64::from(k) * DT).abs() < 1e-12);
+            assert!((joint.used().position - velocity * f64::from(k) * DT).abs() < ROUNDED);
             assert_eq!(joint.used().velocity, velocity);
         }
     }
@@ -53,7 +57,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
     let mut joint = moving(0.4);
     let slower = Tick { commanded: 0.1, ..tick(None, 0.4) };
     step(&mut joint, &slower);
-    assert!((joint.used().position - 0.1 * DT).abs() < 1e-12);
+    assert!((joint.used().position - 0.1 * DT).abs() < ROUNDED);
     assert!((joint.used().velocity - 0.1).abs() < 1e-12);
 }
 
@@ -63,7 +67,7 @@ fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
     for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
         let mut joint = moving(velocity);
         step(&mut joint, &tick(None, velocity));
-        assert!((joint.used().position - carried * DT).abs() < 1e-12, "{:?}", joint.used());
+        assert!((joint.used().position - carried * DT).abs() < ROUNDED, "{:?}", joint.used());
     }
 }
 
@@ -98,7 +102,7 @@ fn j35_neither_position_nor_velocity_of_an_unusable_answer_is_used() {
     let mut joint = moving(0.2);
     let glitch = Tick { commanded: 0.2, ..tick(Some(0.05), 1.9) };
     assert!(!step(&mut joint, &glitch));
-    assert!((joint.used().position - 0.2 * DT).abs() < 1e-12 && joint.used().velocity == 0.2);
+    assert!((joint.used().position - 0.2 * DT).abs() < ROUNDED && joint.used().velocity == 0.2);
     joint.forget();
     assert!(step(&mut joint, &glitch), "after the error the next answer is taken as it is");
     assert_eq!(joint.used(), Reading { position: 0.05, velocity: 1.9 });
@@ -133,7 +137,7 @@ fn j63_the_return_of_the_answers_makes_no_step_and_ends_at_the_answer() {
 fn j63_a_long_tick_is_predicted_for_its_length() {
     let mut joint = moving(0.4);
     step(&mut joint, &Tick { elapsed_ms: 3, ..tick(None, 0.4) });
-    assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < 1e-12);
+    assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < ROUNDED);
 }
 
 /// A joint at `rate` that reports another velocity, until an answer comes `off` the way, `since` more go on from there, and the
@@ -172,7 +176,7 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
         (0.4, 0.5, 2.0 * unexpected, 6, 0.4),
     ] {
         let found = carried_after(rate, reported, off, since);
-        assert!((found - carried).abs() < 1e-9, "{rate} {reported} {off} {since}: {found}");
+        assert!((found - carried).abs() < ROUNDED, "{rate} {reported} {off} {since}: {found}");
     }
 }
 
@@ -209,7 +213,7 @@ fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
         let answer = Some(Reading { position: 0.3 * f64::from(k) * DT, velocity: 0.0 });
         step(&mut joint, &Tick { answer, ..tick(None, 0.0) });
     }
-    assert!((joint.speed() - 0.3).abs() < 1e-9);
+    assert!((joint.speed() - 0.3).abs() < ROUNDED);
 }
 
 /// The double pole's own decay, whatever the ticks are and wherever it is.

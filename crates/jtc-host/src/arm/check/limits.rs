@@ -38,11 +38,14 @@ impl Arm {
             if !(rotor >= 0.0 && rotor.is_finite()) {
                 fault("rotor_inertia_kg_m2", rotor, format!("{rotor} is negative or not finite"));
             }
-            let gain = limits.torque_gain;
-            if let Some(Setting { low, high, .. }) = settings::named("torque_gain")
-                && !(*low..=*high).contains(&gain)
+            for (key, value) in
+                [("torque_gain", limits.torque_gain), ("teach_damping_nm_s_rad", limits.teach_damping)]
             {
-                fault("torque_gain", gain, format!("{gain} is outside {low}..{high}"));
+                if let Some(Setting { low, high, .. }) = settings::named(key)
+                    && !(*low..=*high).contains(&value)
+                {
+                    fault(key, value, format!("{value} is outside {low}..{high}"));
+                }
             }
         }
         all

@@ -21,8 +21,8 @@ pub struct RotorMargins {
 }
 
 impl Arm {
-    /// Refuses gains with which the arm is not stable, as [`Arm::check`] does. Where gains or rotor inertias are not given, there is
-    /// nothing to compare.
+    /// Refuses gains with which the arm is not stable, and gains that a controller refuses with it (J-71), as [`Arm::check`] does. Where
+    /// gains are not given, there is nothing to compare.
     ///
     /// # Errors
     ///
@@ -31,6 +31,7 @@ impl Arm {
         let mut findings = Vec::new();
         if self.is_physical().is_ok() {
             self.find_gains(&mut findings);
+            self.find_borne(&mut findings);
         }
         match findings.into_iter().find(|found| found.finding.severity == Severity::Problem) {
             Some(ArmFinding { finding: Finding { what, why, next, .. }, .. }) => {

@@ -215,3 +215,40 @@ proptest! {
         }
     }
 }
+
+/// What a controller would refuse is refused here, with the joint and what it may have.
+#[test]
+fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
+    let mut arm = Arm::avena();
+    arm.pid.as_mut().unwrap()[0].kd = 170.0;
+    let findings = arm.check().findings;
+    let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
+    assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
+    // It is stable, with little reserve: that much the other check knows.
+    assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
+    assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
+    // Also where the rotors are not given, and nothing is known of stability.
+    let mut arm = Arm { rotors_given: [false; JOINTS], ..Arm::avena() };
+    arm.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 0.0);
+    assert!(arm.check_gains().is_ok());
+    arm.pid.as_mut().unwrap()[5].kd = 200.0;
+    assert!(arm.check_gains().is_err());
+}
+
+/// An integral that a heavy load makes too strong is warned of, and the advice helps.
+#[test]
+fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
+    let warned = |ki: f64| {
+        let mut arm = Arm::avena();
+        arm.pid.as_mut().unwrap()[1].ki = ki;
+        arm.check().findings.into_iter().find(|f| f.code == "damping")
+    };
+    assert_eq!(warned(14_000.0), None, "the shipped gains damp the arm with 5 kg");
+    let warning = warned(23_000.0).expect("a warning");
+    assert_eq!((warning.finding.severity, warning.value), (Severity::Warning, Some(80.0)));
+    assert!(warning.finding.what.contains(" kg at the flange"), "{}", warning.finding.what);
+    let advice: f64 =
+        warning.finding.next.split("Ki of ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert_eq!(warned(advice - 1.0), None, "{}", warning.finding.next);
+    assert!(warned(advice + 100.0).is_some());
+}

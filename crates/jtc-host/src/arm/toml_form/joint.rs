@@ -12,6 +12,9 @@ use crate::file::{FileError, Place};
 pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
 pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
 pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
+/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit: as much as three tenths of the limit, the most that is found as a load,
+/// need at 0.6 rad/s.
+pub(in crate::arm) const TEACH_DAMPING_DEFAULT: f64 = 0.5;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -30,6 +33,7 @@ pub(super) struct JointForm {
     pub(super) rotor_inertia_kg_m2: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) torque_gain: Option<f64>,
+    pub(super) teach_damping_nm_s_rad: Option<f64>,
     pub(super) pid: Option<PidForm>,
     pub(super) friction_polynomial: Option<Vec<f64>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -66,9 +70,15 @@ impl JointForm {
         let need = |key: &str, v: Option<f64>| {
             v.ok_or_else(|| FileError::at(Place::name(format!("joint {}, {key}", self.name)), "missing"))
         };
-        if self.torque_gain.is_none() {
-            sources.fill_in((Some(number), "torque_gain"));
+        for (key, given) in [
+            ("torque_gain", self.torque_gain.is_some()),
+            ("teach_damping_nm_s_rad", self.teach_damping_nm_s_rad.is_some()),
+        ] {
+            if !given {
+                sources.fill_in((Some(number), key));
+            }
         }
+        let torque_max = need("torque_max_nm", self.torque_max_nm)?;
         let mut or = |key: &'static str, v: Option<f64>, default: f64| {
             v.unwrap_or_else(|| {
                 let problem = format!("{key} not given: {default} is used");
@@ -86,7 +96,7 @@ impl JointForm {
                 self.acceleration_max_rad_s2,
                 ACCELERATION_DEFAULT,
             ),
-            torque_max: need("torque_max_nm", self.torque_max_nm)?,
+            torque_max,
             position_error_max: or(
                 "position_error_max_rad",
                 self.position_error_max_rad,
@@ -94,6 +104,7 @@ impl JointForm {
             ),
             rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
             torque_gain: self.torque_gain.unwrap_or(1.0),
+            teach_damping: self.teach_damping_nm_s_rad.unwrap_or(TEACH_DAMPING_DEFAULT * torque_max),
         })
     }
 

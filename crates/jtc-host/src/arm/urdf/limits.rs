@@ -82,7 +82,7 @@ impl Chain<'_> {
             to.rotor_inertia = 0.0;
             self.position(number, joint, to)?;
             self.dynamic_limits(number, joint, to);
-            for key in ["position_error_max_rad", "torque_gain"] {
+            for key in ["position_error_max_rad", "torque_gain", "teach_damping_nm_s_rad"] {
                 self.sources.fill_in((Some(number), key));
             }
             let place = format!("joint {}", joint.name);

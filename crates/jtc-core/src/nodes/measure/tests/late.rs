@@ -73,8 +73,10 @@ impl Motion {
                 commanded: self.commanded * self.velocity(ms),
                 elapsed_ms: 1,
                 velocity_max: VELOCITY_MAX,
+                enabled: false,
+                joint: 0,
             };
-            let usable = joint.step(&tick, |ticks| self.past(ms, ticks), config);
+            let usable = joint.step(&tick, |ticks| self.past(ms, ticks), config) == Outcome::Used;
             assert_eq!(usable, answer.is_some(), "{now} ms");
             let Reading { position, velocity } = joint.used();
             off.push(Off { position: position - self.position(ms), velocity: velocity - self.velocity(ms) });

@@ -1,4 +1,5 @@
 //! Where a person sits who types commands: a directory, a port, and something behind it.
+#![cfg(target_os = "linux")]
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -85,11 +86,9 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// With the files of the cases, and nothing at the port.
+    /// With nothing at the port.
     pub fn new() -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        crate::files::write(dir.path());
-        Self { dir, sim: None, line: None }
+        Self { dir: tempfile::tempdir().unwrap(), sim: None, line: None }
     }
 
     /// With this line at the port.
@@ -163,7 +162,6 @@ impl Desk {
     }
 
     /// Types a line where the simulator runs.
-    #[allow(dead_code)]
     pub fn write_line(&mut self, line: &str) {
         if let Some(sim) = &mut self.sim {
             sim.write_line(line);

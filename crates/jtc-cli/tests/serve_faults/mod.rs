@@ -2,8 +2,6 @@
 #![cfg(unix)]
 
 mod cell;
-#[path = "../common/mod.rs"]
-mod common;
 mod phases;
 mod restarted;
 

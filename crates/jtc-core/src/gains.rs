@@ -1,0 +1,276 @@
+//! Which gains the inertia of the joints bears (J-71), and gains on trial.
+//!
+//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. What a joint feels
+//! at least is looked for in some fixed poses, one a tick; gains are compared with it.
+use core::f64::consts::TAU;
+
+use jtc_dynamics::{ArmModel, Dynamics, JointVec};
+use jtc_wire::StopKind;
+
+use crate::config::Config;
+use crate::interpolation::smooth;
+use crate::limits::JointConfig;
+use crate::parameters::PidGains;
+use crate::remembered::remembered;
+use crate::{DT, JOINTS};
+
+/// Poses in which the inertia of the joints is looked at.
+pub(crate) const POSES: usize = 17;
+/// Half of the ticks over which the derivative is taken, and half of the tick for which a torque is held: how much older than
+/// [`Config::delay_ticks`] the torque of the derivative is, ticks.
+const DERIVATIVE_AGE: f64 = 3.0;
+/// The same for the torque of the position error, ticks.
+const POSITION_AGE: f64 = 0.5;
+/// Inertia that is asked for, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times what the loop of one joint needs to be stable,
+/// as long as Kp is not more than half of what its Kd can damp.
+const PER_KD: f64 = 0.75;
+const PER_KP: f64 = 2.0;
+/// Share of the limit of the position error by which a joint may sag when gains take its integral away.
+const SAG: f64 = 0.25;
+/// Share of the torque limit that the position gain makes at the limit of the position error, at least.
+const STIFF: f64 = 0.03;
+/// Time over which new gains come in, and for which they are on trial, ms.
+const BLEND_MS: u16 = 500;
+const TRIAL_MS: u16 = 2_000;
+/// Time after which an unstable loop is no longer blamed on new gains, ms.
+const BLAMED_MS: u16 = 10_000;
+/// Factor of the gains of a joint whose loop is unstable, and time within which it may not be unstable again, ms.
+const SOFTER: f64 = 0.3;
+const AGAIN_MS: u16 = 500;
+
+/// Shares of the joints' ranges in the poses behind the first: points that fill them evenly (Halton 1960).
+const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
+
+const fn shares() -> [[f32; JOINTS]; POSES - 1] {
+    const PRIMES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];
+    let mut shares = [[0.0; JOINTS]; POSES - 1];
+    let mut n = 0;
+    while n < POSES - 1 {
+        let mut j = 0;
+        while j < JOINTS {
+            let (mut rest, mut unit) = (n + 1, 1.0);
+            while rest > 0 {
+                unit /= PRIMES[j] as f32;
+                shares[n][j] += unit * (rest % PRIMES[j]) as f32;
+                rest /= PRIMES[j];
+            }
+            j += 1;
+        }
+        n += 1;
+    }
+    shares
+}
+
+/// The pose of this number: the zero pose first, each within the limits of the joints.
+fn pose(number: usize, config: &Config) -> JointVec {
+    let shares = number.checked_sub(1).and_then(|n| SHARES.get(n));
+    core::array::from_fn(|j| {
+        let (low, high) = config.position_range(j);
+        let (low, high) = (low.max(-TAU), high.min(TAU));
+        match shares.and_then(|shares| shares.get(j)) {
+            Some(share) => low + f64::from(*share) * (high - low),
+            None => 0.0f64.max(low).min(high),
+        }
+    })
+}
+
+/// The least inertia that each joint feels, with the others free, in the poses that were looked at; kg·m².
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeltInertia {
+    joints: [f64; JOINTS],
+}
+
+remembered!(FeltInertia { joints });
+
+impl FeltInertia {
+    /// No pose was looked at.
+    pub const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
+
+    /// The pose of this number of an arm, without a payload.
+    #[inline(never)]
+    pub fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
+        let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
+        let felt = Dynamics::new(model, [0.0; 3]).felt_inertia(&pose(number, config), &rotor);
+        for (least, felt) in self.joints.iter_mut().zip(felt) {
+            *least = least.min(felt);
+        }
+    }
+
+    /// All poses of an arm were looked at.
+    pub fn is_known(&self) -> bool {
+        self.joints.iter().all(|felt| felt.is_finite())
+    }
+
+    /// Every joint is heavy enough for its gains.
+    pub fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
+        // Written so that NaN is refused.
+        gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
+    }
+}
+
+/// The least inertia (kg·m²) that each joint of an arm without a payload feels, with the others free, as a controller with these
+/// settings looks for it (J-71): the zero pose and sixteen poses within the position limits. A drive of which no rotor inertia is given
+/// counts with 0.7 kg·m².
+pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
+    let mut felt = FeltInertia::NONE;
+    (0..POSES).for_each(|number| felt.look(number, model, config));
+    felt.joints
+}
+
+/// Inertia (kg·m²) that a joint has to feel for a controller to take its gains (J-71).
+pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
+    let derivative = DT * (f64::from(delay_ticks) + DERIVATIVE_AGE);
+    derivative * (PER_KD * gains.kd + PER_KP * gains.kp * position_delay(delay_ticks))
+}
+
+/// By how much the torque of the position error is late, s.
+fn position_delay(delay_ticks: u8) -> f64 {
+    // No delay is shorter than the tick for which a torque is held.
+    DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
+}
+
+/// A joint that is held by the torque `p` of its position error and that `i` of its integral, N·m, does not fall when it gets these
+/// gains: its position gain makes some torque, and what its integral does not hold any more makes a small error (J-71).
+pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
+    let held = p + i;
+    let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
+    let stiff = gains.kp * limits.position_error_max >= STIFF * limits.torque_max;
+    stiff && gains.kp > 0.0 && (held - kept).abs() < SAG * limits.position_error_max * gains.kp
+}
+
+/// What gains were given under torque, and how they do.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Trial {
+    /// Gains before, while they may come back.
+    before: Option<[PidGains; JOINTS]>,
+    /// Time for which all joints were held with the others, ms.
+    held_ms: u16,
+    /// Kp and Kd that acted when the gains changed, and time left in which they go over into the new ones, ms.
+    from: [[f32; 2]; JOINTS],
+    blend_ms: u16,
+    /// Joints (a bit each) whose gains were reduced or taken back because their loop was unstable, and time left in which it may not
+    /// be so again, ms.
+    unstable: u8,
+    again_ms: u16,
+}
+
+remembered!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
+remembered!(PidGains { kp, ki, kd, int_min, int_max });
+
+impl Trial {
+    /// These gains were `given` under torque, in place of those `before`.
+    pub fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
+        self.blend_from(before);
+        // Those that were on trial have not held yet.
+        if self.before.is_none() || self.held_ms >= TRIAL_MS {
+            self.before = Some(*before);
+        }
+        // What has held comes back: there is nothing to try.
+        self.before = self.before.filter(|before| before != given);
+        self.held_ms = 0;
+    }
+
+    /// The arm is not held any more. Gains on trial have not held it: returns those before.
+    pub fn end(&mut self) -> Option<[PidGains; JOINTS]> {
+        let before = self.before.filter(|_| self.is_on());
+        *self = Self::default();
+        before
+    }
+
+    /// The gains before come back only if they may.
+    pub fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
+        self.before = self.before.filter(may);
+    }
+
+    /// There is something to count.
+    #[inline(always)]
+    pub fn runs(&self) -> bool {
+        self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
+    }
+
+    /// A tick under torque; `held`: all joints have settled, and none yields.
+    pub fn step(&mut self, held: bool) {
+        self.again_ms = self.again_ms.saturating_sub(1);
+        self.blend_ms = self.blend_ms.saturating_sub(1);
+        self.held_ms = self.held_ms.saturating_add(u16::from(held));
+        if self.held_ms > BLAMED_MS {
+            self.before = None;
+        }
+    }
+
+    /// Gains are on trial.
+    pub fn is_on(&self) -> bool {
+        self.before.is_some() && self.held_ms <= TRIAL_MS
+    }
+
+    /// The gains of this tick, while those that were `given` come in: stiffness and damping go over, the integral has changed at once.
+    pub fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
+        if self.blend_ms == 0 {
+            return None;
+        }
+        let left = smooth(f64::from(self.blend_ms) / f64::from(BLEND_MS));
+        let mut blended = *given;
+        for (gains, [kp, kd]) in blended.iter_mut().zip(&self.from) {
+            gains.kp += left * (f64::from(*kp) - gains.kp);
+            gains.kd += left * (f64::from(*kd) - gains.kd);
+        }
+        Some(blended)
+    }
+
+    /// Other gains go over from those that act while `given` are in use.
+    fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
+        let acting = self.blended(given).unwrap_or(*given);
+        self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
+        self.blend_ms = BLEND_MS;
+    }
+
+    /// The joint was unstable a moment ago, and is so again.
+    pub fn again(&self, joint: usize) -> bool {
+        self.again_ms > 0 && self.unstable >> joint & 1 != 0
+    }
+
+    /// Joints (a bit each) do not bear their `gains`; the loops of those that are `unstable` are so. Returns why and what the gains
+    /// become, if they have to change: those before come back. Where there are none, an unstable joint is held more softly.
+    pub fn fails(
+        &mut self,
+        failed: u8,
+        unstable: u8,
+        gains: &[PidGains; JOINTS],
+        delay_ticks: u8,
+    ) -> Option<(StopKind, [PidGains; JOINTS])> {
+        if unstable != 0 {
+            (self.unstable, self.again_ms) = (unstable, AGAIN_MS);
+        }
+        if unstable == 0 && (failed == 0 || !self.is_on()) {
+            return None;
+        }
+        let before = self.before.take().map(|before| (StopKind::Gains, before));
+        let next = before.or_else(|| {
+            (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
+        })?;
+        self.blend_from(gains);
+        // The joints that fail are not held with what they do not bear for any longer.
+        for j in 0..JOINTS {
+            if failed >> j & 1 != 0 {
+                self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
+            }
+        }
+        Some(next)
+    }
+}
+
+/// Softer gains for the `joints` (a bit each), which damp them at least.
+fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
+    core::array::from_fn(|j| match gains[j] {
+        own if joints >> j & 1 == 0 => own,
+        own => {
+            let kp = SOFTER * own.kp;
+            // The delay of Kp takes half of it at most.
+            let kd = (SOFTER * own.kd).max(2.0 * kp * position_delay(delay_ticks));
+            PidGains { kp, kd, ki: 0.0, ..own }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,151 @@
+//! Held stops (J-69): what moves comes to rest, the arm is held, and why is kept for the host.
+use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
+
+use crate::controller::Controller;
+use crate::motion::RUSH;
+use crate::remembered::remembered;
+use crate::teach::too_fast;
+use crate::{JOINTS, TrajectoryState, joint_error};
+
+/// Why the arm came to a held stop last.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LastStop {
+    cause: StopCause,
+    /// The tick in which it began; 0: there was none.
+    tick: u64,
+}
+
+remembered!(StopCause { kind, joint, value, limit });
+remembered!(LastStop { cause, tick });
+
+/// This `error` for each joint of a mask.
+fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {
+    core::array::from_fn(|j| if joints & 1 << j != 0 { error } else { 0 })
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// A held stop begins. `errors`: what is shown of each joint.
+    pub(crate) fn hold_stop(&mut self, errors: &[u16; JOINTS], kind: StopKind) {
+        let joint = errors.iter().position(|bits| *bits != 0).unwrap_or(0);
+        let (value, limit) = self.measure(kind, joint);
+        self.hold_stop_for(errors, self.cause(kind, joint, value, limit));
+    }
+
+    /// The same for a cause that is known.
+    pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
+        // What comes while the arm is held already is a consequence more often than not.
+        if !self.errors.held_stop() {
+            self.keep_cause(cause);
+        }
+        self.rest_and_hold(errors);
+    }
+
+    /// What moves comes to rest, and the arm is held.
+    pub(crate) fn rest_and_hold(&mut self, errors: &[u16; JOINTS]) {
+        self.errors.hold_joints(errors, self.config.protective_stop_latches);
+        // A Teaching that waits does so anew.
+        self.teaching_waits_ms = 0;
+        if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
+            self.leave_path(ExecCommand::Pause);
+        }
+        if self.motion.set.jogging() {
+            self.motion.set.end_jog();
+            self.extensions.refuse_jogs();
+        }
+    }
+
+    /// The encoders of joints do not fit (J-35): the arm comes to rest and is held, also out of Teaching.
+    #[cold]
+    pub(crate) fn hold_misfits(&mut self) {
+        let misfits = self.nodes.misfits();
+        let first = misfits.trailing_zeros() as usize;
+        if self.powered()
+            && let Some((kind, value)) = self.nodes.misfit(first)
+        {
+            self.teaching = false;
+            self.hold_stop_for(
+                &errors_of(misfits, joint_error::POSITION_ERROR),
+                self.cause(kind, first, value, 0.0),
+            );
+        }
+    }
+
+    /// A joint that is led too fast ends Teaching, before its over-speed releases the arm (J-25): the arm comes to rest and is held.
+    /// This tick is so `late`, ms.
+    pub(crate) fn end_fast_teaching(&mut self, late: u16) {
+        let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
+        for j in 0..JOINTS {
+            let speed = f64::from(speeds[j]);
+            let limit = too_fast(&self.config.joints[j], &self.config);
+            // The speed that the drive reports is later, but says that no encoder has jumped.
+            if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
+                self.teaching = false;
+                let cause = self.cause(StopKind::Shove, j, speed, limit);
+                self.hold_stop_for(&errors_of(1 << j, joint_error::TORQUE), cause);
+                return;
+            }
+        }
+    }
+
+    /// J-35: nothing is executed with positions that are not to be trusted. It is shown as what has occurred.
+    pub(crate) fn check_trust(&mut self) -> Result<(), DataStatus> {
+        match self.nodes.untrusted() {
+            0 => Ok(()),
+            joints => {
+                self.errors.occur_joints(&errors_of(joints, joint_error::POSITION_ERROR));
+                Err(DataStatus::NotAllowed)
+            }
+        }
+    }
+
+    /// The cause of a joint with this index.
+    pub(crate) fn cause(&self, kind: StopKind, joint: usize, value: f64, limit: f64) -> StopCause {
+        StopCause { kind, joint: joint as u8 + 1, value: value as f32, limit: limit as f32 }
+    }
+
+    /// From now on this is the last cause.
+    pub(crate) fn keep_cause(&mut self, cause: StopCause) {
+        self.last_stop = LastStop { cause, tick: self.observed.tick };
+    }
+
+    /// What has been found of a joint, and what is allowed, in the unit of the kind.
+    fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
+        // An index of this crate's own: written so that the compiler sees that it is one of a joint.
+        let j = joint.min(JOINTS - 1);
+        let limits = &self.config.joints[j];
+        let (law, set) = (&self.motion.law, &self.motion.set);
+        let of = |values: &[f64; JOINTS]| values[j];
+        match kind {
+            StopKind::Overload | StopKind::Unstable => (law.torque[j].sum(), limits.torque_max),
+            StopKind::Push => (law.feedback(j), self.config.yield_torque_share * limits.torque_max),
+            StopKind::Shove => {
+                (of(self.nodes.velocities()) - of(&set.point.velocity), RUSH * limits.velocity_max)
+            }
+            StopKind::PositionError => {
+                (of(set.due(&self.config)) - of(self.nodes.positions()), limits.position_error_max)
+            }
+            StopKind::Position => {
+                let position = of(&set.point.position);
+                (position, if position > 0.0 { limits.position_max } else { limits.position_min })
+            }
+            StopKind::Velocity | StopKind::FrictionTable => (of(&set.point.velocity), limits.velocity_max),
+            StopKind::Acceleration => (of(&set.point.acceleration), limits.acceleration_max),
+            // These come with their figures, or have none.
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// What the controller does about what it has found, and why it stopped last: what Info says of it (J-69).
+    pub fn reactions(&self) -> Reactions {
+        let LastStop { cause, tick } = self.last_stop;
+        let ago = self.observed.tick.saturating_sub(tick).min(u32::MAX.into()) as u32;
+        let mask = |is: &dyn Fn(usize) -> bool| (0..JOINTS).fold(0, |mask, j| mask | u8::from(is(j)) << j);
+        Reactions {
+            stop: (tick != 0).then_some((cause, ago)),
+            yields: mask(&|j| self.motion.law.yields(j)),
+            jumped: self.nodes.untrusted(),
+            rate: if self.trajectory == TrajectoryState::Execute { self.clock.rate as f32 } else { 0.0 },
+            held_back_ms: self.motion.hold_back.run_ms().into(),
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Whether the positions and the speed that a drive reports fit (J-35).
+//!
+//! They come from two encoders, so either shows what is wrong with the other. A full scale that is set wrong makes all speeds wrong by a
+//! factor. An encoder that slips, or has stopped, moves where the motor does not, or stands where it does.
+use super::measure::Ways;
+use super::node::Node;
+use crate::JOINTS;
+use crate::config::Config;
+use crate::limits::JointConfig;
+use crate::remembered::remembered;
+
+/// Ticks between two looks at a joint: one joint is looked at in a tick.
+const PERIOD: u8 = 10;
+/// Looks, one after the other, at which the two differ in the same direction when they do not fit.
+const LOOKS: u8 = 5;
+/// So many times the largest twist of the gear, the two differ by together then: by less a hand or a wall may twist it.
+const TWISTS: f64 = 2.0;
+/// One of them stands where the other one goes so many times as far.
+const STANDS: f32 = 10.0;
+
+/// A joint whose position and speed have differed at each of the last looks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Differs {
+    looks: u8,
+    /// Way of its positions in the windows of these looks, rad.
+    measured: f32,
+    /// Way that its speed stands for, rad.
+    reported: f32,
+}
+
+/// How often and how far the two have differed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SpeedCheck {
+    /// Whose turn it is.
+    turn: u8,
+    differs: [Differs; JOINTS],
+    /// Reported torque at the last look, N·m.
+    torque: [f32; JOINTS],
+}
+
+remembered!(Differs { looks, measured, reported });
+remembered!(SpeedCheck { turn, differs, torque });
+
+impl SpeedCheck {
+    /// One tick. Returns the joint whose speed is found to have another scale, as a mask; one of whose encoders only one moves has
+    /// misbehaved.
+    #[inline(always)]
+    pub fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
+        let turn = self.turn;
+        let j = usize::from(turn);
+        self.turn = if turn + 1 < PERIOD { turn + 1 } else { 0 };
+        if let (Some(differs), Some(torque)) = (self.differs.get_mut(j), self.torque.get_mut(j))
+            && let (Some(node), Some(limits)) = (nodes.get_mut(j), config.joints.get(j))
+        {
+            let before = core::mem::replace(torque, node.report.torque as f32);
+            if !node.enabled() {
+                differs.looks = 0;
+            } else if let Some(ways) = node.measured.ways(config) {
+                if ways.unexplained().abs() <= ways.tolerance(config) {
+                    differs.looks = 0;
+                } else if differs.differ(&ways, node, before, limits, config) {
+                    return 1 << j;
+                }
+            }
+        }
+        0
+    }
+}
+
+impl Differs {
+    /// The two differ. Returns whether that shows another scale of the speed. `before`: torque at the last look, N·m.
+    #[cold]
+    fn differ(
+        &mut self,
+        ways: &Ways,
+        node: &mut Node,
+        before: f32,
+        limits: &JointConfig,
+        config: &Config,
+    ) -> bool {
+        // How far the gear may have been twisted since.
+        let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
+        if ways.unexplained().abs() <= ways.tolerance(config) + twist {
+            self.looks = 0;
+            return false;
+        }
+        if self.looks == 0 || (ways.unexplained() > 0.0) != (self.measured > self.reported) {
+            *self = Self::default();
+        }
+        self.looks = self.looks.saturating_add(1);
+        self.measured += ways.measured as f32;
+        self.reported += ways.reported as f32;
+        let apart = f64::from((self.measured - self.reported).abs());
+        if self.looks < LOOKS || apart <= TWISTS * limits.torque_max / config.gear_stiffness {
+            return false;
+        }
+        self.looks = 0;
+        let factor = self.measured / self.reported;
+        if factor.abs() <= STANDS && factor.abs() >= 1.0 / STANDS {
+            node.measured.find_factor(factor);
+            return true;
+        }
+        node.misbehaved = true;
+        false
+    }
+}

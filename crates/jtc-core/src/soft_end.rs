@@ -1,0 +1,36 @@
+//! The soft end of a joint's range: a spring that pushes a joint back which a hand or a shove moves towards a position limit (J-25, J-68).
+
+/// Distance from a position limit, rad, from which on the spring acts.
+pub(crate) const SOFT_END: f64 = 0.1;
+
+/// How far (rad) a joint at `position` is inside the soft end of its `range` (lowest and highest position, rad): above zero at the high
+/// end, below zero at the low one.
+pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
+    let (low, high) = range;
+    let above = (position - (high - SOFT_END)).max(0.0);
+    let below = ((low + SOFT_END) - position).max(0.0);
+    above - below
+}
+
+/// Torque of a spring that is compressed by `depth` (rad), N·m: `most` at the position limit.
+pub(crate) fn spring(depth: f64, most: f64) -> f64 {
+    -most * depth / SOFT_END
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j25_j68_the_spring_acts_from_a_tenth_before_each_limit() {
+        for (position, expected) in
+            [(0.0, 0.0), (1.9, 0.0), (1.95, -5.0), (2.0, -10.0), (2.1, -20.0), (-2.85, 0.0)]
+        {
+            let torque = spring(depth(position, (-3.0, 2.0)), 10.0);
+            assert!((torque - expected).abs() < 1e-9, "{torque} N·m at {position} rad");
+        }
+        for (position, expected) in [(-2.9, 0.0), (-2.95, 5.0), (-3.0, 10.0)] {
+            assert!((spring(depth(position, (-3.0, 2.0)), 10.0) - expected).abs() < 1e-9, "{position}");
+        }
+    }
+}

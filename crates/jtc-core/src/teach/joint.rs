@@ -1,0 +1,281 @@
+//! Damping, dry friction, friction that is taken away, and the soft ends of one joint in Teaching.
+use crate::DT;
+use crate::config::Config;
+use crate::interpolation::smooth;
+use crate::limits::JointConfig;
+use crate::remembered::remembered;
+use crate::soft_end;
+use crate::yielding::SPRING_RATE;
+
+/// Speed of a joint, rad/s, from which on its damping grows, and from which on it does not grow any more.
+const FAST: (f64, f64) = (0.4, 0.8);
+/// Highest rate at which it reduces a speed, 1/s, of a joint whose others are free to move. Measured speeds are about 8 ms old; joints that move
+/// each other lower what they bear.
+pub(super) const DAMPING_RATE: f64 = 90.0;
+/// Speed, rad/s, at which the damping of a joint balances what it carries, where its inertia bears so much damping.
+const SINKS: f64 = 0.5;
+/// What it grows to, as a multiple of the torque limit, s/rad.
+const GROWN: f64 = 1.0;
+/// Speeds, rad/s, between which a brake comes beside the damping, and the deceleration that it makes, rad/s²: too little to turn a joint round
+/// before that is measured. Over-speed would release the arm.
+const BRAKES: (f64, f64) = (0.9, 1.7);
+const BRAKE: f64 = 60.0;
+/// Speed, rad/s, and share of the speed of its release (J-35) above which a joint is not taught any more but brought to rest.
+const TOO_FAST: (f64, f64) = (1.4, 0.75);
+/// Time constant with which that speed is taken from positions, s: drives report a mean over 10 ms.
+const SPEED_S: f32 = 0.004;
+/// Share of a rotor inertia that counts: it may be a proposal that nobody has measured. Where none is given, it is that of the proposal: the
+/// torque limit over this acceleration, rad/s².
+const ROTOR: f64 = 0.2;
+const PROPOSED: f64 = 200.0;
+/// Part of the modelled friction that every joint has.
+const CERTAIN_FRICTION: f64 = 0.7;
+/// Part of the damping that the friction which is taken away may use up: that friction may not be there.
+const USED_UP: f64 = 0.5;
+/// Time constant with which the dry friction comes and goes, s.
+const GRIP_S: f64 = 0.1;
+/// Speed below which a joint always stands, rad/s.
+const STANDING: f64 = 0.01;
+/// Highest speed up to which the dry friction is whole, rad/s.
+const SLOW: f64 = 0.3;
+/// Longest stretch of the spring that holds a joint where it stands, rad.
+const STRETCH: f64 = 0.005;
+/// Speed around zero in which the sign of the friction that is taken away is smoothed, rad/s.
+const SIGN_WIDTH: f64 = 0.1;
+/// Speed from which on less of the friction is taken away, rad/s, and from which on nothing.
+const COMPENSATED: (f64, f64) = (0.3, 0.6);
+/// Missing answers after which first the springs go, then damping and friction, each within so many ticks.
+const MISSING: u8 = 2;
+const LETS_GO: u8 = 5;
+
+/// Speed above which a joint ends Teaching, rad/s, as its positions have it: a position controller stops what a damper cannot, and over-speed would release the arm.
+pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
+    TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
+}
+
+/// Rotor inertia that a joint has at least, kg·m².
+pub(super) fn rotor(limits: &JointConfig) -> f64 {
+    let given = limits.rotor_inertia;
+    ROTOR * if given > 0.0 { given } else { limits.torque_max / PROPOSED }
+}
+
+/// What Teaching remembers of a joint. Single precision, because the flight recorder keeps it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TaughtJoint {
+    /// Where the spring of the dry friction is fixed, rad, and its share that acts.
+    anchor: f32,
+    pub(super) grip: f32,
+    /// How far inside a soft end the joint began, rad: a spring that acts from there on moves nothing by itself.
+    begun: f32,
+    /// Friction of the joint as its parameters have it, N·m: the Coulomb part, and all of it at the speed of a while ago.
+    coulomb: f32,
+    rubs: f32,
+    /// Least inertia that the joint moves, kg·m².
+    inertia: f32,
+    /// What damping and friction had against the last motion, N·m.
+    against: f32,
+    /// Position that follows that of the joint, rad: the faster it is, the further behind.
+    behind: f32,
+    /// Answers of the joint that are missing now, and how far springs and damping have gone because of that: 2 · [`LETS_GO`] is wholly.
+    missing: u8,
+    lost: u8,
+}
+
+remembered!(TaughtJoint { anchor, grip, begun, coulomb, rubs, inertia, against, behind, missing, lost });
+
+/// The inputs of a joint in a tick of Teaching.
+pub(crate) struct LedJoint<'a> {
+    /// Measured position, rad.
+    pub position: f64,
+    /// Measured velocity, rad/s.
+    pub velocity: f64,
+    pub limits: &'a JointConfig,
+    /// Lowest and highest position, rad.
+    pub range: (f64, f64),
+}
+
+/// What Teaching adds to the torque of a joint, N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TaughtTorque {
+    /// Of the load found.
+    pub load: f64,
+    /// Damping, dry friction and soft ends.
+    pub brake: f64,
+    /// Friction of the joint that is taken away.
+    pub friction: f64,
+}
+
+/// How a joint bears its load.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bears {
+    /// Share of it that the damping balances at [`SINKS`].
+    pub balanced: f64,
+    /// How far the joint is inside a soft end beyond where it began, rad, with the sign of [`soft_end::depth`].
+    pub compressed: f64,
+}
+
+impl TaughtJoint {
+    /// Teaching begins in a joint at rest at `position` (rad).
+    pub fn begin(position: f64, limits: &JointConfig, range: (f64, f64)) -> Self {
+        let begun = soft_end::depth(position, range).abs() as f32;
+        let (anchor, inertia) = (position as f32, rotor(limits) as f32);
+        Self { anchor, behind: anchor, grip: 1.0, begun, inertia, ..Self::default() }
+    }
+
+    /// The joint moves at least this inertia, kg·m². One that cannot be computed changes nothing.
+    pub fn set_inertia(&mut self, inertia: f64) {
+        if inertia.is_finite() {
+            self.inertia = inertia as f32;
+        }
+    }
+
+    /// Each tick, which is so `late`, ms: whether the joint has answered, and with which `position`, rad. Without an answer its speed is an old one, and its springs
+    /// pull to where it was. Returns the speed that its positions make, rad/s.
+    #[inline(always)]
+    pub fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
+        // A tick that is late shows as an answer that is missing.
+        let missed = self.missing.saturating_add(late.min(u8::MAX.into()) as u8);
+        if !fresh {
+            self.missing = missed.saturating_add(1);
+            if self.missing > MISSING {
+                self.lost = (self.lost + 1).min(2 * LETS_GO);
+            }
+            return 0.0;
+        }
+        (self.missing, self.lost) = (0, self.lost.saturating_sub(1));
+        let way = position as f32 - self.behind;
+        // Without a missing answer both are constants.
+        let (time, part) = if missed == 0 {
+            (SPEED_S, DT as f32 / SPEED_S)
+        } else {
+            let missed = f32::from(missed) * DT as f32;
+            (SPEED_S + missed, (missed + DT as f32) / (SPEED_S + missed))
+        };
+        self.behind += way * part;
+        way / time
+    }
+
+    /// Shares of the springs, and of damping and friction, that act.
+    fn heard(&self) -> (f64, f64) {
+        if self.lost == 0 {
+            return (1.0, 1.0);
+        }
+        let share = |lost: u8| 1.0 - f64::from(lost) / f64::from(LETS_GO);
+        (share(self.lost.min(LETS_GO)), share(self.lost.saturating_sub(LETS_GO)))
+    }
+
+    /// Its Coulomb friction, and its friction at the present speed, N·m.
+    pub fn set_friction(&mut self, coulomb: f64, moving: f64) {
+        (self.coulomb, self.rubs) = (coulomb as f32, (moving.abs() as f32).max(coulomb as f32));
+    }
+
+    /// What damping and friction had against the last motion, N·m.
+    pub fn against(&self) -> f64 {
+        self.against.into()
+    }
+
+    #[cfg(test)]
+    pub fn set_against(&mut self, torque: f64) {
+        self.against = torque as f32;
+    }
+
+    /// Damping at low speed, and what it grows to, N·m·s/rad.
+    fn dampings(&self, load: f64, limits: &JointConfig) -> (f64, f64) {
+        let most = DAMPING_RATE * f64::from(self.inertia);
+        let damping = limits.teach_damping.max(load.abs() / SINKS).min(most);
+        (damping, damping.max(most.min(GROWN * limits.torque_max)))
+    }
+
+    /// A tick of a joint that carries this `load`, N·m; `haste`: how far the flange is above the tool speed limit, 0 to 1.
+    #[inline(always)]
+    pub fn step(
+        &mut self,
+        joint: &LedJoint<'_>,
+        load: f64,
+        haste: f32,
+        config: &Config,
+    ) -> (TaughtTorque, Bears) {
+        let LedJoint { position, velocity, limits, range } = *joint;
+        let (springs, damps) = self.heard();
+        let (damping, most) = self.dampings(load, limits);
+        let depth = soft_end::depth(position, range);
+        let begun = f64::from(self.begun).min(depth.abs());
+        self.begun = begun as f32;
+        // It grows with the speed of the joint and of the flange, and towards a position limit.
+        let fast =
+            if velocity.abs() > FAST.0 { smooth((velocity.abs() - FAST.0) / (FAST.1 - FAST.0)) } else { 0.0 };
+        let compressed = depth - begun.copysign(depth);
+        let outward = if depth * velocity > 0.0 { compressed.abs() / soft_end::SOFT_END } else { 0.0 };
+        let grown = (most - damping) * fast.max(f64::from(haste)).max(outward.min(1.0));
+        let mut damper = -(damping + grown) * velocity;
+        if velocity.abs() > BRAKES.0 {
+            let braked = smooth((velocity.abs() - BRAKES.0) / (BRAKES.1 - BRAKES.0));
+            damper -= (BRAKE * f64::from(self.inertia) * braked).copysign(velocity);
+        }
+        let share = config.yield_torque_share * limits.torque_max;
+        let end = soft_end::spring(compressed, share).max(-share).min(share);
+        let dry = self.dry_friction(position, velocity, damping, limits, config);
+        let friction = damps * self.compensation(velocity, damping, config);
+        self.against = ((damping + grown) * velocity.abs() + f64::from(self.rubs) - friction.abs()) as f32;
+        let balances = SINKS * damping;
+        let balanced = if balances < load.abs() { balances / load.abs() } else { 1.0 };
+        let torque = TaughtTorque { load: 0.0, brake: damper * damps + (end + dry) * springs, friction };
+        (torque, Bears { balanced, compressed })
+    }
+
+    /// Torque of the dry friction, N·m: less where the joint has friction of its own.
+    fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
+        (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
+    }
+
+    /// Dry friction of a joint that is slow. It fades out from the speed that its torque gives the damped joint to three times that: so
+    /// any torque below it is stopped, and damping and dry friction together never fall with the speed.
+    fn dry_friction(
+        &mut self,
+        position: f64,
+        velocity: f64,
+        damping: f64,
+        limits: &JointConfig,
+        config: &Config,
+    ) -> f64 {
+        let breakaway = self.breakaway(limits, config);
+        if breakaway == 0.0 {
+            self.anchor = position as f32;
+            return 0.0;
+        }
+        let slow = (breakaway / damping.max(f64::MIN_POSITIVE)).clamp(STANDING, SLOW);
+        let gripped =
+            if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
+        let grip = f64::from(self.grip);
+        self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
+        // The spring slips where it is stretched by its whole torque; of a joint that moves it only follows.
+        let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
+        self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
+        self.dry_spring(position, limits, config)
+    }
+
+    /// Stretch at which the spring of the dry friction slips, rad.
+    fn stretch(&self, breakaway: f64) -> f64 {
+        STRETCH.max(breakaway / (SPRING_RATE * SPRING_RATE * f64::from(self.inertia)).max(f64::MIN_POSITIVE))
+    }
+
+    /// Torque of the spring at `position` (rad), N·m.
+    pub fn dry_spring(&self, position: f64, limits: &JointConfig, config: &Config) -> f64 {
+        let breakaway = self.breakaway(limits, config);
+        let way = f64::from(self.anchor) - position;
+        f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)
+    }
+
+    /// Friction of the joint that is taken away, N·m. At standstill it grows with the speed half as fast as the damping at most.
+    fn compensation(&self, velocity: f64, damping: f64, config: &Config) -> f64 {
+        let torque = config.teach_friction * f64::from(self.coulomb);
+        let slope = (torque / SIGN_WIDTH).min(USED_UP * damping);
+        let (from, to) = COMPENSATED;
+        let left =
+            if velocity.abs() > from { 1.0 - smooth((velocity.abs() - from) / (to - from)) } else { 1.0 };
+        (slope * velocity).max(-torque).min(torque) * left
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,149 @@
+//! What Teaching adds to the torque of one joint (J-25).
+use proptest::prelude::*;
+
+use super::*;
+
+const INERTIA: f64 = 3.0;
+
+/// Joint 2 of the default arm: 180 N·m, 90 N·m·s/rad.
+fn limits() -> JointConfig {
+    Config::avena().joints[1]
+}
+
+/// At rest at `position` (rad), with this Coulomb friction (N·m).
+fn begun(position: f64, coulomb: f64) -> TaughtJoint {
+    let mut joint = TaughtJoint::begin(position, &limits(), (-1.5, 1.5));
+    joint.set_inertia(INERTIA);
+    joint.set_friction(coulomb, coulomb);
+    joint
+}
+
+fn led(limits: &JointConfig, position: f64, velocity: f64) -> LedJoint<'_> {
+    LedJoint { position, velocity, limits, range: (-1.5, 1.5) }
+}
+
+fn tick_of(joint: &mut TaughtJoint, limits: &JointConfig, position: f64, velocity: f64) -> TaughtTorque {
+    joint.step(&led(limits, position, velocity), 0.0, 0.0, &Config::avena()).0
+}
+
+fn tick(joint: &mut TaughtJoint, position: f64, velocity: f64) -> TaughtTorque {
+    tick_of(joint, &limits(), position, velocity)
+}
+
+/// A joint that moves at `velocity` (rad/s) around 0 for a second.
+fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
+    let mut joint = begun(-velocity, coulomb);
+    let mut torque = TaughtTorque::default();
+    for k in 0..1_000 {
+        torque = tick(&mut joint, velocity * (f64::from(k) / 1_000.0 - 1.0), velocity);
+    }
+    torque
+}
+
+proptest! {
+    /// Together with the damping neither the friction that is taken away nor the dry friction ever drives a joint on, and the torque
+    /// against the motion never falls with the speed.
+    #[test]
+    fn j25_the_faster_a_joint_is_the_more_torque_it_has_against_it(
+        slow in 0.001..1.4f64, more in 0.001..0.3f64, coulomb in 0.0..10.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)],
+    ) {
+        let at = |speed: f64| {
+            let torque = moving(sign * speed, coulomb);
+            -(torque.brake + torque.friction) * sign
+        };
+        let (first, second) = (at(slow), at(slow + more));
+        prop_assert!(first >= -1e-9 && second >= first - 1e-2, "{first} N·m, then {second} N·m");
+    }
+
+    #[test]
+    fn j25_the_damping_is_the_setting_where_the_joint_bears_it(damping in 0.0..1000.0f64, inertia in 0.05..10.0f64) {
+        let limits = JointConfig { teach_damping: damping, rotor_inertia: 0.05, ..limits() };
+        let mut joint = begun(0.0, 0.0);
+        joint.set_inertia(inertia);
+        // Fast enough to be beyond dry friction, slow enough not to be braked harder.
+        joint.grip = 0.0;
+        let torque = tick_of(&mut joint, &limits, 0.0, 0.39).brake;
+        let expected = damping.min(90.0 * inertia) * 0.39;
+        let dry = 0.03 * limits.torque_max * DT / GRIP_S;
+        prop_assert!((torque + expected).abs() < dry + 1e-3, "{torque} N·m, not {expected}");
+    }
+}
+
+#[test]
+fn j25_a_joint_at_rest_is_held_by_dry_friction_up_to_its_breakaway_torque() {
+    for (coulomb, breakaway) in [(0.0, 5.4), (3.0, 3.3), (6.0, 1.2), (8.0, 0.0)] {
+        let mut joint = begun(0.2, coulomb);
+        let at_rest = tick(&mut joint, 0.2, 0.0);
+        assert!(at_rest.brake.abs() < 1e-3 && at_rest.friction == 0.0, "no step at the begin");
+        // Pulled away slowly it slips, and is held where it stands then.
+        let slips = tick(&mut joint, 0.25, 0.0).brake;
+        assert!((slips + breakaway).abs() < 1e-3, "{slips} N·m, not {breakaway}");
+        let back = tick(&mut joint, 0.2, 0.0).brake;
+        assert!((back - breakaway).abs() < 1e-3, "{back} N·m, not {breakaway}");
+    }
+}
+
+#[test]
+fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
+    let mut joint = begun(0.0, 0.0);
+    let mut position = 0.0;
+    for _ in 0..1_000 {
+        position += 0.3 * DT;
+        tick(&mut joint, position, 0.3);
+    }
+    let only_damped = -limits().teach_damping * 0.3;
+    assert!((tick(&mut joint, position, 0.3).brake - only_damped).abs() < 0.01);
+    (0..300).for_each(|_| {
+        tick(&mut joint, position, 0.0);
+    });
+    let held = tick(&mut joint, position + 0.02, 0.0).brake;
+    assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
+}
+
+/// Half of the Coulomb part, smoothed within 0.1 rad/s, gone from 0.6 rad/s on; less where the damping does not bear its slope.
+#[test]
+fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
+    for (velocity, share) in
+        [(0.0, 0.0), (0.05, 0.25), (0.1, 0.5), (0.3, 0.5), (0.45, 0.25), (0.6, 0.0), (1.0, 0.0)]
+    {
+        for sign in [1.0, -1.0] {
+            let friction = moving(sign * velocity, 8.0).friction;
+            assert!((friction - sign * share * 8.0).abs() < 1e-6, "{friction} N·m at {velocity} rad/s");
+        }
+    }
+    let limits = JointConfig { teach_damping: 10.0, ..limits() };
+    let slow = tick_of(&mut begun(0.0, 8.0), &limits, 0.0, 0.05).friction;
+    assert!((slow - 0.25).abs() < 1e-6, "{slow} N·m");
+}
+
+#[test]
+fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
+    let share = 0.3 * limits().torque_max;
+    let mut joint = begun(1.0, 8.0);
+    for (position, part) in [(1.4, 0.0), (1.45, 0.5), (1.5, 1.0), (1.6, 1.0)] {
+        let torque = tick(&mut joint, position, 0.0).brake;
+        assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
+    }
+    // One that is found in there, or beyond, is moved by nothing; going out further it meets the spring.
+    for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
+        let mut joint = begun(found, 8.0);
+        assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
+        let torque = tick(&mut joint, further, 0.0).brake;
+        assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
+        // Led inwards and out again it has no room of its own any more.
+        tick(&mut joint, 0.0, 0.0);
+        let torque = tick(&mut joint, 1.45, 0.0).brake;
+        assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");
+    }
+}
+
+#[test]
+fn j25_towards_a_limit_the_damper_grows() {
+    let damper = |position: f64, velocity: f64| {
+        let mut joint = begun(0.0, 8.0);
+        tick(&mut joint, position, velocity).brake - tick(&mut joint.clone(), position, 0.0).brake
+    };
+    let inward = damper(1.45, -0.2);
+    assert!((inward - 0.2 * 90.0).abs() < 0.1, "{inward} N·m");
+    assert!(damper(1.45, 0.2) < -1.4 * 0.2 * 90.0 && damper(1.5, 0.2) < damper(1.45, 0.2));
+}

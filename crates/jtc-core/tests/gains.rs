@@ -1,0 +1,459 @@
+//! Gains that are given while the arm is held, on an arm of metal: what would drop it is refused, and what it does not stand is taken
+//! back (J-71).
+use jtc_bus::NodeState;
+use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
+use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
+
+use crate::plant::{self, LuGre, Plant, loaded};
+use crate::rig::{Rig, floats};
+
+const POSE: [f64; 6] = [0.0, 0.6, -1.0, 0.3, 0.4, 0.0];
+
+type Gains = [PidGains; 6];
+
+fn shipped() -> Gains {
+    Parameters::avena().pid
+}
+
+fn times(factor: f64) -> Gains {
+    shipped().map(|g| PidGains {
+        kp: factor * g.kp,
+        ki: (factor * g.ki).min(50_000.0),
+        kd: factor * g.kd,
+        ..g
+    })
+}
+
+fn of(each: [[f64; 3]; 6]) -> Gains {
+    let [own, ..] = shipped();
+    each.map(|[kp, ki, kd]| PidGains { kp, ki, kd, ..own })
+}
+
+fn body(gains: &Gains) -> Vec<u8> {
+    floats(gains.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|x| x as f32)))
+}
+
+/// An arm without brakes that carries 2 kg which the model lacks, held at rest.
+fn held_with(friction: f64) -> (Plant, Rig) {
+    let model = loaded(Parameters::avena().model, 2.0);
+    let friction = if friction > 0.0 { LuGre::of_avena_times(friction) } else { [LuGre::NONE; 6] };
+    let mut arm = Plant::new(&model, friction, POSE);
+    let mut rig = arm.holding(Config::avena());
+    arm.brakes = false;
+    arm.run(&mut rig, 4_000);
+    (arm, rig)
+}
+
+fn give(arm: &mut Plant, rig: &mut Rig, gains: &Gains) -> DataStatus {
+    let before = rig.records().len();
+    rig.send(FrameType::PidParam, &body(gains));
+    while rig.records().len() == before {
+        arm.tick(rig);
+    }
+    rig.records().last().unwrap().data
+}
+
+/// Farthest that a joint gets from `from` within the next `ms`, rad.
+fn farthest(arm: &mut Plant, rig: &mut Rig, from: &[f64; 6], ms: usize) -> f64 {
+    let mut farthest = 0.0f64;
+    for _ in 0..ms {
+        arm.tick(rig);
+        farthest = arm.q.iter().zip(from).fold(farthest, |f, (q, from)| f.max((q - from).abs()));
+    }
+    farthest
+}
+
+/// Before, all of these were taken and the arm fell by a radian, or moved by 42 mrad.
+#[test]
+fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
+    for (factor, expected) in [
+        (0.0, DataStatus::IncorrectValue),
+        (3.0, DataStatus::IncorrectValue),
+        (5.0, DataStatus::IncorrectValue),
+        (0.05, DataStatus::NoError),
+        (1.5, DataStatus::NoError),
+    ] {
+        let (mut arm, mut rig) = held_with(1.0);
+        let from = arm.q;
+        assert_eq!(give(&mut arm, &mut rig, &times(factor)), expected, "times {factor}");
+        let farthest = farthest(&mut arm, &mut rig, &from, 4_000);
+        println!("times {factor}: {:.1} mrad", 1e3 * farthest);
+        let held = (rig.state(), rig.errors(), rig.controller.telemetry().joints.map(|j| j.internal));
+        assert_eq!(held, (ControllerState::HoldPos, 0, [0; 6]), "times {factor}");
+        assert!(farthest < 0.005, "times {factor}: {farthest} rad");
+    }
+}
+
+/// Without an integral the position error has to hold what it has found: that is allowed as long as it is small.
+#[test]
+fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
+    for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {
+        let (mut arm, mut rig) = held_with(0.3);
+        let gains = shipped().map(|g| PidGains { kp: kp * g.kp, ki: 0.0, ..g });
+        let from = arm.q;
+        assert_eq!(give(&mut arm, &mut rig, &gains), expected, "Kp times {kp}");
+        let farthest = farthest(&mut arm, &mut rig, &from, 3_000);
+        println!("Kp times {kp}: {:.1} mrad", 1e3 * farthest);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "Kp times {kp}");
+        assert!(farthest < 0.25 * 0.09, "{farthest} rad");
+    }
+}
+
+/// Gains of such arms that are in use, and gains on an arm that they are not for.
+#[test]
+fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
+    let stronger = of([
+        [8000.0, 14_000.0, 160.0],
+        [8000.0, 14_000.0, 160.0],
+        [8000.0, 14_000.0, 160.0],
+        [4000.0, 24_000.0, 100.0],
+        [4000.0, 24_000.0, 100.0],
+        [4000.0, 24_000.0, 100.0],
+    ]);
+    let soft = of([[420.0, 160.0, 20.0]; 6]);
+    let others = of([
+        [28_000.0, 24_000.0, 220.0],
+        [28_000.0, 24_000.0, 260.0],
+        [24_000.0, 24_000.0, 120.0],
+        [4000.0, 24_000.0, 100.0],
+        [2000.0, 12_000.0, 120.0],
+        [4000.0, 24_000.0, 100.0],
+    ]);
+    for (name, gains, expected) in [
+        ("shipped", shipped(), DataStatus::NoError),
+        ("stronger", stronger, DataStatus::NoError),
+        ("soft", soft, DataStatus::NoError),
+        ("for a heavier arm", others, DataStatus::IncorrectValue),
+    ] {
+        let (mut arm, mut rig) = held_with(1.0);
+        let from = arm.q;
+        assert_eq!(give(&mut arm, &mut rig, &gains), expected, "{name}");
+        let farthest = farthest(&mut arm, &mut rig, &from, 3_000);
+        println!("{name}: {:.1} mrad", 1e3 * farthest);
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
+        assert!(farthest < 0.01, "{name}: {farthest} rad");
+    }
+}
+
+/// Position gain that acts in a joint, N·m/rad.
+fn stiffness(rig: &Rig, joint: usize) -> f64 {
+    let joint = rig.controller.telemetry().joints[joint];
+    joint.torque_p / (joint.due_position - joint.position)
+}
+
+/// What was found first in the last held stop (J-69).
+fn found(rig: &Rig) -> StopKind {
+    rig.controller.reactions().stop.expect("a held stop").0.kind
+}
+
+/// Causes of a held stop that the status shows now.
+fn causes(rig: &mut Rig) -> u16 {
+    rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
+}
+
+/// Nothing swings against these: the integral is too strong for the inertia, which no check of the controller sees. Within the two seconds
+/// in which they are on trial the arm swings, and the gains before are back.
+#[test]
+fn j71_gains_that_make_the_arm_swing_are_taken_back() {
+    // The torque of the last ones stays so small that only the swing shows.
+    for [kp, ki, kd] in
+        [[8000.0, 50_000.0, 20.0], [2000.0, 50_000.0, 20.0], [8000.0, 14_000.0, 5.0], [400.0, 4000.0, 0.0]]
+    {
+        let (mut arm, mut rig) = held_with(0.0);
+        let from = arm.q;
+        let swinging = of([[kp, ki, kd]; 6]);
+        assert_eq!(give(&mut arm, &mut rig, &swinging), DataStatus::NoError);
+        // It is found at rest, and a touch is enough.
+        arm.run(&mut rig, 550);
+        arm.push = [10.0, 20.0, 15.0, 5.0, 4.0, 4.0];
+        arm.run(&mut rig, 30);
+        arm.push = [0.0; 6];
+        let farthest = farthest(&mut arm, &mut rig, &from, 6_000);
+        println!("{kp} {ki} {kd}: {:.1} mrad", 1e3 * farthest);
+        let causes = causes(&mut rig);
+        assert_eq!(rig.state(), ControllerState::HoldPos, "{kp} {ki} {kd}");
+        assert_eq!(found(&rig), StopKind::Gains, "{kp} {ki} {kd}: causes {causes:#x}");
+        assert!(farthest < 0.05, "{kp} {ki} {kd}: {farthest} rad");
+        // Held again, by those before.
+        assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+        arm.run(&mut rig, 1_000);
+        let before = shipped();
+        for j in 0..6 {
+            let stiffness = stiffness(&rig, j);
+            assert!(!stiffness.is_finite() || (stiffness - before[j].kp).abs() < 1.0, "{stiffness}");
+        }
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{kp} {ki} {kd}");
+        assert!(arm.v.iter().all(|v| v.abs() < 0.02), "{:?}", arm.v);
+    }
+}
+
+/// Whatever a joint does not stand while gains are on trial: they are not what it goes on with. Later a push says nothing about them.
+#[test]
+fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
+    for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
+        let (mut arm, mut rig) = held_with(1.0);
+        assert_eq!(give(&mut arm, &mut rig, &times(0.5)), DataStatus::NoError);
+        arm.run(&mut rig, wait);
+        arm.push[1] = -90.0;
+        arm.run(&mut rig, 150);
+        arm.push[1] = 0.0;
+        arm.run(&mut rig, 1_500);
+        let causes = causes(&mut rig);
+        assert_eq!(causes, joint_error::TORQUE, "after {wait} ms");
+        let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
+        assert_eq!(found(&rig), kind, "after {wait} ms");
+        assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+        // An error to measure the stiffness by.
+        arm.push[0] = 15.0;
+        arm.run(&mut rig, 20);
+        let expected = if taken_back { 8000.0 } else { 4000.0 };
+        assert!((stiffness(&rig, 0) - expected).abs() < 1.0, "after {wait} ms: {}", stiffness(&rig, 0));
+    }
+}
+
+/// No torque steps when gains come in, whatever the integral has of it.
+#[test]
+fn j71_gains_come_in_without_a_step_of_the_torque() {
+    let worst_step = |gains: Option<Gains>| {
+        let (mut arm, mut rig) = held_with(0.3);
+        if let Some(gains) = gains {
+            rig.send(FrameType::PidParam, &body(&gains));
+        }
+        let (mut last, mut worst) = (rig.torque, 0.0f64);
+        for _ in 0..1_500 {
+            arm.tick(&mut rig);
+            worst = (0..6).map(|j| (rig.torque[j] - last[j]).abs()).fold(worst, f64::max);
+            last = rig.torque;
+        }
+        (worst, rig.controller.telemetry().joints[1].torque_i)
+    };
+    let (quiet, integral) = worst_step(None);
+    for gains in [times(1.5), times(0.1), shipped().map(|g| PidGains { ki: 1.0, ..g })] {
+        let (worst, kept) = worst_step(Some(gains));
+        println!(
+            "{worst:.2} N·m a tick, {quiet:.2} without new gains; integral {integral:.1}, then {kept:.1} N·m"
+        );
+        // A step of the encoder makes as much, with one and a half times the gains.
+        let encoder = 1.5 * (8000.0 + 80.0 / 0.005) * plant::ENCODER_STEP;
+        assert!(worst <= encoder + 0.1, "{worst} N·m, a step of the encoder makes {encoder}");
+        assert!((kept - integral).abs() < 1.0, "{integral}, then {kept} N·m");
+    }
+}
+
+/// A loop that is unstable when the joints are enabled: there are no gains before, and softer ones hold the arm.
+#[test]
+fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
+    let model = Parameters::avena().model;
+    let mut arm = Plant::new(&loaded(model, 2.0), LuGre::of_avena_times(0.05), POSE);
+    let mut rig = Rig::new(Config::avena());
+    rig.follow = false;
+    arm.report(&mut rig);
+    rig.defaults();
+    let swinging = of([[8000.0, 50_000.0, 5.0]; 6]);
+    assert_eq!(rig.ask(FrameType::PidParam, &body(&swinging)), DataStatus::NoError);
+    while rig.nodes[..6].iter().any(|node| node.report.state != NodeState::ENABLED) {
+        arm.tick(&mut rig);
+    }
+    arm.brakes = false;
+    let from = arm.q;
+    let farthest = farthest(&mut arm, &mut rig, &from, 8_000);
+    println!("{farthest} rad");
+    let causes = causes(&mut rig);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    assert_eq!(found(&rig), StopKind::Unstable, "{causes:#x}");
+    assert!(farthest < 0.09, "{farthest} rad");
+    // They hold it: a touch makes no swing that goes on.
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    arm.run(&mut rig, 2_000);
+    arm.push[1] = 20.0;
+    arm.run(&mut rig, 50);
+    arm.push[1] = 0.0;
+    arm.run(&mut rig, 5_000);
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+    let speeds = arm.v.map(f64::abs);
+    assert!(speeds.iter().all(|v| *v < 0.02), "{speeds:?}");
+}
+
+/// Kp that acts in joint 1 after it was pushed a little, N·m/rad.
+fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
+    arm.push[0] = 15.0;
+    arm.run(rig, 20);
+    arm.push[0] = 0.0;
+    stiffness(rig, 0)
+}
+
+/// The operator presses the safety input because the arm shakes, or a drive gives up: the arm is not enabled again with these gains.
+#[test]
+fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
+    for (wait, taken_back) in [(1_000, true), (2_300, false)] {
+        for drive in [false, true] {
+            let (mut arm, mut rig) = held_with(1.0);
+            assert_eq!(give(&mut arm, &mut rig, &times(0.5)), DataStatus::NoError);
+            arm.run(&mut rig, wait);
+            arm.brakes = true;
+            if drive {
+                rig.nodes[2].fault();
+            } else {
+                rig.safety_input = false;
+            }
+            arm.run(&mut rig, 50);
+            assert_eq!(rig.state(), ControllerState::Error);
+            rig.safety_input = true;
+            arm.run(&mut rig, 50);
+            rig.clear(true, 0x7F);
+            arm.run(&mut rig, 6_000);
+            arm.brakes = false;
+            arm.run(&mut rig, 2_000);
+            assert_eq!(rig.state(), ControllerState::HoldPos, "drive {drive}, {wait} ms");
+            let expected = if taken_back { 8000.0 } else { 4000.0 };
+            let stiffness = stiffness_when_pushed(&mut arm, &mut rig);
+            assert!((stiffness - expected).abs() < 1.0, "drive {drive}, {wait} ms: {stiffness}");
+            let told = rig.controller.reactions().stop.map(|(cause, _)| (cause.kind, cause.joint));
+            assert_eq!(told, taken_back.then_some((StopKind::Gains, 0)));
+        }
+    }
+}
+
+/// Teaching says nothing about gains: the trial goes on behind it.
+#[test]
+fn j71_teaching_does_not_end_a_trial() {
+    let (mut arm, mut rig) = held_with(1.0);
+    assert_eq!(give(&mut arm, &mut rig, &times(0.5)), DataStatus::NoError);
+    arm.run(&mut rig, 600);
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    let mut ticks = 0;
+    while rig.state() != ControllerState::Teaching && ticks < 9_000 {
+        arm.tick(&mut rig);
+        ticks += 1;
+    }
+    assert!(ticks < 1_000, "{ticks} ms of the trial");
+    arm.run(&mut rig, 5_000);
+    rig.send(FrameType::TeachingModeDisable, &[]);
+    arm.run(&mut rig, 800);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    arm.push[1] = -90.0;
+    arm.run(&mut rig, 150);
+    arm.push[1] = 0.0;
+    arm.run(&mut rig, 1_500);
+    assert_eq!(found(&rig), StopKind::Gains);
+}
+
+/// An arm whose joints are too light for its gains with the present settings is not stored, where Disable has left its parts behind.
+#[test]
+fn j71_an_arm_that_would_be_refused_is_not_stored() {
+    use FrameType::{Disable, SetSettings, StoreArm};
+    let setting = jtc_core::settings::named("rotor_inertia_kg_m2").expect("a setting").number;
+    let rotors: Vec<u8> =
+        (1..=6).flat_map(|joint| SettingValue { setting, joint, value: 0.05 }.emit()).collect();
+    let mut rig = Rig::holding();
+    rig.press_stop(5);
+    rig.controller.set_store_state(StoreState::Empty, 0);
+    assert_eq!(rig.ask(Disable, &[]), DataStatus::NoError);
+    assert_eq!(rig.ask(SetSettings, &rotors), DataStatus::NoError);
+    assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
+}
+
+/// Gains, model and settings that do not go together are refused, whichever comes last, and change nothing. After Disable another arm can be
+/// given in any order.
+#[test]
+fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
+    use FrameType::{
+        ArmModelUseDefault, Disable, FrictionPolynomialUseDefault, PidParam, PidParamUseDefault, SetSettings,
+    };
+    let rotors = |rotor: f64| -> Vec<u8> {
+        let setting = jtc_core::settings::named("rotor_inertia_kg_m2").expect("a setting").number;
+        (1..=6).flat_map(|joint| SettingValue { setting, joint, value: rotor }.emit()).collect()
+    };
+    let (good, bad) = (DataStatus::NoError, DataStatus::IncorrectValue);
+    let mut rig = Rig::holding();
+    rig.press_stop(5);
+    assert_eq!(rig.state(), ControllerState::Error);
+    // Light rotors do not bear the gains in use; lighter gains come first.
+    assert_eq!(rig.ask(SetSettings, &rotors(0.05)), bad);
+    assert_eq!(rig.ask(PidParam, &body(&times(3.0))), bad);
+    assert_eq!(rig.ask(PidParam, &body(&times(0.1))), good);
+    assert_eq!(rig.ask(SetSettings, &rotors(0.05)), good);
+    assert_eq!(rig.ask(PidParamUseDefault, &[]), bad);
+    assert_eq!(rig.ask(ArmModelUseDefault, &[]), good);
+    // Without the last arm there is nothing to compare with, until both are there again.
+    assert_eq!(rig.ask(Disable, &[]), good);
+    assert_eq!(rig.ask(PidParamUseDefault, &[]), good);
+    assert_eq!(rig.ask(ArmModelUseDefault, &[]), bad);
+    assert_eq!(rig.ask(SetSettings, &rotors(0.7)), good);
+    assert_eq!(rig.ask(ArmModelUseDefault, &[]), good);
+    assert_eq!(rig.ask(FrictionPolynomialUseDefault, &[]), good);
+    rig.clear(true, 0);
+    rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
+    // Never a long tick: each of the slices of a model takes one.
+    rig.send(ArmModelUseDefault, &[]);
+    let ticks = rig.until(100, |rig| rig.waiting() == 0);
+    assert!((18..=20).contains(&ticks), "{ticks}");
+}
+
+/// An arm without physics whose first joint jerks: each jerk takes the torque to both limits, for too short a time to overload the joint.
+fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
+    rig.follow = false;
+    for pause in pauses_ms {
+        rig.nodes[0].report.position = 4e-3;
+        rig.run(2);
+        rig.nodes[0].report.position = 0.0;
+        rig.run(*pause);
+    }
+}
+
+/// Two joints swing against new gains. The gains before come back, and what the second joint has swung before says nothing about them.
+#[test]
+fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
+    let mut config = Config::avena();
+    (config.joints[0].torque_max, config.joints[5].torque_max) = (10.0, 10.0);
+    (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);
+    let mut rig = Rig::holding_with(config);
+    rig.run(1_000);
+    assert_eq!(rig.ask(FrameType::PidParam, &body(&times(0.9))), DataStatus::NoError);
+    rig.run(3_000);
+    rig.follow = false;
+    let jerk = |rig: &mut Rig, joints: &[usize]| {
+        joints.iter().for_each(|j| rig.nodes[*j].report.position = 4e-3);
+        rig.run(2);
+        joints.iter().for_each(|j| rig.nodes[*j].report.position = 0.0);
+        rig.run(40);
+    };
+    jerk(&mut rig, &[0]);
+    jerk(&mut rig, &[0, 5]);
+    jerk(&mut rig, &[5]);
+    assert_eq!(found(&rig), StopKind::Gains);
+    rig.run(1_000);
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    for (j, kp) in [(0, 8000.0), (5, 4000.0)] {
+        rig.nodes[j].report.position = 1e-3;
+        rig.run(20);
+        let stiffness = stiffness(&rig, j);
+        assert!((stiffness - kp).abs() < 1.0, "joint {}: {stiffness}", j + 1);
+    }
+}
+
+#[test]
+fn j66_a_torque_that_goes_from_limit_to_limit_gets_softer_gains() {
+    let holding = || {
+        let mut config = Config::avena();
+        config.joints[0].torque_max = 10.0;
+        // Such a joint has more friction than torque.
+        (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);
+        let mut rig = Rig::holding_with(config);
+        rig.run(1_000);
+        rig
+    };
+    // Jerks that are far apart are not a swing of the loop.
+    let mut rig = holding();
+    jerks(&mut rig, &[250, 250, 250]);
+    assert_eq!(causes(&mut rig), 0);
+    jerks(&mut rig, &[110, 20]);
+    assert_eq!((causes(&mut rig), found(&rig)), (joint_error::TORQUE, StopKind::Unstable));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, error::INTERNAL_JOINTS));
+    rig.run(1_000);
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    rig.nodes[0].report.position = 1e-3;
+    rig.run(20);
+    assert!((stiffness(&rig, 0) - 0.3 * 8000.0).abs() < 1.0, "{}", stiffness(&rig, 0));
+    assert_eq!(rig.controller.telemetry().joints[0].torque_i, 0.0);
+}

@@ -1,0 +1,113 @@
+//! Whether a controller takes the gains of an arm (J-71), and whether they damp it.
+
+use host_kit::Severity;
+use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
+use jtc_dynamics::{Dynamics, JointVec, Payload};
+use jtc_wire::Joint;
+
+use super::ArmFinding;
+use crate::arm::Arm;
+use crate::arm::statics::{POSES, pose};
+
+/// Heaviest payload for which the damping is looked at, kg.
+const PAYLOAD_MAX: f64 = 5.0;
+/// Delay of the position gain beside that of the controller's setting, and the length of a tick, s: half of a tick, for which a torque
+/// is held.
+const HALF_A_TICK: f64 = 0.5e-3;
+const TICK: f64 = 1e-3;
+
+impl Arm {
+    /// Joints that are too light for their gains, which a controller refuses, and joints that their gains do not damp.
+    pub(super) fn find_borne(&self, findings: &mut Vec<ArmFinding>) {
+        let Some(pid) = &self.pid else { return };
+        let (config, delay) = (self.config(), self.config().delay_ticks);
+        let felt = least_felt_inertia(&self.model, &config);
+        let (payload, moved) = self.heaviest_moved();
+        for (joint, gains) in Joint::ALL.into_iter().zip(pid) {
+            let j = joint.index();
+            // What is found for stability says more.
+            if findings.iter().any(|found| found.code == "gains" && found.joint == Some(joint)) {
+                continue;
+            }
+            let needed = inertia_needed(gains, delay);
+            if felt[j] < needed {
+                findings.push(self.too_light(joint, gains, felt[j], needed));
+            } else if gains.kp > 0.0 {
+                let delayed = gains.kp * (TICK * f64::from(delay) + HALF_A_TICK);
+                let damped = delayed + gains.ki * moved[j] / gains.kp;
+                if gains.kd < damped {
+                    findings.push(self.undamped(joint, gains, damped, delayed, payload));
+                }
+            }
+        }
+    }
+
+    fn too_light(&self, joint: Joint, gains: &PidGains, felt: f64, needed: f64) -> ArmFinding {
+        let PidGains { kp, kd, .. } = gains;
+        let what = format!(
+            "{}: Kp {kp} and Kd {kd} need {needed:.3} kg·m², the joint feels {felt:.3} kg·m² where it feels least",
+            self.titled(joint)
+        );
+        ArmFinding::new(Severity::Problem, "too-light", what)
+            .because(
+                "their torque is some milliseconds late, and a joint that is too light for it oscillates",
+            )
+            .next(format!(
+                "Kp and Kd times {:.2} at most; or the rotor inertia, if that is missing",
+                felt / needed
+            ))
+            .of(joint, "pid")
+            .measured(felt, needed, "kg·m²")
+    }
+
+    fn undamped(
+        &self,
+        joint: Joint,
+        gains: &PidGains,
+        needed: f64,
+        delayed: f64,
+        payload: f64,
+    ) -> ArmFinding {
+        let PidGains { kd, ki, .. } = gains;
+        let with = if payload > 0.0 { format!(" with {payload:.1} kg at the flange") } else { String::new() };
+        let what = format!(
+            "{}: Kd {kd} N·m·s/rad does not damp the joint{with}: {needed:.1} is needed",
+            self.titled(joint)
+        );
+        // What the delay of Kp leaves of Kd is for the integral.
+        let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
+        ArmFinding::new(Severity::Warning, "damping", what)
+            .because(
+                "the delay of Kp and the integral take its damping away: without friction the joint swings",
+            )
+            .next(if ki > 0.0 {
+                format!("Kd of {needed:.1} or more, or Ki of {ki:.0} or less")
+            } else {
+                format!("Kd of {needed:.1} or more, or a smaller Kp")
+            })
+            .of(joint, "pid")
+            .measured(*kd, needed, "N·m·s/rad")
+    }
+
+    /// The heaviest payload up to [`PAYLOAD_MAX`] that the torque limits hold in every pose, kg, and the greatest inertia that each joint
+    /// moves with it, the others held, kg·m².
+    fn heaviest_moved(&self) -> (f64, JointVec) {
+        let ranges = self.ranges();
+        let bare = Dynamics::new(&self.model, self.config().gravity);
+        let mut mass = PAYLOAD_MAX;
+        for q in (0..POSES).map(|n| pose(n, &ranges)) {
+            let (own, more) = (bare.gravity_torque(&q), bare.flange_torque(&q));
+            for j in 0..JOINTS {
+                let left = (self.joints[j].torque_max - own[j].abs()).max(0.0);
+                mass = mass.min(left / more[j].abs().max(1e-9));
+            }
+        }
+        let payload = Payload { mass, ..Payload::default() };
+        let loaded = Dynamics::with_payload(&self.model, [0.0; 3], &payload);
+        let mut moved = [0.0f64; JOINTS];
+        for matrix in (0..POSES).map(|n| loaded.mass_matrix(&pose(n, &ranges))) {
+            (0..JOINTS).for_each(|j| moved[j] = moved[j].max(matrix[j][j]));
+        }
+        (mass, std::array::from_fn(|j| moved[j] + self.joints[j].counted_rotor()))
+    }
+}

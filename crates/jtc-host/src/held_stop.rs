@@ -1,0 +1,227 @@
+//! A held stop (J-69) as every front end shows it: cause, values, and what helps.
+
+use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
+use serde::Serialize;
+
+use crate::explain::{self, Page};
+use crate::words;
+
+/// What leads on after an encoder has jumped (J-35), with commands.
+pub const AFTER_ENCODER_JUMP: &str = "support the arm, `jtc disable`, compare the joint with its marks, `jtc reset --joints JOINT`, \
+     then `jtc recover`; if it comes again, the encoder, its cable or the setting `velocity_full_scale_rad_s` is wrong";
+
+/// The last held stop of a controller.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldStop {
+    /// Kind of the cause: its name with hyphens.
+    pub kind: String,
+    /// Number of the kind on the wire.
+    pub number: u8,
+    /// Name of its page: `jtc explain CODE`.
+    pub code: &'static str,
+    /// Joint from 1 that the cause was found at first; `None`: at none in particular.
+    pub joint: Option<u8>,
+    /// Value that was found; `None` where the kind has none.
+    pub value: Option<f32>,
+    /// Limit of the value; `None` where there is none.
+    pub limit: Option<f32>,
+    /// Unit of value and limit; empty where they have none.
+    pub unit: &'static str,
+    /// Cause in a sentence without a full stop.
+    pub text: String,
+    /// What removes the cause, without commands.
+    pub remedy: String,
+    /// Time since the held stop began, s.
+    pub ago_s: f64,
+}
+
+impl HeldStop {
+    /// That of a cause that was found `ago_ms` ago.
+    pub fn new(cause: &StopCause, ago_ms: u32) -> Self {
+        let (value, limit) = figures(cause);
+        Self {
+            kind: cause.kind.name().replace(' ', "-"),
+            number: cause.kind as u8,
+            code: page(cause.kind).map_or("", |page| page.name),
+            joint: joint(cause).map(Joint::number),
+            value,
+            limit,
+            unit: cause.kind.unit(),
+            text: cause.to_string(),
+            remedy: remedy(cause.kind),
+            ago_s: f64::from(ago_ms) * 1e-3,
+        }
+    }
+
+    /// The last one that a controller tells of.
+    pub fn last(reactions: &Reactions) -> Option<Self> {
+        reactions.stop.as_ref().map(|(cause, ago_ms)| Self::new(cause, *ago_ms))
+    }
+
+    /// The cause and its age in one line: `joint 2 was pushed: …; 12 s ago`.
+    pub fn line(&self) -> String {
+        format!("{}; {} ago", self.text, age(self.ago_s))
+    }
+}
+
+/// What a controller does about what it has found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Reacting {
+    /// The last held stop; `None`: there was none since the start, or since the occurred errors were cleared.
+    pub last_held_stop: Option<HeldStop>,
+    /// Joints from 1 that yield or lower their loads.
+    pub yields: Vec<u8>,
+    /// Joints from 1 whose encoder has jumped since their drives were configured.
+    pub encoder_jumped: Vec<u8>,
+    /// Rate of path time, path seconds per second; 0 where no trajectory is executed.
+    pub path_rate: f32,
+    /// Time for which this run has been held back because a torque was at its limit, s.
+    pub held_back_s: f64,
+}
+
+impl From<&Reactions> for Reacting {
+    fn from(reactions: &Reactions) -> Self {
+        let numbers = |mask| joints(mask).into_iter().map(Joint::number).collect();
+        Self {
+            last_held_stop: HeldStop::last(reactions),
+            yields: numbers(reactions.yields),
+            encoder_jumped: numbers(reactions.jumped),
+            path_rate: reactions.rate,
+            held_back_s: f64::from(reactions.held_back_ms) * 1e-3,
+        }
+    }
+}
+
+impl Reacting {
+    /// What a controller tells of itself; `None` where it does not report it.
+    pub fn of(info: &Info) -> Option<Self> {
+        info.reactions.as_ref().map(Self::from)
+    }
+}
+
+/// The joints of a mask with a bit for each.
+pub fn joints(mask: u8) -> Vec<Joint> {
+    Joint::ALL.into_iter().filter(|joint| mask & 1 << joint.index() != 0).collect()
+}
+
+/// The joint that a cause was found at first.
+pub fn joint(cause: &StopCause) -> Option<Joint> {
+    Joint::from_number(cause.joint.into())
+}
+
+/// Value and limit of a cause, as far as its kind has them.
+pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
+    let known = match cause.kind {
+        StopKind::Approach | StopKind::Gains => (false, false),
+        StopKind::SpeedScale | StopKind::EncoderJump => (true, false),
+        StopKind::Overload
+        | StopKind::Push
+        | StopKind::Shove
+        | StopKind::PositionError
+        | StopKind::Position
+        | StopKind::Velocity
+        | StopKind::Acceleration
+        | StopKind::FrictionTable
+        | StopKind::Unstable => (true, true),
+    };
+    (known.0.then_some(cause.value), (known.1 && cause.limit != 0.0).then_some(cause.limit))
+}
+
+/// The page about a kind.
+pub fn page(kind: StopKind) -> Option<&'static Page> {
+    explain::pages().find(|page| page.family == explain::Family::Stop && page.code == u32::from(kind as u8))
+}
+
+/// What removes a cause, without commands and without a full stop: part of a sentence.
+pub fn remedy(kind: StopKind) -> String {
+    page(kind).map_or_else(String::new, |page| clause(page.remedy))
+}
+
+/// What usually is behind a cause, without a full stop: part of a sentence.
+pub fn usual_cause(kind: StopKind) -> String {
+    page(kind).map_or_else(String::new, |page| clause(page.cause))
+}
+
+/// A sentence as part of another one.
+fn clause(sentence: &str) -> String {
+    let mut letters = sentence.trim_end_matches('.').chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// What leads on from a held stop, with commands.
+pub fn next_step(status: &Status, cause: Option<&StopCause>) -> String {
+    match cause.map(|cause| cause.kind) {
+        Some(StopKind::EncoderJump) => AFTER_ENCODER_JUMP.to_owned(),
+        Some(kind) if status.is_held_stop() && status.state != ControllerState::Teaching => {
+            words::next_step(status).replacen(words::REMOVE_THE_CAUSE, &remedy(kind), 1)
+        }
+        _ => words::next_step(status).to_owned(),
+    }
+}
+
+/// A time in the unit that fits.
+pub fn age(s: f64) -> String {
+    match s.max(0.0) as u64 {
+        s @ 0..120 => format!("{s} s"),
+        s @ 120..7_200 => format!("{} min", s / 60),
+        s @ 7_200..172_800 => format!("{} h", s / 3600),
+        s => format!("{} days", s / 86_400),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PUSH: StopCause = StopCause { kind: StopKind::Push, joint: 2, value: -61.5, limit: 54.0 };
+
+    #[test]
+    fn j69_a_held_stop_has_joint_value_limit_and_age() {
+        let stop = HeldStop::new(&PUSH, 12_400);
+        assert_eq!((stop.kind.as_str(), stop.number, stop.joint), ("push", 2, Some(2)));
+        assert_eq!((stop.value, stop.limit, stop.unit), (Some(-61.5), Some(54.0), "N·m"));
+        assert!(
+            stop.line().starts_with("joint 2 was pushed: the controller held 61.5 N·m"),
+            "{}",
+            stop.line()
+        );
+        assert!(stop.line().ends_with("; 12 s ago"), "{}", stop.line());
+        let approach = StopCause { kind: StopKind::Approach, joint: 0, value: 0.0, limit: 0.0 };
+        let stop = HeldStop::new(&approach, 0);
+        assert_eq!((stop.joint, stop.value, stop.limit), (None, None, None));
+        let scale = StopCause { kind: StopKind::SpeedScale, joint: 3, value: 2.0, limit: 0.0 };
+        assert_eq!(figures(&scale), (Some(2.0), None));
+    }
+
+    /// Each kind says something of its own, and every one has a page.
+    #[test]
+    fn j69_each_kind_has_its_own_remedy() {
+        let remedies = StopKind::ALL.map(remedy);
+        for (kind, text) in StopKind::ALL.into_iter().zip(&remedies) {
+            assert!(!text.is_empty() && !text.ends_with('.') && page(kind).is_some(), "{kind}: {text}");
+            assert_eq!(remedies.iter().filter(|other| *other == text).count(), 1, "{kind}: {text}");
+        }
+    }
+
+    #[test]
+    fn j69_the_next_step_is_that_of_the_kind() {
+        let held = Status {
+            state: ControllerState::HoldPos.into(),
+            errors: jtc_wire::error::INTERNAL_JOINTS,
+            ..Status::default()
+        };
+        let next = next_step(&held, Some(&PUSH));
+        assert!(next.starts_with(&remedy(StopKind::Push)) && next.contains("`jtc clear`"), "{next}");
+        assert_eq!(next_step(&held, None), words::next_step(&held));
+        let jump = StopCause { kind: StopKind::EncoderJump, ..PUSH };
+        assert!(next_step(&held, Some(&jump)).contains("`jtc disable`"));
+        let taught = Status { state: ControllerState::Teaching.into(), ..held };
+        assert!(next_step(&taught, Some(&PUSH)).starts_with("`jtc teach off`"));
+    }
+
+    #[test]
+    fn a_time_is_written_in_its_unit() {
+        let times = [0.0, 119.9, 120.0, 7_199.0, 7_200.0, 172_799.0, 172_800.0].map(age);
+        assert_eq!(times, ["0 s", "119 s", "2 min", "119 min", "2 h", "47 h", "2 days"]);
+    }
+}

@@ -1,0 +1,8 @@
+//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+mod arm_numbers;
+mod codes_page;
+mod fuzz_regressions;
+mod margin;
+mod serial;
+mod sessions;
+mod soak_paths;

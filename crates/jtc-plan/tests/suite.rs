@@ -1,0 +1,14 @@
+//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+mod along;
+mod choices;
+mod error_places;
+mod flange_errors;
+mod flange_path;
+mod judge;
+mod kinematics;
+mod lines;
+mod point_to_point;
+mod random;
+mod robots;
+mod route;
+mod times;

@@ -1,0 +1,243 @@
+//! What the arm does when it is pushed, meets something, carries what nobody told it, or is cleared while it falls.
+use jtc_bus::Joint;
+use jtc_core::{ControllerState, JOINTS, TrajectoryState};
+use jtc_dynamics::Dynamics;
+
+use super::standstill::state_then;
+use super::{MatrixError, bring_to, config_for};
+use crate::arm::Side;
+use crate::config::{ModelError, Support};
+use crate::faults::{Fault, FaultKind, Trigger};
+use crate::host;
+use crate::operator::Operator;
+
+/// What is watched, ms: longer than the motion has left.
+const WATCH_MS: u64 = 5_000;
+/// How long a push lasts, ms, and its share of what a joint can be pushed by and held.
+const PUSH_MS: u64 = 500;
+const PUSH_SHARE: f64 = 0.8;
+/// Stiffness (N·m/rad) and damping (N·m·s/rad) of a wall that a joint meets, and how far away it is, rad.
+const WALL: (f64, f64, f64) = (3_000.0, 20.0, 0.1);
+/// Stiffness (N/m) and damping (N·s/m) of a plane that the flange meets, and how far away it is, m.
+const PLANE: (f64, f64, f64) = (20_000.0, 100.0, 0.05);
+
+/// What happens to the arm.
+#[derive(Clone, Copy)]
+enum Meets {
+    /// Somebody pushes a joint.
+    Push(Joint),
+    /// A joint meets a wall on its path.
+    Wall(Joint),
+    /// The flange meets a plane across its way.
+    Plane,
+    /// It takes up a load that the controller does not know, kg.
+    Load(f64),
+    /// It takes it up, and drops it after a second.
+    Drops(f64),
+    /// Friction of all joints, as a factor of what the controller has.
+    Friction(f64),
+    /// Masses of all links, in the same way.
+    Masses(f64),
+    /// The safety input is low for 1 ms, and the host clears the error after so many.
+    Cleared(u64),
+}
+
+impl Meets {
+    fn words(self) -> String {
+        match self {
+            Self::Push(joint) => format!("joint {} is pushed for {PUSH_MS} ms", joint.number()),
+            Self::Wall(joint) => format!("joint {} meets a wall", joint.number()),
+            Self::Plane => "the flange meets a wall".to_owned(),
+            Self::Load(mass) => format!("{mass} kg, unknown, are taken up"),
+            Self::Drops(mass) => format!("{mass} kg, unknown, are taken up, and dropped after 1 s"),
+            Self::Friction(factor) => format!("friction times {factor} in all joints"),
+            Self::Masses(factor) => format!("masses times {factor}"),
+            Self::Cleared(ms) => format!("safety input low for 1 ms, cleared after {ms} ms"),
+        }
+    }
+
+    /// The joint that is meant, if one is.
+    fn joint(self) -> Option<usize> {
+        match self {
+            Self::Push(joint) | Self::Wall(joint) => Some(joint.index()),
+            _ => None,
+        }
+    }
+
+    /// Errors of the model that are there from the beginning.
+    fn model_error(self) -> ModelError {
+        match self {
+            Self::Friction(factor) => {
+                ModelError { friction_factors: Some([factor; JOINTS]), ..ModelError::NONE }
+            }
+            Self::Masses(factor) => ModelError { mass_factors: Some([factor; 7]), ..ModelError::NONE },
+            _ => ModelError::NONE,
+        }
+    }
+
+    /// What happens before the step of millisecond `ms`, counted from 1.
+    fn before(self, operator: &mut Operator, ms: u64) {
+        let q = operator.world.truth().q;
+        let fault = match self {
+            Self::Push(joint) if ms == 1 => {
+                let torque = push(operator, joint.index());
+                Some((FaultKind::Push { joint, torque }, PUSH_MS))
+            }
+            Self::Wall(joint) if ms == 1 => {
+                let (stiffness, damping, ahead) = WALL;
+                let rad = q[joint.index()] + ahead;
+                Some((FaultKind::JointWall { joint, rad, side: Side::Above, stiffness, damping }, WATCH_MS))
+            }
+            Self::Plane if ms == 1 => Some((plane(operator), WATCH_MS)),
+            Self::Load(mass) if ms == 1 => Some((load(mass), WATCH_MS)),
+            Self::Drops(mass) if ms == 1 => Some((load(mass), 1_000)),
+            Self::Cleared(_) if ms == 1 => Some((FaultKind::SafetyInput, 1)),
+            _ => None,
+        };
+        if let Some((kind, lasts)) = fault {
+            let trigger = Trigger::At(operator.world.now_us() / 1000);
+            operator.world.inject(Fault { kind, trigger, duration_ms: Some(lasts) });
+        }
+        if let Self::Cleared(after) = self
+            && ms == after
+        {
+            operator.world.host_write(&host::clear_all());
+        }
+    }
+}
+
+fn load(mass: f64) -> FaultKind {
+    FaultKind::Payload { mass, com: [0.0, 0.0, 0.05] }
+}
+
+/// A push with gravity, of which the joint can hold 0.8 beside 1.1 times its load and a reserve of 5 %, N·m.
+fn push(operator: &Operator, joint: usize) -> f64 {
+    let config = operator.world.config();
+    let q = operator.world.truth().q;
+    let holds = Dynamics::new(&config.arm.model, config.arm.gravity).gravity_torque(&q)[joint];
+    let left = 0.95 * config.controller.joints[joint].torque_max - 1.1 * holds.abs();
+    -holds.signum() * PUSH_SHARE * left.max(0.0)
+}
+
+/// A plane across the way of the flange, a little ahead of it.
+fn plane(operator: &Operator) -> FaultKind {
+    let config = operator.world.config();
+    let truth = operator.world.truth();
+    let dynamics = Dynamics::new(&config.arm.model, config.arm.gravity);
+    let place = |q: &[f64; JOINTS]| dynamics.forward_kinematics(q)[JOINTS].position;
+    let here = place(&truth.q);
+    let soon = place(&core::array::from_fn(|j| truth.q[j] + 1e-3 * truth.qd[j]));
+    let way: [f64; 3] = core::array::from_fn(|i| soon[i] - here[i]);
+    let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+    let (stiffness, damping, ahead) = PLANE;
+    let position = core::array::from_fn(|i| here[i] + ahead * way[i] / length);
+    FaultKind::Wall { position, normal: way.map(|x| -x / length), stiffness, damping }
+}
+
+/// What became of it.
+struct Outcome {
+    then: String,
+    /// First reaction, ms.
+    found: Option<u64>,
+    /// The motion came to its end.
+    ended: bool,
+    /// Longest way of the joint that is meant, or of any; of the others; rad.
+    way: [f64; 2],
+    /// Highest speed of a joint, rad/s.
+    speed: f64,
+    /// Strongest torque from outside in one joint, and the one that stays, N·m.
+    torque: [f64; 2],
+    /// Work of the arm against what is outside, and of that on the arm, J.
+    work: [f64; 2],
+}
+
+/// The table, as Markdown.
+pub fn contact_table() -> Result<String, MatrixError> {
+    let mut out = format!(
+        "The default arm on drives without brakes. A push is with gravity, and {} % of what the joint can hold beside its load; a wall of\n\
+         {} N·m/rad stands {} rad ahead of the joint on its path, one of {} N/m {} m ahead of the flange. The way of an arm that is held counts from\n\
+         where it was, of one that moves from where it met something, the path to the place where it stops included. The torque is the highest that\n\
+         presses on a joint from outside, and what stays of it after {} s. The energy is what the arm gives to a wall or a hand, and what it takes\n\
+         from them. A joint that is pushed for long yields (J-68). An arm that falls is enabled again when it stands: nothing catches it before.\n\n\
+         | what happens | in | state then | found after | way; other joints | speed | torque; lasting | energy given; taken |\n\
+         |---|---|---|---|---|---|---|---|\n",
+        100.0 * PUSH_SHARE,
+        WALL.0,
+        WALL.2,
+        PLANE.0,
+        PLANE.2,
+        WATCH_MS / 1000
+    );
+    use ControllerState::{HoldPos, Operate};
+    let pushes = Joint::ALL.into_iter().flat_map(|joint| [HoldPos, Operate].map(|s| (Meets::Push(joint), s)));
+    let walls = Joint::ALL.into_iter().map(|joint| (Meets::Wall(joint), Operate));
+    let loads = [Meets::Load(2.0), Meets::Load(4.0), Meets::Drops(2.0)];
+    let loads = loads.into_iter().flat_map(|load| [HoldPos, Operate].map(|state| (load, state)));
+    let models = [Meets::Friction(1.2), Meets::Friction(1.5), Meets::Masses(1.1), Meets::Masses(1.2)];
+    let models = models.into_iter().map(|model| (model, Operate));
+    let cleared = [20, 400, 3_000].map(|ms| (Meets::Cleared(ms), HoldPos));
+    let rows = pushes.chain(walls).chain([(Meets::Plane, Operate)]).chain(loads).chain(models).chain(cleared);
+    for (meets, state) in rows {
+        let outcome = outcome(meets, state)?;
+        if !matches!(meets, Meets::Cleared(_)) && outcome.then.starts_with("Error") {
+            return Err(MatrixError::Released { state });
+        }
+        out += &outcome.row(&meets.words(), state);
+    }
+    Ok(out)
+}
+
+fn outcome(meets: Meets, state: ControllerState) -> Result<Outcome, MatrixError> {
+    let config =
+        crate::config::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
+    let mut operator = bring_to(config, state)?;
+    if state == ControllerState::HoldPos {
+        // What it carries is known.
+        operator.run(3_000);
+    }
+    let from = operator.world.truth().q;
+    let before = (operator.state(), operator.world.telemetry().errors);
+    let (mut found, mut ended) = (None, false);
+    let (mut way, mut speed, mut torque, mut work) = ([0.0f64; 2], 0.0f64, [0.0f64; 2], [0.0f64; 2]);
+    for ms in 1..=WATCH_MS {
+        meets.before(&mut operator, ms);
+        operator.step();
+        let truth = operator.world.truth();
+        let strongest = truth.outside.iter().fold(0.0f64, |most, torque| most.max(torque.abs()));
+        torque = [torque[0].max(strongest), strongest];
+        for j in 0..JOINTS {
+            let meant = meets.joint().is_none_or(|joint| joint == j);
+            let way = &mut way[usize::from(!meant)];
+            *way = way.max((truth.q[j] - from[j]).abs());
+            speed = speed.max(truth.qd[j].abs());
+            let power = truth.outside[j] * truth.qd[j];
+            work[usize::from(power > 0.0)] += power.abs() * 1e-3;
+        }
+        let telemetry = operator.world.telemetry();
+        ended |= telemetry.trajectory == TrajectoryState::Finish;
+        let now = (telemetry.state, telemetry.errors);
+        if found.is_none() && now != before && !ended {
+            found = Some(ms);
+        }
+    }
+    let t = operator.world.telemetry();
+    let joints = t.joints.iter().fold(0, |word, joint| word | joint.internal);
+    let then = state_then(t.state, t.trajectory, t.errors, joints);
+    Ok(Outcome { then, found, ended, way, speed, torque, work })
+}
+
+impl Outcome {
+    fn row(&self, what: &str, state: ControllerState) -> String {
+        let Self { then, found, ended, way, speed, torque, work } = self;
+        let found = found.map_or_else(|| "no reaction".to_owned(), |ms| format!("{ms} ms"));
+        let (then, ways) = if *ended {
+            ("the motion came to its end".to_owned(), "its path".to_owned())
+        } else {
+            (then.clone(), format!("{:.3}; {:.3} rad", way[0], way[1]))
+        };
+        format!(
+            "| {what} | {state:?} | {then} | {found} | {ways} | {speed:.2} rad/s | {:.0}; {:.0} N·m | {:.1}; {:.1} J |\n",
+            torque[0], torque[1], work[0], work[1]
+        )
+    }
+}

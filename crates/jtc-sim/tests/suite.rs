@@ -1,0 +1,19 @@
+//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+mod bring_up;
+mod by_hand;
+mod determinism;
+mod elastic;
+mod falling;
+mod fault_matrix;
+mod free_fall;
+mod obstacles;
+mod own_controller;
+mod recorder;
+mod soak;
+mod stiction;
+mod stop;
+mod stop_under_load;
+mod stories;
+mod tracking;
+mod violent;
+mod walls;

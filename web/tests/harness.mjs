@@ -197,7 +197,7 @@ export async function recoverAs(page, arm = 'avena') {
 export async function open(browser, url, { clock = false, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, ...options });
   const page = await context.newPage();
-  page.setDefaultTimeout(60_000);
+  page.setDefaultTimeout(120_000);
   if (clock) await page.clock.install();
   page.complaints = [];
   page.on('console', (message) => {
@@ -214,7 +214,7 @@ export async function passes(page, ms) {
 }
 
 /** Waits until a condition holds in this process: long, for a computer that has much else to do. */
-export async function until(what, condition, within = 30_000) {
+export async function until(what, condition, within = 120_000) {
   const end = Date.now() + within;
   for (;;) {
     const value = await condition();

@@ -37,6 +37,26 @@ test('each state has a word, and says what leads on', () => {
   assert.match(stateWords(controller({ state: 'Init' }), undefined, ['friction']).detail, /friction/);
 });
 
+test('a held stop shows what the controller found, and what to do about that', () => {
+  const stop = { kind: 'push', number: 2, code: 'held-stop-push', joint: 2, value: 61.5, limit: 54, unit: 'N·m', text: 'joint 2 was pushed: …', remedy: 'remove what pushes the joint', since_s: 12 };
+  const held = controller({ errors: ['internal joints error'], error_codes: ['internal-joint-error'], causes: ['joint 2: torque over limit'], held_stop: stop });
+  const words = stateWords(held, undefined, []);
+  assert.equal(words.detail, 'Joint 2 was pushed: …. The arm is held.');
+  assert.equal(words.next, 'Remove what pushes the joint, then acknowledge. Nothing moves until then.');
+  assert.deepEqual(words.causes, [{ words: 'Joint 2 was pushed: …', code: 'held-stop-push' }, { words: 'Joint 2: torque over limit', code: 'joint 2: torque over limit' }]);
+  assert.equal(words.step, 'acknowledge');
+  held.held_stop = { ...stop, kind: 'encoder-jump', remedy: 'support the arm, …, then recover' };
+  assert.equal(stateWords(held, undefined, []).next, 'Support the arm, …, then recover.');
+  // An agent that does not know the cause.
+  delete held.held_stop;
+  assert.match(stateWords(held, undefined, []).next, /^Remove what it met/);
+});
+
+test('an encoder that has jumped is shown until its drive was reset', () => {
+  const words = stateWords(controller({ encoder_jumped: [3], next: 'support the arm' }), undefined, []);
+  assert.deepEqual([words.word, words.detail, words.next], ['Holding', 'Encoder jumped: joint 3. No trajectory is executed.', 'Support the arm.']);
+});
+
 test('held is held only when every drive is enabled', () => {
   const late = controller();
   for (const joint of late.joints.slice(2, 4)) joint.state = 'in transition';

@@ -803,12 +803,15 @@ export interface components {
              *     it is executed.
              */
             commanded_rad?: number[] | null;
+            /** @description Joints from 1 whose encoder had jumped at the last held stop: no trajectory is executed until their drives were reset; missing: none. */
+            encoder_jumped?: number[];
             /** @description Names of their pages, in the same order: `GET /api/explain/{code}`. */
             error_codes: string[];
             /** @description Errors now. */
             errors: string[];
             /** @description Errors since they were cleared last. */
             errors_occurred: string[];
+            held_stop?: components["schemas"]["HeldStopObject"] | null;
             /** @description Joints, from the base. */
             joints: components["schemas"]["JointObject"][];
             /** @description What helps now; empty where nothing is wrong. */
@@ -1117,6 +1120,47 @@ export interface components {
             /** @description `finished`, `stopped` or `failed`. */
             outcome: string;
         };
+        /** @description A held stop: the controller has brought the arm to rest and holds it. */
+        HeldStopObject: {
+            /** @description Name of its page: `GET /api/explain/{code}`. */
+            code: string;
+            /**
+             * Format: u-int8
+             * @description Joint from 1 that the cause was found at first; missing: at none in particular.
+             */
+            joint?: number | null;
+            /**
+             * @description Kind of the cause: `overload`, `push`, `position-error`, `position-over-limit`, `velocity-over-limit`, `acceleration-over-limit`,
+             *     `friction-table-value-missing`, `unstable`, `encoder-jump`, `speed-scale`, `approach`, `gains`, `shove`; later versions may have others.
+             */
+            kind: string;
+            /**
+             * Format: float
+             * @description Limit of the value; missing where there is none.
+             */
+            limit?: number | null;
+            /**
+             * Format: u-int8
+             * @description Number of the kind, as Modbus has it.
+             */
+            number: number;
+            /** @description What removes the cause, in words. */
+            remedy: string;
+            /**
+             * Format: double
+             * @description Time since the held stop began, s.
+             */
+            since_s: number;
+            /** @description Cause in words. */
+            text: string;
+            /** @description Unit of value and limit; empty where they have none. */
+            unit: string;
+            /**
+             * Format: float
+             * @description Value that was found; missing where the kind has none.
+             */
+            value?: number | null;
+        };
         /** @description Who the controller is. */
         InfoObject: {
             /** @description Name of the arm in use. */
@@ -1148,6 +1192,7 @@ export interface components {
             lost_records: number;
             /** @description Parameters that it has not been given. */
             missing: string[];
+            reactions?: components["schemas"]["ReactionsObject"] | null;
             /** @description Its git revision. */
             revision: string;
             /**
@@ -1697,6 +1742,24 @@ export interface components {
             /** @description It does not forbid to run the trajectory. */
             warning: boolean;
         };
+        /** @description What a controller does about what it has found. */
+        ReactionsObject: {
+            /** @description Joints from 1 whose encoder has jumped: no trajectory is executed until their drives were reset. */
+            encoder_jumped: number[];
+            /**
+             * Format: double
+             * @description Time for which this run has been held back because a torque was at its limit, s.
+             */
+            held_back_s: number;
+            last_held_stop?: components["schemas"]["HeldStopObject"] | null;
+            /**
+             * Format: float
+             * @description Rate of path time, path seconds per second; 0 where no trajectory is executed.
+             */
+            path_rate: number;
+            /** @description Joints from 1 that yield to a push, or lower a load. */
+            yields: number[];
+        };
         /** @description The way back to a held arm. */
         RecoverRequest: {
             /** @description The controller uses other limits than this arm has, and they are safe for it. */
@@ -1941,6 +2004,7 @@ export type FlangeObject = components['schemas']['FlangeObject'];
 export type FrameObject = components['schemas']['FrameObject'];
 export type GivenObject = components['schemas']['GivenObject'];
 export type Happening = components['schemas']['Happening'];
+export type HeldStopObject = components['schemas']['HeldStopObject'];
 export type InfoObject = components['schemas']['InfoObject'];
 export type JobObject = components['schemas']['JobObject'];
 export type JogRequest = components['schemas']['JogRequest'];
@@ -1973,6 +2037,7 @@ export type PoseFrom = components['schemas']['PoseFrom'];
 export type PoseObject = components['schemas']['PoseObject'];
 export type PoseRequest = components['schemas']['PoseRequest'];
 export type ProblemObject = components['schemas']['ProblemObject'];
+export type ReactionsObject = components['schemas']['ReactionsObject'];
 export type RecoverRequest = components['schemas']['RecoverRequest'];
 export type ReportPage = components['schemas']['ReportPage'];
 export type ResetRequest = components['schemas']['ResetRequest'];

@@ -22,9 +22,22 @@ export interface StateWords {
   step?: Step;
 }
 
-/** What is wrong now, the most particular first. `explain` takes each as it is. */
+function sentence(words: string): string {
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+/** What is wrong now, the most particular first: the cause of a held stop, then what the errors say. `explain` takes each as it is. */
 export function causesOf(controller: Controller): Cause[] {
-  return controller.causes.map((words) => ({ words: words.charAt(0).toUpperCase() + words.slice(1), code: words }));
+  const stop = controller.held_stop;
+  const found = stop ? [{ words: sentence(stop.text), code: stop.code }] : [];
+  return [...found, ...controller.causes.map((words) => ({ words: sentence(words), code: words }))];
+}
+
+/** What leads on from a held stop, as the agent words it. */
+function afterHeldStop({ held_stop: stop }: Controller): string {
+  if (!stop) return 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.';
+  const remedy = sentence(stop.remedy);
+  return stop.kind === 'encoder-jump' ? `${remedy}.` : `${remedy}, then acknowledge. Nothing moves until then.`;
 }
 
 /** Joints that are set absent: under torque no other drive is in Start. */
@@ -117,7 +130,7 @@ export function stateWords(controller: Controller, job: string | undefined, miss
   if (isHeldStop(controller)) {
     return {
       ...base, tone: 'error', word: 'Held stop', detail: `${causes[0]?.words ?? 'The controller stopped the arm'}. The arm is held.`,
-      next: 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.', step: 'acknowledge',
+      next: afterHeldStop(controller), step: 'acknowledge',
     };
   }
   if (controller.state === 'Error' || causes.length > 0) {
@@ -160,6 +173,11 @@ export function stateWords(controller: Controller, job: string | undefined, miss
         const names = gone.join(', ');
         return { ...base, tone: 'hold', word: 'Holding', detail: `Set absent: ${gone.length === 1 ? 'joint' : 'joints'} ${names}. No motion is executed.`, next: 'Joints that are there can be jogged.' };
       }
+      const jumped = controller.encoder_jumped ?? [];
+      if (jumped.length > 0) {
+        const names = `${jumped.length === 1 ? 'joint' : 'joints'} ${jumped.join(', ')}`;
+        return { ...base, tone: 'hold', word: 'Holding', detail: `Encoder jumped: ${names}. No trajectory is executed.`, next: `${sentence(controller.next)}.` };
+      }
       if (fastest(controller) > MOVES_RAD_S) return { ...base, tone: 'move', word: 'Moving', detail: job ?? 'Joints are jogged.', next: '' };
       return { ...base, tone: 'hold', word: 'Holding', detail: job ?? 'The arm is held, and can be moved.', next: '' };
     }
@@ -180,7 +198,7 @@ export function whatStopDid(before: string | undefined, wasMoving: boolean, now:
 
 /** "recover" is what an event calls it; people read a sentence. */
 export function jobWords(what: string): string {
-  return what.charAt(0).toUpperCase() + what.slice(1);
+  return sentence(what);
 }
 
 /** An event in words; undefined: not worth a line. */

@@ -92,8 +92,10 @@ pub struct Config {
     pub teach_stiction: f64,
     /// Share of the joints' Coulomb friction that Teaching takes away (J-25).
     pub teach_friction: f64,
-    /// Speed of the flange from which on Teaching brakes harder, m/s, at twice that fully: a brake, no limit; 0: any.
+    /// Highest speed of the flange in a jog (J-58), and from which on Teaching brakes harder, at twice that fully (J-25), m/s; 0: any.
     pub tool_speed_max: f64,
+    /// Time that a motion has for its stop when the safety input becomes 0, before the torque is taken away, ms (J-22); 0: none.
+    pub safety_input_ramp_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
     /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.

@@ -46,6 +46,8 @@ pub struct Controller<M> {
     pub(crate) phase: Phase,
     /// Ticks since a pause or stop was commanded on the path, until the arm stands (J-33).
     pub(crate) braking_ms: Option<u16>,
+    /// Ticks since the safety input has stopped a motion, which takes the torque away later (J-22).
+    pub(crate) safety_stop_ms: Option<u16>,
     pub(crate) motion: Motion,
     /// Why the arm came to a held stop last (J-69).
     pub(crate) last_stop: LastStop,
@@ -79,6 +81,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clock: PathClock::default(),
             phase: Phase::BEGIN,
             braking_ms: None,
+            safety_stop_ms: None,
             motion: Motion::default(),
             last_stop: LastStop::default(),
             slice_progress: SliceProgress::Begin,

@@ -59,6 +59,7 @@ impl Config {
             teach_stiction: 0.03,
             teach_friction: 0.5,
             tool_speed_max: 0.0,
+            safety_input_ramp_ms: 0,
             friction_sign_width: 0.02,
             host_timeout_ms: 0,
             speed: 1.0,

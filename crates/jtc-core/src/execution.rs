@@ -92,10 +92,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A joint is overloaded by the motion along the path: path time is held back (J-75). Returns false where the arm is not on its path, or
-    /// stops on it already.
+    /// A joint is overloaded by the motion along the path or on the approach: its time is held back (J-75). Returns false where the arm is in
+    /// no such motion, or stops already.
     pub(crate) fn hold_back(&mut self) -> bool {
-        if self.phase != (Phase::Running { leave: None }) {
+        if self.trajectory != TrajectoryState::Execute || !self.phase.goes_on() {
             return false;
         }
         if self.motion.hold_back.begin() {
@@ -104,9 +104,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// A tick on a path that is held back.
+    /// A tick of a motion that is held back.
     pub(crate) fn step_hold_back(&mut self) {
-        if !self.motion.hold_back.is_active() || self.phase != (Phase::Running { leave: None }) {
+        if !self.motion.hold_back.is_active() || !self.phase.goes_on() {
             return;
         }
         let (pressed, lags) = self.motion.presses(&self.nodes, &self.config);
@@ -139,6 +139,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Phase::Approaching { clock, leave, .. } if clock.time > 0.0 => {
                 if leave.replace(to).is_none() {
                     clock.halt();
+                    self.motion.hold_back.end();
                     self.begin_braking();
                 }
             }
@@ -188,17 +189,21 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
                 clock.advance(length_ms);
                 let at = motion::approach(&from, &self.path_point(), clock.time / length_ms, length_ms);
-                self.motion.approach(&at, &mut clock, &self.config);
+                self.motion.follow(&at, &mut clock, &self.config);
                 let arrived = clock.time >= length_ms;
                 if let Some(trajectory) = leave.filter(|_| arrived || clock.standing()) {
                     self.set_trajectory(trajectory);
                 } else if !arrived {
                     self.phase = Phase::Approaching { from, length_ms, clock, leave };
-                } else if self.clock.time == 0.0 {
-                    self.phase = Phase::AtStart;
                 } else {
-                    self.go_on();
-                    self.phase = Phase::Running { leave: None };
+                    // The path begins at rest.
+                    self.motion.hold_back.end();
+                    if self.clock.time == 0.0 {
+                        self.phase = Phase::AtStart;
+                    } else {
+                        self.go_on();
+                        self.phase = Phase::Running { leave: None };
+                    }
                 }
             }
             Phase::AtStart => {

@@ -189,7 +189,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             // J-53: a drive on a bench does not bear the load that the model has.
             Command::TeachingModeEnable
-                if self.state == ControllerState::HoldPos && !self.joints_absent() && !received.overtaken =>
+                if self.state == ControllerState::HoldPos
+                    && !self.joints_absent()
+                    && !received.overtaken
+                    && self.safety_stop_ms.is_none() =>
             {
                 self.teaching = true;
                 SliceOutcome::Done
@@ -342,9 +345,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-69: a held stop is latched, or a joint yields.
+    /// J-69: a held stop is latched, or a joint yields. J-22: the safety input stops the arm.
     pub(crate) fn stops_held(&self) -> bool {
-        self.errors.held_stop() || self.motion.law.any_yields()
+        self.errors.held_stop() || self.motion.law.any_yields() || self.safety_stop_ms.is_some()
     }
 
     /// J-53: joints are set absent.

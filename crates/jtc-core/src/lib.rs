@@ -38,6 +38,7 @@ pub mod recorder;
 mod remembered;
 mod report;
 mod response_queue;
+mod safety_input;
 pub mod settings;
 pub mod slots;
 mod soft_end;

@@ -142,13 +142,7 @@ impl Motion {
         }
     }
 
-    /// A tick of the approach, of which `at` are the full-speed values at the time of its clock.
-    pub fn approach(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
-        self.ramp.step(at, &self.law, clock, config);
-        self.set.follow(at, clock.rate, clock.slope);
-    }
-
-    /// A tick on the path, of which `at` are the full-speed values at the time of its clock (J-33).
+    /// A tick on the path or of the approach, of which `at` are the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);

@@ -8,8 +8,8 @@
 //! | the same joint again within 500 ms | release |
 //! | an overloaded joint that has not settled since it was enabled | it lowers its load (J-70) |
 //! | a joint that is pushed, or overloaded by its feedback torque; a position error | it yields (J-68), the others stop |
-//! | a joint that is overloaded otherwise: on the path | path time is held back (J-75); where that does not help the arm stops on its path |
-//! | the same on the approach, or in a jog | the arm stops, or its jog ends (J-33) |
+//! | a joint that is overloaded otherwise: on the path or the approach | its time is held back (J-75); where that does not help the arm stops |
+//! | the same in a jog | the jog ends (J-33) |
 //! | the same at rest, or still in motion when a stop has taken its time | it lowers its load |
 //! | a limit of the path | the arm stops on its path, or its jog ends |
 //!

@@ -399,3 +399,39 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     assert_eq!(rig.ask(FrameType::ArmModelUseDefault, &[]), DataStatus::NoError);
     rig.until(500, |r| r.state() == ControllerState::HoldPos);
 }
+
+/// Three times the friction of the model, at a torque limit that leaves little: the approach slows down until the torque suffices, and arrives.
+#[test]
+fn j75_an_approach_that_takes_too_much_torque_is_held_back() {
+    let pose = plant::POSES[0];
+    for (left, way) in [(16.0, -0.1), (20.0, -0.1), (26.0, -0.2), (35.0, -0.3)] {
+        let mut config = Config { start_tolerance_rad: 0.5, ..Config::avena() };
+        let held = plant::standing(&Parameters::avena().model, &pose)[1].abs();
+        config.joints[1].torque_max = held + LuGre::avena(1, 1.2).coulomb + left;
+        let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(3.0), pose);
+        let mut rig = arm.holding(config);
+        arm.brakes = false;
+        arm.run(&mut rig, 3_500);
+        let mut rest = RawPoint::default();
+        for j in 0..6 {
+            rest.position[j] = raw(arm.q[j] + if j == 1 { way } else { 0.0 }, 3.141592);
+        }
+        rig.send(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest; 10]));
+        arm.run(&mut rig, 100);
+        rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
+        let (mut ms, mut at_limit_ms) = (0, 0);
+        while rig.trajectory() != TrajectoryState::Finish {
+            arm.tick(&mut rig);
+            assert_eq!(rig.errors(), 0, "{left} N·m, {way} rad: {:?}", rig.controller.telemetry());
+            at_limit_ms +=
+                usize::from(rig.torque[1].abs() >= 0.999 * rig.controller.config().joints[1].torque_max);
+            ms += 1;
+            assert!(ms < 10_000, "{left} N·m, {way} rad: it never arrives");
+        }
+        let back = rig.controller.reactions().held_back_ms;
+        println!(
+            "{left} N·m left, {way} rad: {ms} ms, held back for {back} ms, {at_limit_ms} ms at the limit"
+        );
+        assert!(back > 0, "{left} N·m, {way} rad");
+    }
+}

@@ -379,3 +379,60 @@ fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
         rig.run(900);
     }
 }
+
+/// Keys of several joints pressed, changed and let go in random poses: the flange is never faster than the tool speed limit, and one joint alone
+/// takes it there. The speed is that of the pose of the flange from tick to tick.
+#[test]
+fn j58_a_jog_keeps_to_the_tool_speed_limit() {
+    const LIMIT: f64 = 0.25;
+    let seed = 23;
+    println!("seed {seed}");
+    let mut random = Random(seed);
+    let model = Parameters::avena().model;
+    let dynamics = jtc_dynamics::Dynamics::new(&model, Config::avena().gravity);
+    let flange = |q: &[f64; 6]| dynamics.forward_kinematics(q)[6].position;
+    let (mut fastest, mut alone) = (0.0f64, 0.0f64);
+    for trial in 0..60 {
+        let config = Config { tool_speed_max: LIMIT, delay_ticks: 1, ..Config::avena() };
+        let mut rig = Rig::new(config);
+        rig.follow = false;
+        for (node, q) in rig.nodes.iter_mut().zip(pose(&mut random, 0.0, 0.6).0) {
+            node.report.position = q;
+        }
+        rig.defaults();
+        rig.run(700);
+        rig.follow = true;
+        let set = |rig: &Rig| rig.controller.telemetry().joints.map(|joint| joint.set_position);
+        let (mut keys, mut last) = ([0.0f32; 6], flange(&set(&rig)));
+        let single = trial % 3 == 0;
+        for ms in 0..4_000 {
+            if ms % 1_000 == 0 {
+                keys = core::array::from_fn(|j| {
+                    let on = if single { j == trial / 3 % 3 } else { random.next() < 0.5 };
+                    if on { random.between(-1.5, 1.5) as f32 } else { 0.0 }
+                });
+            }
+            if ms % 50 == 0 {
+                rig.send(FrameType::Jog, &floats(keys));
+            }
+            rig.tick();
+            assert_eq!(
+                rig.state(),
+                ControllerState::HoldPos,
+                "trial {trial}: {:?}",
+                rig.controller.telemetry()
+            );
+            let here = flange(&set(&rig));
+            let way: f64 = (0..3).map(|k| (here[k] - last[k]).powi(2)).sum();
+            let speed = way.sqrt() / 0.001;
+            fastest = fastest.max(speed);
+            if single {
+                alone = alone.max(speed);
+            }
+            assert!(speed < 1.03 * LIMIT, "trial {trial} after {ms} ms: {speed} m/s with keys {keys:.2?}");
+            last = here;
+        }
+    }
+    println!("fastest {fastest:.4} m/s, by one joint alone {alone:.4} m/s");
+    assert!(alone > 0.97 * LIMIT, "{alone} m/s");
+}

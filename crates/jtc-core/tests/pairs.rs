@@ -14,15 +14,15 @@ const WATCH_MS: usize = 6_000;
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// An arm of metal without brakes, and its controller.
-struct Bench {
-    arm: Plant,
-    rig: Rig,
+pub struct Bench {
+    pub arm: Plant,
+    pub rig: Rig,
 }
 
 impl Bench {
     /// The controller holds an arm at rest. The true masses are `mass` times those of the model, and the arm carries a `load` (kg) that the
     /// model lacks.
-    fn holding(config: Config, mass: f64, load: f64) -> Self {
+    pub fn holding(config: Config, mass: f64, load: f64) -> Self {
         let model = loaded(heavier(Parameters::avena().model, mass), load);
         let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), POSES[0]);
         let mut rig = arm.holding(config);
@@ -39,12 +39,12 @@ impl Bench {
         bench
     }
 
-    fn run(&mut self, ms: usize) {
+    pub fn run(&mut self, ms: usize) {
         self.arm.run(&mut self.rig, ms);
     }
 
     /// Runs until it is so.
-    fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
+    pub fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
         for _ in 0..20_000 {
             if is(&self.rig) {
                 return;
@@ -54,19 +54,19 @@ impl Bench {
         panic!("never: {what}");
     }
 
-    fn send(&mut self, frame_type: FrameType, body: &[u8]) {
+    pub fn send(&mut self, frame_type: FrameType, body: &[u8]) {
         self.rig.send(frame_type, body);
     }
 
     /// A motion of joints 2 and 3 from where the arm stands.
-    fn execute(&mut self, way: f64, seconds: f64) {
+    pub fn execute(&mut self, way: f64, seconds: f64) {
         let mut to = POSES[0];
         to[1] += 0.6 * way;
         to[2] += 0.9 * way;
         pushed::begin(&mut self.rig, &pushed::motion(&POSES[0], &to, seconds));
     }
 
-    fn moves(rig: &Rig) -> bool {
+    pub fn moves(rig: &Rig) -> bool {
         rig.state() == ControllerState::Operate && rig.controller.telemetry().point > 20
     }
 
@@ -74,7 +74,7 @@ impl Bench {
         rig.controller.reactions().yields != 0
     }
 
-    fn jog(&mut self) {
+    pub fn jog(&mut self) {
         self.send(FrameType::Jog, &floats([0.2f32, 0.0, 0.0, 0.0, 0.0, 0.0]));
     }
 
@@ -98,8 +98,8 @@ impl Bench {
 }
 
 /// What the controller does.
-type Begin = fn(Config) -> Bench;
-const UNDER_WAY: [(&str, Begin); 11] = [
+pub type Begin = fn(Config) -> Bench;
+pub const UNDER_WAY: [(&str, Begin); 11] = [
     ("holds", |config| Bench::holding(config, 1.0, 1.0)),
     ("moves along a path", |config| {
         let mut bench = Bench::holding(config, 1.0, 0.0);

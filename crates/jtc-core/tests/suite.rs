@@ -33,6 +33,7 @@ mod recorder;
 mod records;
 mod resuming;
 mod rig;
+mod safety_input;
 mod settings_page;
 mod slots;
 mod state_machine;

@@ -73,6 +73,15 @@ impl Phase {
         }
     }
 
+    /// In motion, and no Pause or Stop has been accepted.
+    pub fn goes_on(&self) -> bool {
+        match self {
+            Self::Approaching { clock, leave, .. } => leave.is_none() && clock.time > 0.0,
+            Self::Running { leave } => leave.is_none(),
+            Self::Waiting { .. } | Self::AtStart => false,
+        }
+    }
+
     /// The state that an accepted Pause or Stop leads to.
     pub fn leave(&self) -> Option<TrajectoryState> {
         match self {

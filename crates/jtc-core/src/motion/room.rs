@@ -28,6 +28,8 @@ const SLIDES: f64 = 0.1;
 const NO_SPEED: f64 = 1e-3;
 /// Share of a torque limit that counts as left at least for a motion that unloads the joint.
 const UNLOADING: f64 = 0.01;
+/// Share of the tool speed limit that joints which get faster have at least, so that the jog goes on.
+const LEAST_ROOM: f64 = 0.02;
 /// Lowest share of a jog's acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
@@ -80,10 +82,11 @@ impl Motion {
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
 
-    /// Velocities and accelerations that the torque limits allow a jog at the `wanted` velocities (rad/s); `None` if a limit allows no motion.
-    /// For the inertia of a ramp that begins here.
+    /// Velocities and accelerations that the limits of torque and tool speed allow a jog at the `wanted` velocities (rad/s); `None` if a torque
+    /// limit allows no motion. For the inertia of a ramp that begins here.
     pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
+        let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
         let fastest = wanted.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let share = self.jog_speed(wanted, inputs);
         let creeping = if share * fastest < CREEP && fastest > CREEP {
@@ -105,6 +108,34 @@ impl Motion {
         };
         let share = self.least_share(&velocity, needed, inputs).max(LEAST_ACCELERATION);
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
+    }
+
+    /// The `wanted` velocities (rad/s), or as much of them as the tool speed limit allows. What each joint adds to the speed of the flange is
+    /// summed up, because joints whose motions cancel out do not speed up alike; and joints that get faster wait for those that have to
+    /// become slower.
+    fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
+        let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
+        // How far the flange is from the axis of each joint, m.
+        let mut reach = [0.0; JOINTS];
+        for j in 0..JOINTS {
+            let mut turned = [0.0; JOINTS];
+            turned[j] = 1.0;
+            reach[j] = inputs.parameters.dynamics.flange_speed(&set.position, &turned);
+        }
+        let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
+        let share = if speed > most { most / speed } else { 1.0 };
+        let slows = |j: usize| set.velocity[j].abs() > share * wanted[j].abs();
+        let (mut slower, mut faster) = (0.0, 0.0);
+        for j in 0..JOINTS {
+            if slows(j) {
+                slower += reach[j] * set.velocity[j].abs();
+            } else {
+                faster += reach[j] * wanted[j].abs();
+            }
+        }
+        let room = (most - slower).max(LEAST_ROOM * most);
+        let rising = if share * faster > room { room / faster } else { share };
+        core::array::from_fn(|j| wanted[j] * if slows(j) { share } else { rising })
     }
 
     /// Share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of what is left there.

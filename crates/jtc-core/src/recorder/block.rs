@@ -8,7 +8,7 @@ use jtc_wire::LogState;
 use super::{BLOCK_WORDS, Block};
 
 /// "JTCF" and the version of the layout, to be raised with each change of what is written, a list of `remembered!` among it.
-pub(super) const MAGIC: u32 = 0x4A46_0009;
+pub(super) const MAGIC: u32 = 0x4A46_000A;
 /// Words in front of the bits.
 pub(super) const HEAD: usize = 5;
 /// Bits of a block.

@@ -84,6 +84,7 @@ pub(crate) struct Dynamic {
     clock: PathClock,
     phase: Phase,
     braking_ms: Option<u16>,
+    safety_stop_ms: Option<u16>,
     motion: Motion,
     last_stop: LastStop,
     overtaking: [Overtaking; HOST_LINES],
@@ -108,6 +109,7 @@ remembered!(Dynamic {
     clock,
     phase,
     braking_ms,
+    safety_stop_ms,
     motion,
     last_stop,
     overtaking,
@@ -183,6 +185,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clock,
             phase,
             braking_ms,
+            safety_stop_ms,
             motion,
             last_stop,
             slice_progress: _,
@@ -208,6 +211,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         clock.write(to);
         phase.write(to);
         braking_ms.write(to);
+        safety_stop_ms.write(to);
         motion.write(to);
         last_stop.write(to);
         overtaking.write(to);
@@ -234,6 +238,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clock,
             phase,
             braking_ms,
+            safety_stop_ms,
             motion,
             last_stop,
             overtaking,
@@ -250,7 +255,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (self.teaching, self.teaching_waits_ms, self.pump) = (teaching, teaching_waits_ms, pump);
         self.store.restore(&store);
         (self.trajectory, self.clock, self.phase) = (trajectory, clock, phase);
-        (self.braking_ms, self.motion, self.last_stop) = (braking_ms, motion, last_stop);
+        (self.braking_ms, self.safety_stop_ms) = (braking_ms, safety_stop_ms);
+        (self.motion, self.last_stop) = (motion, last_stop);
         (self.overtaking, self.uploads) = (overtaking, uploads);
         (self.late_ticks, self.observed) = (late_ticks, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;

@@ -107,7 +107,8 @@ settings! {
     Whole 72 "delay_ticks" [""] 0.0..=7.0 No "age of a measurement when what is commanded because of it acts, in ticks" (delay_ticks: u8);
     Number 77 "teach_stiction" [""] 0.0..=0.3 No "torque that holds a joint at standstill in Teaching, its own friction included, as a share of the limit" (teach_stiction);
     Number 78 "teach_friction" [""] 0.0..=0.7 No "share of the Coulomb friction that Teaching takes away" (teach_friction);
-    Number 79 "tool_speed_max_m_s" ["m/s"] 0.0..=10.0 No "speed of the flange from which on Teaching brakes harder, at twice that fully; 0: any" (tool_speed_max);
+    Number 79 "tool_speed_max_m_s" ["m/s"] 0.0..=10.0 No "highest speed of the flange in a jog; Teaching brakes harder from it on, at twice that fully; 0: any" (tool_speed_max);
+    Whole 80 "safety_input_ramp_ms" ["ms"] 0.0..=500.0 No "time for a stop when the safety input becomes 0, before the torque is taken away; 0: none" (safety_input_ramp_ms: u16);
     Number 96 "kp_max" ["N·m/rad"] 0.0..=1e6 No "highest Kp that is taken" (parameter_bounds.kp_max);
     Number 97 "ki_max" ["N·m/(rad·s)"] 0.0..=1e6 No "highest Ki that is taken" (parameter_bounds.ki_max);
     Number 98 "kd_max" ["N·m·s/rad"] 0.0..=1e5 No "highest Kd that is taken" (parameter_bounds.kd_max);

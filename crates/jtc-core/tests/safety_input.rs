@@ -1,0 +1,109 @@
+//! The safety input with a ramp (J-22): what moves stops first, and then the torque goes.
+use jtc_core::{Config, ControllerState, TrajectoryState, settings};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
+
+use crate::pairs::{Bench, UNDER_WAY};
+use crate::rig::{Rig, floats};
+
+fn config(ramp_ms: u16) -> Config {
+    Config { safety_input_ramp_ms: ramp_ms, ..Config::avena() }
+}
+
+/// Highest true speed and highest commanded speed, rad/s.
+fn speeds(bench: &Bench) -> (f64, f64) {
+    let most = |speeds: [f64; 6]| speeds.into_iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    (most(bench.arm.v), most(bench.rig.controller.telemetry().joints.map(|joint| joint.set_velocity)))
+}
+
+/// Ticks until the torque is gone.
+fn released(bench: &mut Bench) -> usize {
+    for k in 1..2_000 {
+        bench.arm.tick(&mut bench.rig);
+        if !bench.rig.state().has_torque() {
+            assert_eq!((bench.rig.state(), bench.rig.errors() & 1), (ControllerState::Error, 1));
+            assert_eq!(bench.rig.torque, [0.0; 6]);
+            return k;
+        }
+    }
+    panic!("the torque stays");
+}
+
+/// A pulse of 1 ms is enough. What moves by command has come to rest when the torque goes; what yields or is led has until the end of the ramp.
+#[test]
+fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
+    for (doing, begin) in UNDER_WAY {
+        let mut bench = begin(config(500));
+        let (_, before) = speeds(&bench);
+        let operates = bench.rig.state() == ControllerState::Operate;
+        bench.rig.safety_input = false;
+        bench.arm.tick(&mut bench.rig);
+        bench.rig.safety_input = true;
+        let ms = if bench.rig.state() == ControllerState::Error { 0 } else { released(&mut bench) };
+        let (speed, set) = speeds(&bench);
+        println!("{doing}: from {before:.2} rad/s, {ms} ms, then {speed:.3} rad/s");
+        assert!(ms <= 500, "{doing}: {ms} ms");
+        match doing {
+            "holds" => assert_eq!(ms, 0),
+            "jogs" => assert!(ms > 50 && set == 0.0 && speed < 0.05, "{doing}: {ms} ms, {speed} rad/s"),
+            _ if operates => {
+                assert!(ms > 50 && set == 0.0 && speed < 0.05, "{doing}: {ms} ms, {speed} rad/s")
+            }
+            _ => {}
+        }
+        bench.run(1_000);
+        assert_eq!((bench.rig.state(), bench.rig.errors() & 1), (ControllerState::Error, 1), "{doing}");
+    }
+}
+
+/// On the path with a ramp.
+fn moving(ramp_ms: u16) -> Bench {
+    let mut bench = Bench::holding(config(ramp_ms), 1.0, 0.0);
+    bench.execute(1.0, 4.0);
+    bench.until("the path", Bench::moves);
+    bench.run(1_000);
+    assert!(speeds(&bench).1 > 0.15, "{:?}", speeds(&bench));
+    bench.rig.safety_input = false;
+    bench
+}
+
+/// The ramp is the longest time; without one the torque goes in the tick that reads 0.
+#[test]
+fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
+    for ramp_ms in [0, 1, 20, 100] {
+        assert_eq!(released(&mut moving(ramp_ms)), 1 + usize::from(ramp_ms));
+    }
+    // What a drive or another error asks for does not wait.
+    let mut bench = moving(500);
+    bench.run(50);
+    bench.rig.nodes[3].fault();
+    let ticks = bench.rig.until(30, |rig| rig.state() == ControllerState::Error);
+    assert!(ticks < 20, "{ticks} ms");
+}
+
+/// Nothing begins to move while the safety input stops the arm, also when it is 1 again.
+#[test]
+fn j22_nothing_begins_during_the_ramp() {
+    let mut bench = moving(500);
+    bench.run(1);
+    bench.rig.safety_input = true;
+    bench.until("a path that stands", |rig| rig.trajectory() == TrajectoryState::Stop);
+    // The hand that pushes the arm keeps it from standing.
+    bench.rig.follow = false;
+    let rig = &mut bench.rig;
+    rig.nodes[1].report.velocity = 0.1;
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
+    let body = floats([0.1f32, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(rig.ask(FrameType::Jog, &body), DataStatus::NotAllowed);
+    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NotAllowed);
+    rig.until(500, |rig| rig.state() == ControllerState::Error);
+}
+
+/// The setting is one of the arm: it changes without torque only.
+#[test]
+fn j22_j53_the_ramp_is_a_setting_that_changes_without_torque_only() {
+    let row = settings::setting(80).expect("the setting");
+    assert_eq!((row.name, row.low, row.high), ("safety_input_ramp_ms", 0.0, 500.0));
+    let mut rig = Rig::holding();
+    let body = SettingValue { setting: 80, joint: 0, value: 100.0 }.emit();
+    assert_eq!(rig.ask(FrameType::SetSettings, &body), DataStatus::NotAllowed);
+}

@@ -322,6 +322,11 @@ impl<P: Port> Session<P> {
     pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
         let mut frame = [0; 30];
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
-        Ok(self.extension(&frame)?)
+        let halts = self.port.halts();
+        match self.extension(&frame) {
+            // Another program's Stop has overtaken it (J-04). The port says whose it was, and sends nothing that moves the arm.
+            Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
+            done => Ok(done?),
+        }
     }
 }

@@ -212,12 +212,14 @@ mod tests {
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
         assert!(!incoming.mid_frame(), "complete");
         incoming.push(&frame[..9], later(171));
+        incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
         // Of a host that died there, silence counts afterwards; a short frame is not waited for.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));
+        incoming.carries(later(600));
         assert_eq!(incoming.silence(later(605)), None);
     }
 }

@@ -8,7 +8,7 @@ use crate::controller::Controller;
 use crate::hold_back::{HoldBack, Next};
 use crate::motion::{self, ControlMode, LawInputs};
 use crate::path::PathClock;
-use crate::{JOINTS, TrajectoryState, joint_error};
+use crate::{ControllerState, JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -93,10 +93,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// A joint is overloaded by the motion along the path or on the approach: its time is held back (J-75). Returns false where the arm is in
-    /// no such motion, or stops already.
+    /// no such motion, or stops already. In the tick in which it arrives nothing is to be done about it.
     pub(crate) fn hold_back(&mut self) -> bool {
-        if self.trajectory != TrajectoryState::Execute || !self.phase.goes_on() {
-            return false;
+        if self.state != ControllerState::Operate || !self.phase.goes_on() {
+            return self.phase == Phase::AtStart;
+        }
+        if self.trajectory != TrajectoryState::Execute {
+            return true;
         }
         if self.motion.hold_back.begin() {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
@@ -106,11 +109,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// A tick of a motion that is held back.
     pub(crate) fn step_hold_back(&mut self) {
-        if !self.motion.hold_back.is_active() || !self.phase.goes_on() {
+        if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;
         }
         let (pressed, lags) = self.motion.presses(&self.nodes, &self.config);
-        let next = self.motion.hold_back.step(&pressed);
+        let clock = match &self.phase {
+            Phase::Approaching { clock, .. } => clock,
+            _ => &self.clock,
+        };
+        let next = self.motion.hold_back.step(&pressed, clock);
         if next == Next::Stop || lags.contains(&true) {
             let cause = |j: usize| match (lags[j], self.motion.hold_back.has_pressed(j)) {
                 (true, _) => joint_error::POSITION_ERROR,

@@ -144,7 +144,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             stop: (tick != 0).then_some((cause, ago)),
             yields: mask(&|j| self.motion.law.yields(j)),
             jumped: self.nodes.untrusted(),
-            rate: if self.trajectory == TrajectoryState::Execute { self.clock.rate as f32 } else { 0.0 },
+            rate: if self.trajectory == TrajectoryState::Execute {
+                self.phase.rate(&self.clock) as f32
+            } else {
+                0.0
+            },
             held_back_ms: self.motion.hold_back.run_ms().into(),
         }
     }

@@ -4,6 +4,7 @@
 //! for less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling under
 //! torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
 use crate::JOINTS;
+use crate::path::PathClock;
 use crate::remembered::remembered;
 
 /// Time for which the inertia of the arm is taken for constant, ms.
@@ -14,11 +15,17 @@ const QUIET_MS: u16 = 200;
 const PRESSED_MS: u16 = 250;
 /// Longest time of all of it in a run, ms.
 const RUN_MS: u16 = 5_000;
+/// Longest time at a rate below the first, ms, until the path has its pace again: torque that just suffices to hold the arm lets it stand for ever.
+const STANDS: f64 = 0.02;
+const STANDS_MS: u16 = 1_000;
 
 /// How the path is held back.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
+    /// The path is on the way back to its pace, and for how long it has stood.
+    restores: bool,
+    stands_ms: u16,
     /// Ticks since the inertia was computed.
     since_ms: u16,
     /// Ticks in which a joint has been at its limit, without a break.
@@ -31,7 +38,7 @@ pub(crate) struct HoldBack {
     pressed: u8,
 }
 
-remembered!(HoldBack { active, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
+remembered!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
 
 /// What follows from a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +57,11 @@ impl HoldBack {
         self.active
     }
 
+    /// Each tick has to be looked at.
+    pub fn is_watched(&self) -> bool {
+        self.active | self.restores
+    }
+
     /// A joint is overloaded. Returns whether the inertia of the arm has to be computed.
     pub fn begin(&mut self) -> bool {
         if self.active && self.since_ms < INERTIA_MS {
@@ -58,13 +70,13 @@ impl HoldBack {
         if !self.active {
             (self.pressed_ms, self.quiet_ms, self.pressed) = (0, 0, 0);
         }
-        (self.active, self.since_ms) = (true, 0);
+        (self.active, self.restores, self.since_ms) = (true, false, 0);
         true
     }
 
     /// The path stops: it is not held back any more. What it took in this run counts on.
     pub fn end(&mut self) {
-        self.active = false;
+        (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
 
     /// Time of holding back in this run, ms.
@@ -77,8 +89,17 @@ impl HoldBack {
         self.pressed & (1 << joint) != 0
     }
 
-    /// A tick on the path; `joints` that are at their torque limits.
-    pub fn step(&mut self, joints: &[bool; JOINTS]) -> Next {
+    /// A tick on the path, in the time of this clock; `joints` that are at their torque limits.
+    pub fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
+        let stands = clock.rate < STANDS && clock.ramping();
+        self.stands_ms = if stands { self.stands_ms.saturating_add(1) } else { 0 };
+        if self.stands_ms > STANDS_MS {
+            return Next::Stop;
+        }
+        if !self.active {
+            self.restores &= clock.ramping();
+            return Next::Nothing;
+        }
         let pressed = joints.contains(&true);
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;
@@ -93,7 +114,7 @@ impl HoldBack {
         if self.pressed_ms > PRESSED_MS || self.run_ms > RUN_MS {
             Next::Stop
         } else if self.quiet_ms >= QUIET_MS {
-            self.active = false;
+            (self.active, self.restores) = (false, true);
             Next::Restore
         } else {
             Next::Nothing
@@ -107,12 +128,23 @@ mod tests {
 
     const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
 
+    /// A clock on the way to its pace.
+    fn at(rate: f64) -> PathClock {
+        let mut clock = PathClock::start(1.0);
+        clock.rate = rate;
+        clock
+    }
+
+    fn going() -> PathClock {
+        at(0.5)
+    }
+
     #[test]
     fn j75_the_inertia_is_computed_anew_from_time_to_time() {
         let mut hold_back = HoldBack::default();
         assert!(hold_back.begin());
         for ms in 1..=2 * INERTIA_MS {
-            hold_back.step(&PRESSED);
+            hold_back.step(&PRESSED, &going());
             assert_eq!(hold_back.begin(), ms % INERTIA_MS == 0, "{ms} ms");
         }
     }
@@ -122,10 +154,13 @@ mod tests {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
         for pressed in [true, false, true] {
-            assert_eq!(hold_back.step(&[false, false, pressed, false, false, false]), Next::Nothing);
+            assert_eq!(
+                hold_back.step(&[false, false, pressed, false, false, false], &going()),
+                Next::Nothing
+            );
         }
-        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(&[false; JOINTS]), Next::Nothing));
-        assert_eq!(hold_back.step(&[false; JOINTS]), Next::Restore);
+        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(&[false; JOINTS], &going()), Next::Nothing));
+        assert_eq!(hold_back.step(&[false; JOINTS], &going()), Next::Restore);
         assert!(!hold_back.is_active());
     }
 
@@ -133,18 +168,34 @@ mod tests {
     fn j75_what_lasts_too_long_in_one_go_or_in_a_run_is_a_stop() {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        let after = (1..1_000).find(|_| hold_back.step(&PRESSED) == Next::Stop);
+        let after = (1..1_000).find(|_| hold_back.step(&PRESSED, &going()) == Next::Stop);
         assert_eq!(after, Some(PRESSED_MS + 1));
         let mut hold_back = HoldBack::default();
         let mut ms = 0;
         let next = loop {
             hold_back.begin();
             ms += 1;
-            match hold_back.step(&[ms % 100 < 50; JOINTS]) {
+            match hold_back.step(&[ms % 100 < 50; JOINTS], &going()) {
                 Next::Nothing => {}
                 next => break next,
             }
         };
         assert_eq!((next, ms), (Next::Stop, RUN_MS + 1));
+    }
+
+    #[test]
+    fn j75_a_path_that_stands_on_the_way_back_to_its_pace_is_a_stop() {
+        for (rate, stops) in [(0.0, true), (0.03, false)] {
+            let mut hold_back = HoldBack::default();
+            hold_back.begin();
+            let next = (0..5_000).find(|_| hold_back.step(&[false; JOINTS], &at(rate)) == Next::Stop);
+            assert_eq!(next, stops.then_some(u32::from(STANDS_MS)), "{rate}");
+        }
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        (0..QUIET_MS).for_each(|_| assert_ne!(hold_back.step(&[false; JOINTS], &going()), Next::Stop));
+        assert!(hold_back.is_watched());
+        hold_back.step(&[false; JOINTS], &PathClock::start(1.0));
+        assert!(!hold_back.is_watched(), "it has its pace again");
     }
 }

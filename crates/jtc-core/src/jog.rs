@@ -35,7 +35,7 @@ struct JointJog {
 }
 
 /// How fast the acceleration of a joint changes, rad/s³.
-fn jerk(limits: &JointConfig) -> f64 {
+pub(crate) fn jerk(limits: &JointConfig) -> f64 {
     hardest(limits) / RISE_S
 }
 

@@ -2,22 +2,24 @@
 use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
+use crate::io::Inputs;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// The `level` of the safety input in this tick. With `safety_input_ramp_ms` an arm that moves comes to rest first (stop category 1 of
-    /// IEC 60204-1), also where the input is 1 again meanwhile.
-    pub(crate) fn watch_safety_input(&mut self, level: bool) {
+    /// The safety input in this tick. With `safety_input_ramp_ms` what moves by command comes to rest first (stop category 1 of IEC 60204-1),
+    /// also where the input is 1 again meanwhile. The error is raised in every case, whatever has taken the torque away by then.
+    pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {
-            _ if !self.powered() => None,
-            None if level || ramp_ms == 0 || self.stands_still() => None,
+            // It was raised in the last tick.
+            Some(ms) if ms >= ramp_ms => None,
+            Some(_) if !self.powered() || self.stands_still() => Some(ramp_ms),
+            Some(ms) => Some(ms.saturating_add(1).saturating_add(inputs.missed_ticks).min(ramp_ms)),
+            None if inputs.safety_input || ramp_ms == 0 || !self.has_to_stop() => None,
             None => {
                 self.come_to_rest();
                 Some(0)
             }
-            Some(_) if self.stands_still() => Some(ramp_ms),
-            Some(ms) => Some(ms.saturating_add(1).min(ramp_ms)),
         };
     }
 
@@ -39,6 +41,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.motion.set.end_jog();
             self.extensions.refuse_jogs();
         }
+    }
+
+    /// The arm moves by command or is led, with the torque of every joint. Where drives are still to be enabled, or a joint moves for
+    /// another reason, a stop would only keep the torque on.
+    fn has_to_stop(&self) -> bool {
+        let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
+        let moves = match self.state {
+            ControllerState::Teaching => true,
+            ControllerState::Operate => !self.phase.waits(),
+            ControllerState::HoldPos => self.motion.set.coming_to_rest(),
+            _ => false,
+        };
+        moves && (0..JOINTS).all(enabled)
     }
 
     /// The arm is held at rest: nothing moves, and nothing is to.

@@ -22,9 +22,19 @@ pub(crate) const SPRING_RATE: f64 = 30.0;
 const LOWERING_RATE: f64 = 40.0;
 /// Part of the way to its value that the damper and the spring go in a tick.
 const SETTLES: f64 = 0.2;
+/// The same of the brake.
+const BRAKE_SETTLES: f64 = 0.5;
 /// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them: a damper above
 /// 200 1/s would drive a joint to and fro, and joints that move each other lower that bound.
 const DAMPING_RATE: f64 = 100.0;
+/// Speeds, in velocity limits, from which on a joint is braked beside its damper, and at which that takes the whole torque limit.
+const BRAKES: (f64, f64) = (0.2, 0.8);
+/// A joint that comes back within so many ms, faster than that (rad/s), swings. Each time it does all is softer by the first factor, and at
+/// most by the second.
+const SWINGS_MS: u8 = 80;
+const SWINGS: f32 = 0.15;
+const SOFTER: f32 = 0.5;
+const SOFTEST: f32 = 0.1;
 /// Speed below which a joint that yields is calm, rad/s.
 const CALM: f64 = 0.05;
 /// Speed below which a load that is lowered is at rest, rad/s.
@@ -74,8 +84,10 @@ pub(crate) struct Yield {
     driven_ms: u16,
     /// N·m·s/rad.
     damping: f64,
-    /// Share of the spring that acts.
+    /// Share of the brake that acts, and of the spring.
+    braking: f64,
     grip: f64,
+    swing: Swing,
     /// The position controller can hold what the joint carries; or the host has decided that it is to.
     holdable: bool,
     cleared: bool,
@@ -96,7 +108,9 @@ remembered!(Yield {
     least,
     driven_ms,
     damping,
+    braking,
     grip,
+    swing,
     holdable,
     cleared,
     calm_ms,
@@ -111,7 +125,9 @@ pub(crate) struct Joint<'a> {
     pub position: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
-    /// Both were measured for this tick.
+    /// Velocity of the last 5 ms, rad/s.
+    pub young_velocity: f64,
+    /// All were measured for this tick.
     pub fresh: bool,
     /// Torque of the model, N·m.
     pub model: f64,
@@ -136,7 +152,9 @@ impl Yield {
             least: load,
             driven_ms: 0,
             damping: 0.0,
+            braking: 0.0,
             grip: 1.0,
+            swing: Swing::NONE,
             holdable: true,
             cleared: false,
             calm_ms: 0,
@@ -211,17 +229,22 @@ impl Yield {
         let velocity = joint.velocity;
         self.missing = if joint.fresh { 0 } else { self.missing.saturating_add(1) };
 
+        let soft = self.swing.step(velocity);
         // With the first of them a joint at half of its velocity limit is braked with all of its torque limit.
         let wanted = 2.0 * (limit - most) / joint.limits.velocity_max;
         let damping = if self.lowers {
             LOWERING_RATE / f64::from(joint.lowering.max(1)) * self.inertia
         } else {
-            wanted.min(DAMPING_RATE * self.inertia)
+            wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        let d = (-self.damping * velocity).max(-limit).min(limit);
+        // From nothing in the first tick: what it begins with would be blended in.
+        let brake = soft * self.braking * self.grip * brake(joint);
+        self.braking += BRAKE_SETTLES * (1.0 - self.braking);
+        let damper = (-self.damping * velocity).max(-limit).min(limit);
+        let d = (damper + brake).max(-limit).min(limit);
         self.grip += SETTLES * (if self.missing > MISSING { 0.0 } else { 1.0 } - self.grip);
-        let stiffness = (most / STRETCH).min(SPRING_RATE * SPRING_RATE * self.inertia);
+        let stiffness = (most / STRETCH).min(soft * SPRING_RATE * SPRING_RATE * self.inertia);
         let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
         let pull = stiffness * (self.set - joint.position) + end;
         let spring = self.grip * pull.max(-most).min(most);
@@ -240,7 +263,7 @@ impl Yield {
             self.doubt(velocity, p + d);
         } else if loaded {
             // Never beyond the limit; and what was there at the begin is not taken back from a joint that is lifted.
-            let learned = self.load + d * DT / LEARNS_S;
+            let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);
         }
@@ -270,6 +293,45 @@ impl Yield {
             self.load += (self.least - self.load) * (DT / COMES_BACK_S);
         }
     }
+}
+
+/// The swing of a joint that is lighter than its inertia in the arm file: what brakes it is too hard for it, because measured speeds are late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Swing {
+    /// Highest speed in this direction, rad/s, signed, and since when the joint has it, ms.
+    peak: f32,
+    half_ms: u8,
+    /// How much softer everything is.
+    soft: f32,
+}
+
+remembered!(Swing { peak, half_ms, soft });
+
+impl Swing {
+    const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, soft: 1.0 };
+
+    /// A tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
+    fn step(&mut self, velocity: f64) -> f64 {
+        let velocity = velocity as f32;
+        if velocity * self.peak < 0.0 {
+            if self.half_ms < SWINGS_MS && self.peak.abs() > SWINGS {
+                self.soft = (self.soft * SOFTER).max(SOFTEST);
+            }
+            (self.peak, self.half_ms) = (velocity, 0);
+        } else if velocity.abs() > self.peak.abs() {
+            self.peak = velocity;
+        }
+        self.half_ms = self.half_ms.saturating_add(1);
+        self.soft.into()
+    }
+}
+
+/// What a brake has against a fast motion, N·m: the measured speed is too old for the damper of a light joint to stop a shove.
+fn brake(joint: &Joint<'_>) -> f64 {
+    let speed = joint.young_velocity.abs() / joint.limits.velocity_max;
+    let share = (speed - BRAKES.0) * (1.0 / (BRAKES.1 - BRAKES.0));
+    let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
+    -share * joint.limits.torque_max * joint.young_velocity.signum()
 }
 
 /// How often each joint has yielded in the last seconds.
@@ -314,11 +376,43 @@ mod tests {
         Config::avena().joints[1]
     }
 
+    /// A joint that comes back fast, again and again, becomes softer each time; one that a push has moved and a spring takes back does not.
+    #[test]
+    fn j68_what_swings_becomes_softer() {
+        let swing = |half_ms: usize, speed: f64| {
+            let mut swing = Swing::NONE;
+            let mut soft = 1.0;
+            for ms in 0..6 * half_ms {
+                soft = swing.step(if (ms / half_ms).is_multiple_of(2) { speed } else { -speed });
+            }
+            soft
+        };
+        assert_eq!(swing(20, 0.3), f64::from(0.5f32.powi(4)).max(SOFTEST.into()));
+        assert_eq!(swing(20, 0.1), 1.0, "too slow to matter");
+        assert_eq!(swing(100, 0.3), 1.0, "no swing of a loop");
+    }
+
+    /// The brake is no torque in the first tick of a yield, whole soon, and against the motion.
+    #[test]
+    fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
+        let limits = limits();
+        for v in [1.2, -1.2] {
+            let mut yields = Yield::begin(false, false, 0.0, 0.01, 0.0);
+            let joint = Joint { young_velocity: v, ..at(&limits, 0.0, 0.0, 0.0) };
+            assert_eq!(yields.step(&joint).d, 0.0);
+            let torque = (0..20).fold(0.0, |_, _| yields.step(&joint).d);
+            assert!((torque + limits.torque_max * v.signum()).abs() < 1e-3 * limits.torque_max, "{torque}");
+            let slow = Joint { young_velocity: 0.19 * limits.velocity_max, ..joint };
+            assert_eq!(yields.step(&slow).d, 0.0);
+        }
+    }
+
     /// A joint in the middle of a wide range.
     fn at<'a>(limits: &'a JointConfig, position: f64, velocity: f64, model: f64) -> Joint<'a> {
         Joint {
             position,
             velocity,
+            young_velocity: 0.0,
             fresh: true,
             model,
             limits,

@@ -65,6 +65,11 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
 /// Pushes of 60 to 100 % of what a joint has left beside its load, for 50 ms to 1 s, on an arm with errors of 10 % in its masses and of
 /// 20 % in its friction. Returns how many of 48 have released the arm: by over-speed, and nothing else.
 fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
+    push_light(file, seed, moving, 1.0, 1.0)
+}
+
+/// The same with pushes of a `share` of that, on an arm whose rotors are lighter than in its file by a factor.
+fn push_light(file: &ArmFile, seed: u64, moving: bool, share: f64, rotors: f64) -> usize {
     println!("{}, seed {seed}", file.name);
     let (mut random, mut released) = (Random(seed), 0);
     for trial in 0..48 {
@@ -73,7 +78,7 @@ fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
         let model = heavier(file.model, random.between(0.9, 1.1));
         let friction = file.friction(random.between(0.8, 1.2));
         let left = 0.95 * file.config.joints[joint].torque_max - 1.1 * standing(&model, &pose)[joint].abs();
-        let push = random.between(0.6, 1.0) * left * if random.next() < 0.5 { -1.0 } else { 1.0 };
+        let push = share * random.between(0.6, 1.0) * left * if random.next() < 0.5 { -1.0 } else { 1.0 };
         let ms = random.between(50.0, 1_000.0) as usize;
         let to: [f64; 6] = core::array::from_fn(|j| {
             let (low, high) = file.config.position_range(j);
@@ -81,6 +86,7 @@ fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
         });
         let after = random.between(700.0, 1_700.0) as usize;
         let mut arm = Plant::of(file, &model, friction, pose);
+        arm.rotor = arm.rotor.map(|rotor| rotors * rotor);
         let mut rig = arm.holding_arm(file);
         arm.brakes = false;
         arm.run(&mut rig, 1_000);
@@ -109,7 +115,7 @@ fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
             }
             let others = (0..6).filter(|other| *other != joint);
             let aside = others.map(|j| (arm.q[j] - before[j]).abs()).fold(0.0, f64::max);
-            assert!(moving || aside < 0.1, "{about}: another joint by {aside} rad");
+            assert!(moving || aside < 0.1 || rotors < 1.0, "{about}: another joint by {aside} rad");
         }
         if rig.state() == ControllerState::Error {
             continue;
@@ -119,7 +125,7 @@ fn push_at_random(file: &ArmFile, seed: u64, moving: bool) -> usize {
         assert!(rig.last.safety_output);
         // The joint that was pushed is found first.
         let way = (arm.q[joint] - before[joint]).abs();
-        if !moving && way > 0.02 {
+        if !moving && way > 0.02 && rotors == 1.0 {
             assert_ne!(rig.status().joints[joint].internal, 0, "{about}: {way} rad");
             let told = rig.controller.reactions().stop.map(|(cause, _)| usize::from(cause.joint));
             assert_eq!(told, Some(joint + 1), "{about}: {way} rad");
@@ -140,13 +146,25 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
 }
 
 /// Arms as they are imported: their gains are weak, because nobody has measured their rotors. A push of 100 to 180 rad/s² takes such a joint to
-/// its over-speed within 12 ms, before its drive has told of it. Without an eye on the speed more than 80 of these 192 pushes release the arm.
+/// its over-speed within 12 ms, and what its drive reports is 8 ms old. Without an eye on the speed more than 80 of these 192 pushes release the
+/// arm, and 18 where the reported speed alone counts.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released = [ArmFile::ur5(), ArmFile::z1()]
         .map(|arm| [(7, false), (9, true)].map(|(seed, moving)| push_at_random(&arm, seed, moving)));
     println!("of 48 each, UR5 and Z1, held and moving: {released:?}");
-    assert!(released.iter().flatten().sum::<usize>() <= 20, "{released:?}");
+    assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
+}
+
+/// The rotors are only proposed. Where they are half as heavy, or a third, what yields is too hard for them: it becomes softer, does not swing, and
+/// pushes of 24 to 40 % of what is left release no arm.
+#[test]
+fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
+    for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
+        for (seed, moving) in [(7, false), (9, true)] {
+            assert_eq!(push_light(arm, seed, moving, 0.4, rotors), 0, "rotors times {rotors}");
+        }
+    }
 }
 
 /// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after it is noticed on the drive presses the joint against it with

@@ -73,12 +73,25 @@ impl Phase {
         }
     }
 
+    /// Joints are still to be enabled.
+    pub fn waits(&self) -> bool {
+        matches!(self, Self::Waiting { .. })
+    }
+
     /// In motion, and no Pause or Stop has been accepted.
     pub fn goes_on(&self) -> bool {
         match self {
             Self::Approaching { clock, leave, .. } => leave.is_none() && clock.time > 0.0,
             Self::Running { leave } => leave.is_none(),
             Self::Waiting { .. } | Self::AtStart => false,
+        }
+    }
+
+    /// Rate of the time in which the arm moves: of the approach, or of the path.
+    pub fn rate(&self, path: &PathClock) -> f64 {
+        match self {
+            Self::Approaching { clock, .. } => clock.rate,
+            _ => path.rate,
         }
     }
 

@@ -280,13 +280,14 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
 /// What a finished path has left behind is no motion to hold back: a jog that is overloaded ends.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
-    use crate::config::Config;
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     controller.phase = Phase::Running { leave: None };
-    controller.trajectory = TrajectoryState::Finish;
+    (controller.state, controller.trajectory) = (ControllerState::HoldPos, TrajectoryState::Finish);
     assert!(!controller.hold_back());
+    controller.state = ControllerState::Operate;
+    assert!(controller.hold_back() && !controller.motion.hold_back.is_active(), "it has just arrived");
     controller.trajectory = TrajectoryState::Execute;
-    assert!(controller.hold_back());
+    assert!(controller.hold_back() && controller.motion.hold_back.is_active());
     controller.phase = Phase::approach([0.0; JOINTS], 500.0);
     assert!(!controller.hold_back(), "it has not begun");
     let Phase::Approaching { clock, .. } = &mut controller.phase else { panic!() };

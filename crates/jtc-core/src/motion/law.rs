@@ -385,6 +385,7 @@ impl ControlLaw {
                 yields.step(&Joint {
                     position: q[j],
                     velocity: v[j],
+                    young_velocity: nodes.node(j).young_velocity(0.0),
                     fresh: nodes.node(j).fresh(),
                     model,
                     limits: limit,

@@ -146,8 +146,10 @@ impl Limiter {
             };
             let counts = strained && !yields && !taught && ((settled && !brakes()) || lags());
             let rushes = || {
-                let faster = v[j] - set.point.velocity[j];
-                faster.abs() > RUSH * limits.velocity_max && faster * v[j] > 0.0 && error * v[j] < 0.0
+                let due = set.point.velocity[j];
+                let velocity = nodes.node(j).young_velocity(due);
+                let faster = velocity - due;
+                faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
             // The way first: hardly ever is there any.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();

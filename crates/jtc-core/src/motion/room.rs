@@ -29,7 +29,7 @@ const NO_SPEED: f64 = 1e-3;
 /// Share of a torque limit that counts as left at least for a motion that unloads the joint.
 const UNLOADING: f64 = 0.01;
 /// Share of the tool speed limit that joints which get faster have at least, so that the jog goes on.
-const LEAST_ROOM: f64 = 0.02;
+const LEAST_ROOM: f64 = 0.005;
 /// Lowest share of a jog's acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
@@ -111,8 +111,8 @@ impl Motion {
     }
 
     /// The `wanted` velocities (rad/s), or as much of them as the tool speed limit allows. What each joint adds to the speed of the flange is
-    /// summed up, because joints whose motions cancel out do not speed up alike; and joints that get faster wait for those that have to
-    /// become slower.
+    /// summed up, because joints whose motions cancel out do not speed up alike; and joints that get faster have what those leave that are
+    /// to become slower, or go on.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // How far the flange is from the axis of each joint, m.
@@ -124,18 +124,30 @@ impl Motion {
         }
         let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
         let share = if speed > most { most / speed } else { 1.0 };
-        let slows = |j: usize| set.velocity[j].abs() > share * wanted[j].abs();
-        let (mut slower, mut faster) = (0.0, 0.0);
-        for j in 0..JOINTS {
-            if slows(j) {
-                slower += reach[j] * set.velocity[j].abs();
-            } else {
-                faster += reach[j] * wanted[j].abs();
+        // A joint goes on getting faster, or turns round, until its acceleration is back at zero.
+        let peak: [f64; JOINTS] = core::array::from_fn(|j| {
+            let (v, a) = (set.velocity[j], set.acceleration[j]);
+            let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
+            v.abs().max(after.abs())
+        });
+        // Joints that are to be no faster than they are count with what they have. With less room for the others there may be more of them.
+        let mut rising = share;
+        for _ in 0..JOINTS {
+            let (mut slower, mut faster) = (0.0, 0.0);
+            for j in 0..JOINTS {
+                if peak[j] > rising * wanted[j].abs() {
+                    slower += reach[j] * peak[j];
+                } else {
+                    faster += reach[j] * wanted[j].abs();
+                }
             }
+            let room = (most - slower).max(LEAST_ROOM * most);
+            rising = if rising * faster > room { room / faster } else { rising };
         }
-        let room = (most - slower).max(LEAST_ROOM * most);
-        let rising = if share * faster > room { room / faster } else { share };
-        core::array::from_fn(|j| wanted[j] * if slows(j) { share } else { rising })
+        core::array::from_fn(|j| {
+            let most = if peak[j] > rising * wanted[j].abs() { peak[j] } else { rising * wanted[j].abs() };
+            (share * wanted[j]).max(-most).min(most)
+        })
     }
 
     /// Share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of what is left there.

@@ -39,6 +39,8 @@ const COARSEST: f64 = 1e-4;
 const NEAR: f64 = 0.5;
 /// Most that the rate carried on differs from the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
+/// What the velocity of the last 5 ms differs by over what the reported mean of 10 ms does, at most; of an even acceleration it is twice as much.
+const YOUNGER: f64 = 2.5;
 /// Most that is carried on, in velocity limits.
 const FASTEST: f64 = 1.2;
 /// Double pole of a fading offset times the setting: a fifth is left when that is over, a fiftieth after twice as long.
@@ -236,6 +238,14 @@ impl Measurement {
     /// trusted alone: their full scale depends on the drive (J-11).
     pub fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
+    }
+
+    /// Velocity over the last 5 ms, rad/s, which is younger than the reported one. It differs from what is `due` (rad/s) in the direction in which
+    /// the reported one does, and not by much more, or else an encoder has jumped, and not the joint moved.
+    pub fn young_velocity(&self, due: f64) -> f64 {
+        let (young, reported) = (self.rate - due, self.used.velocity - due);
+        let most = YOUNGER * reported.abs();
+        if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }
 
     /// What is taken off an answer, because the encoder has jumped by it, rad.

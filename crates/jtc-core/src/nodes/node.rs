@@ -87,6 +87,11 @@ impl Node {
         self.fresh
     }
 
+    /// [`Measurement::young_velocity`], rad/s.
+    pub fn young_velocity(&self, due: f64) -> f64 {
+        self.measured.young_velocity(due)
+    }
+
     /// Its joint is set absent (J-53).
     pub fn absent(&self) -> bool {
         self.absent

@@ -130,7 +130,7 @@ impl Live {
             if n == 0 {
                 return Ok(());
             }
-            self.incoming.push(&buffer[..n]);
+            self.incoming.push(&buffer[..n], Instant::now());
             self.incoming.carries(Instant::now());
             self.board.write(self.port, &buffer[..n]);
         }

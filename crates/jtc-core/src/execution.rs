@@ -95,7 +95,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// A joint is overloaded by the motion along the path or on the approach: its time is held back (J-75). Returns false where the arm is in
     /// no such motion, or stops already. In the tick in which it arrives nothing is to be done about it.
     pub(crate) fn hold_back(&mut self) -> bool {
-        if self.state != ControllerState::Operate || !self.phase.goes_on() {
+        if self.state != ControllerState::Operate {
+            return false;
+        }
+        if !self.phase.goes_on() {
             return self.phase == Phase::AtStart;
         }
         if self.trajectory != TrajectoryState::Execute {

@@ -119,7 +119,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             StopKind::Overload | StopKind::Unstable => (law.torque[j].sum(), limits.torque_max),
             StopKind::Push => (law.feedback(j), self.config.yield_torque_share * limits.torque_max),
             StopKind::Shove => {
-                (of(self.nodes.velocities()) - of(&set.point.velocity), RUSH * limits.velocity_max)
+                let due = of(&set.point.velocity);
+                (self.nodes.node(j).young_velocity(due) - due, RUSH * limits.velocity_max)
             }
             StopKind::PositionError => {
                 (of(set.due(&self.config)) - of(self.nodes.positions()), limits.position_error_max)

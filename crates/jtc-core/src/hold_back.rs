@@ -91,6 +91,9 @@ impl HoldBack {
 
     /// A tick on the path, in the time of this clock; `joints` that are at their torque limits.
     pub fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
+        for (j, at_limit) in joints.iter().enumerate() {
+            self.pressed |= u8::from(*at_limit) << j;
+        }
         let stands = clock.rate < STANDS && clock.ramping();
         self.stands_ms = if stands { self.stands_ms.saturating_add(1) } else { 0 };
         if self.stands_ms > STANDS_MS {
@@ -101,9 +104,6 @@ impl HoldBack {
             return Next::Nothing;
         }
         let pressed = joints.contains(&true);
-        for (j, at_limit) in joints.iter().enumerate() {
-            self.pressed |= u8::from(*at_limit) << j;
-        }
         self.since_ms = self.since_ms.saturating_add(1);
         self.run_ms = self.run_ms.saturating_add(1);
         if pressed {

@@ -5,6 +5,9 @@ use crate::controller::Controller;
 use crate::io::Inputs;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
+/// The time of a stop is over.
+const OVER: u16 = u16::MAX;
+
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The safety input in this tick. With `safety_input_ramp_ms` what moves by command comes to rest first (stop category 1 of IEC 60204-1),
     /// also where the input is 1 again meanwhile. The error is raised in every case, whatever has taken the torque away by then.
@@ -12,9 +15,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {
             // It was raised in the last tick.
-            Some(ms) if ms >= ramp_ms => None,
-            Some(_) if !self.powered() || self.stands_still() => Some(ramp_ms),
-            Some(ms) => Some(ms.saturating_add(1).saturating_add(inputs.missed_ticks).min(ramp_ms)),
+            Some(OVER) => None,
+            Some(_) if !self.powered() || self.stands_still() || self.motion.law.is_yielding() => Some(OVER),
+            Some(ms) => {
+                let ms = ms.saturating_add(1).saturating_add(inputs.missed_ticks);
+                Some(if ms < ramp_ms { ms } else { OVER })
+            }
             None if inputs.safety_input || ramp_ms == 0 || !self.has_to_stop() => None,
             None => {
                 self.come_to_rest();
@@ -26,7 +32,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The safety input takes the torque away in this tick.
     pub(crate) fn safety_input_releases(&self, level: bool) -> bool {
         match self.safety_stop_ms {
-            Some(ms) => ms >= self.config.safety_input_ramp_ms,
+            Some(ms) => ms == OVER,
             None => !level,
         }
     }
@@ -43,7 +49,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// The arm moves by command or is led, with the torque of every joint. Where drives are still to be enabled, or a joint moves for
+    /// The arm moves by command or is led, with the torque of every joint. Where drives are still to be enabled, a joint yields, or moves for
     /// another reason, a stop would only keep the torque on.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
@@ -53,7 +59,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos => self.motion.set.coming_to_rest(),
             _ => false,
         };
-        moves && (0..JOINTS).all(enabled)
+        moves && !self.motion.law.is_yielding() && (0..JOINTS).all(enabled)
     }
 
     /// The arm is held at rest: nothing moves, and nothing is to.

@@ -27,14 +27,20 @@ const BRAKE_SETTLES: f64 = 0.5;
 /// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them: a damper above
 /// 200 1/s would drive a joint to and fro, and joints that move each other lower that bound.
 const DAMPING_RATE: f64 = 100.0;
-/// Speeds, in velocity limits, from which on a joint is braked beside its damper, and at which that takes the whole torque limit.
+/// Speeds, in velocity limits, from which on a joint is braked where its damper does less, and at which that takes the whole torque limit; the
+/// same where it lowers a load. The rate at which the brake reduces a speed is bounded, too, 1/s: positions are about 4 ms old.
 const BRAKES: (f64, f64) = (0.2, 0.8);
-/// A joint that comes back within so many ms, faster than that (rad/s), swings. Each time it does all is softer by the first factor, and at
-/// most by the second.
+const BRAKES_LOWERED: (f64, f64) = (0.4, 1.0);
+const BRAKE_RATE: f64 = 250.0;
+/// A joint swings that turns round twice, each within so many ms, from more than that (rad/s), the second time from more than this share of the
+/// first. Each time it does all is softer by the first factor, and at most by the second. After the first time (ms) without a swing it is
+/// harder again by a step, and by another after each of the second.
 const SWINGS_MS: u8 = 80;
 const SWINGS: f32 = 0.15;
+const LASTING: f32 = 0.5;
+const HARDENS_MS: (u16, u16) = (300, 100);
 const SOFTER: f32 = 0.5;
-const SOFTEST: f32 = 0.1;
+const SOFTEST: f32 = 0.2;
 /// Speed below which a joint that yields is calm, rad/s.
 const CALM: f64 = 0.05;
 /// Speed below which a load that is lowered is at rest, rad/s.
@@ -239,10 +245,11 @@ impl Yield {
         };
         self.damping += SETTLES * (damping - self.damping);
         // From nothing in the first tick: what it begins with would be blended in.
-        let brake = soft * self.braking * self.grip * brake(joint);
+        let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
+        let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
         let damper = (-self.damping * velocity).max(-limit).min(limit);
-        let d = (damper + brake).max(-limit).min(limit);
+        let d = if brake.abs() > damper.abs() { brake } else { damper };
         self.grip += SETTLES * (if self.missing > MISSING { 0.0 } else { 1.0 } - self.grip);
         let stiffness = (most / STRETCH).min(soft * SPRING_RATE * SPRING_RATE * self.inertia);
         let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
@@ -298,40 +305,54 @@ impl Yield {
 /// The swing of a joint that is lighter than its inertia in the arm file: what brakes it is too hard for it, because measured speeds are late.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Swing {
-    /// Highest speed in this direction, rad/s, signed, and since when the joint has it, ms.
+    /// Highest speed in this direction, rad/s, signed, and since when the joint moves so, ms.
     peak: f32,
     half_ms: u8,
-    /// How much softer everything is.
+    /// Highest speed of the half before, if that was one of a swing.
+    before: f32,
+    /// How much softer everything is, and since when it has been, ms.
     soft: f32,
+    soft_ms: u16,
 }
 
-remembered!(Swing { peak, half_ms, soft });
+remembered!(Swing { peak, half_ms, before, soft, soft_ms });
 
 impl Swing {
-    const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, soft: 1.0 };
+    const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
 
     /// A tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
     fn step(&mut self, velocity: f64) -> f64 {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
-            if self.half_ms < SWINGS_MS && self.peak.abs() > SWINGS {
-                self.soft = (self.soft * SOFTER).max(SOFTEST);
+            let speed = self.peak.abs();
+            let swings = self.half_ms < SWINGS_MS && speed > SWINGS;
+            // A shove and the return of the spring are two halves, too, but the second is slow.
+            if swings && self.before > 0.0 && speed > LASTING * self.before {
+                (self.soft, self.soft_ms) = ((SOFTER * self.soft).max(SOFTEST), 0);
             }
+            self.before = if swings { speed } else { 0.0 };
             (self.peak, self.half_ms) = (velocity, 0);
         } else if velocity.abs() > self.peak.abs() {
             self.peak = velocity;
         }
         self.half_ms = self.half_ms.saturating_add(1);
+        if self.soft < 1.0 {
+            self.soft_ms += 1;
+            if self.soft_ms >= HARDENS_MS.0 {
+                (self.soft, self.soft_ms) = ((self.soft / SOFTER).min(1.0), HARDENS_MS.0 - HARDENS_MS.1);
+            }
+        }
         self.soft.into()
     }
 }
 
-/// What a brake has against a fast motion, N·m: the measured speed is too old for the damper of a light joint to stop a shove.
-fn brake(joint: &Joint<'_>) -> f64 {
-    let speed = joint.young_velocity.abs() / joint.limits.velocity_max;
-    let share = (speed - BRAKES.0) * (1.0 / (BRAKES.1 - BRAKES.0));
-    let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
-    -share * joint.limits.torque_max * joint.young_velocity.signum()
+/// What a brake has against a fast motion of a joint with this `inertia` (kg·m²), N·m: the measured speed is too old for the damper of a light
+/// joint to stop a shove.
+fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
+    let JointConfig { torque_max, velocity_max, .. } = *joint.limits;
+    let slope = (torque_max / ((to - from) * velocity_max)).min(BRAKE_RATE * inertia);
+    let beyond = joint.young_velocity.abs() - from * velocity_max;
+    if beyond > 0.0 { -(slope * beyond).min(torque_max) * joint.young_velocity.signum() } else { 0.0 }
 }
 
 /// How often each joint has yielded in the last seconds.
@@ -376,20 +397,28 @@ mod tests {
         Config::avena().joints[1]
     }
 
-    /// A joint that comes back fast, again and again, becomes softer each time; one that a push has moved and a spring takes back does not.
+    /// A joint that comes back fast, again and again, becomes softer each time, and harder again when it does not; one that a push has moved and
+    /// a spring takes back does not.
     #[test]
-    fn j68_what_swings_becomes_softer() {
-        let swing = |half_ms: usize, speed: f64| {
+    fn j68_what_swings_becomes_softer_for_a_while() {
+        let swing = |half_ms: usize, speeds: [f64; 2]| {
             let mut swing = Swing::NONE;
-            let mut soft = 1.0;
             for ms in 0..6 * half_ms {
-                soft = swing.step(if (ms / half_ms).is_multiple_of(2) { speed } else { -speed });
+                swing.step(speeds[ms / half_ms % 2]);
             }
-            soft
+            swing
         };
-        assert_eq!(swing(20, 0.3), f64::from(0.5f32.powi(4)).max(SOFTEST.into()));
-        assert_eq!(swing(20, 0.1), 1.0, "too slow to matter");
-        assert_eq!(swing(100, 0.3), 1.0, "no swing of a loop");
+        let mut swings = swing(20, [0.3, -0.3]);
+        assert_eq!(
+            swings.soft, SOFTEST,
+            "of five turns the first ends no swing, and the second has none before it"
+        );
+        for (ms, harder) in [(300, 2.0 * SOFTEST), (100, 4.0 * SOFTEST), (100, 1.0)] {
+            assert_eq!((0..ms).fold(0.0, |_, _| swings.step(0.01)), f64::from(harder));
+        }
+        assert_eq!(swing(20, [0.3, -0.1]).soft, 1.0, "shoves, and the spring");
+        assert_eq!(swing(20, [0.1, -0.1]).soft, 1.0, "too slow to matter");
+        assert_eq!(swing(100, [0.3, -0.3]).soft, 1.0, "no swing of a loop");
     }
 
     /// The brake is no torque in the first tick of a yield, whole soon, and against the motion.
@@ -397,7 +426,7 @@ mod tests {
     fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
         let limits = limits();
         for v in [1.2, -1.2] {
-            let mut yields = Yield::begin(false, false, 0.0, 0.01, 0.0);
+            let mut yields = Yield::begin(false, false, 0.0, 5.0, 0.0);
             let joint = Joint { young_velocity: v, ..at(&limits, 0.0, 0.0, 0.0) };
             assert_eq!(yields.step(&joint).d, 0.0);
             let torque = (0..20).fold(0.0, |_, _| yields.step(&joint).d);

@@ -167,6 +167,40 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
+/// Whoever pushes again and again, or to and fro, still meets all of the torque: that is no swing of a joint that is lighter than its file says.
+#[test]
+fn j68_a_joint_that_is_shaken_stays_held() {
+    for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
+        let pose = POSES[0];
+        let left =
+            0.95 * file.config.joints[joint].torque_max - 1.1 * standing(&file.model, &pose)[joint].abs();
+        for half_ms in [40, 50] {
+            let mut arm = Plant::of(&file, &file.model, file.friction(1.0), pose);
+            let mut rig = arm.holding_arm(&file);
+            arm.brakes = false;
+            arm.run(&mut rig, 1_000);
+            for k in 0..2_000 {
+                arm.push[joint] = if k / half_ms % 2 == 0 { 0.4 * left } else { -0.4 * left };
+                arm.tick(&mut rig);
+            }
+            arm.push[joint] = 0.0;
+            arm.run(&mut rig, 600);
+            for k in 0..4_000 {
+                arm.push[joint] = match k % 1_000 {
+                    0..40 => 0.5 * left,
+                    500..800 if k > 3_000 => 0.7 * left,
+                    _ => 0.0,
+                };
+                arm.tick(&mut rig);
+            }
+            let about = format!("{}, joint {}, {half_ms} ms", file.name, joint + 1);
+            assert_eq!(rig.state(), ControllerState::HoldPos, "{about}");
+            arm.run(&mut rig, 2_000);
+            assert!(fastest(&arm) < 0.03, "{about}: {} rad/s", fastest(&arm));
+        }
+    }
+}
+
 /// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after it is noticed on the drive presses the joint against it with
 /// no more than its share, and it is a held stop.
 #[test]

@@ -243,7 +243,8 @@ impl Measurement {
     /// Velocity over the last 5 ms, rad/s, which is younger than the reported one. It differs from what is `due` (rad/s) in the direction in which
     /// the reported one does, and not by much more, or else an encoder has jumped, and not the joint moved.
     pub fn young_velocity(&self, due: f64) -> f64 {
-        let (young, reported) = (self.rate - due, self.used.velocity - due);
+        // Without what fades of an offset: that is older still.
+        let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }

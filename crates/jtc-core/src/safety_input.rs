@@ -9,8 +9,9 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// The safety input in this tick. With `safety_input_ramp_ms` what moves by command comes to rest first (stop category 1 of IEC 60204-1),
+    /// A tick in which the safety input is 0, or has been. With `safety_input_ramp_ms` what moves by command comes to rest first (stop category 1 of IEC 60204-1),
     /// also where the input is 1 again meanwhile. The error is raised in every case, whatever has taken the torque away by then.
+    #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {

@@ -16,7 +16,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // 1. What has come in. The error flags are formed in front of the host's commands: a clear in the very tick in which a
         // fault shows does not hide it. In Start nothing is carried out yet; the events are offered again.
         self.take_answers(inputs);
-        self.watch_safety_input(inputs);
+        if !inputs.safety_input || self.safety_stop_ms.is_some() {
+            self.watch_safety_input(inputs);
+        }
         self.form_error_flags(inputs);
         if self.errors.any() {
             self.enter(ControllerState::Error);

@@ -23,12 +23,12 @@ JOINTS = 6
 
 
 def assembly():
-    command = ["cargo", "rustc", "--release", "--quiet", "--package", "jtc-dynamics", "--lib", "--target", TARGET]
+    command = ["cargo", "rustc", "--profile", "dist", "--quiet", "--package", "jtc-dynamics", "--lib", "--target", TARGET]
     command += ["--", "--emit", "asm", "-C", "lto=off", "-C", "codegen-units=1"]
     target_dir = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "codegen"
     environment = os.environ | {"CARGO_TARGET_DIR": str(target_dir), "RUSTFLAGS": "-C target-cpu=cortex-m7"}
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
-    files = glob.glob(str(target_dir / TARGET / "release/deps/jtc_dynamics-*.s"))
+    files = glob.glob(str(target_dir / TARGET / "dist/deps/jtc_dynamics-*.s"))
     return pathlib.Path(max(files, key=os.path.getmtime)).read_text()
 
 

@@ -8,7 +8,7 @@ import { fileURLToPath } from 'node:url';
 
 import { asking, ended, until } from './harness.mjs';
 
-const UCOM = process.env.UCOM ?? fileURLToPath(new URL('../../target/debug/ucom', import.meta.url));
+const UCOM = process.env.UCOM ?? fileURLToPath(new URL('../../target/release/ucom', import.meta.url));
 
 function firstLine(child, name) {
   let errors = '';

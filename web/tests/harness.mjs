@@ -15,7 +15,7 @@ const FAILED = fileURLToPath(new URL('./out/', import.meta.url));
 /** Those of the docs, which say what they are called. */
 const PICTURES = fileURLToPath(new URL('../pictures/', import.meta.url));
 const SHOWN = readFileSync(new URL('../../docs/dashboard.md', import.meta.url), 'utf8');
-const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/debug/jtc', import.meta.url));
+const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/release/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
 /** `jtc` with these arguments; resolves to what it printed. */
@@ -175,11 +175,17 @@ export function held(page) {
 }
 
 /**
- * Waits until the page says this in passing. To be begun before the touch that causes it: a busy browser answers that after seconds, and
- * the words may be gone by then.
+ * Listens from now on for what the page says in passing; what is returned waits until it has. Words may be gone before a busy browser
+ * answers, so the page itself notes them.
  */
-export function says(page, pattern) {
-  return page.waitForFunction((source) => new RegExp(source).test(document.body.textContent), pattern.source, { polling: 100 });
+export async function says(page, pattern) {
+  await page.evaluate((source) => {
+    window.listening?.disconnect();
+    window.heard = false;
+    window.listening = new MutationObserver(() => (window.heard ||= new RegExp(source).test(document.body.textContent)));
+    window.listening.observe(document.body, { subtree: true, childList: true, characterData: true });
+  }, pattern.source);
+  return () => page.waitForFunction(() => window.heard, undefined, { polling: 100 });
 }
 
 /** The browser has complained of nothing but refused requests. */

@@ -1,4 +1,4 @@
-// How the page looks, and that everyone can use it: each tab is read by axe, in light and dark, from a phone to a large screen. The pictures
+// How the page looks, and that everyone can use it: each tab fits a phone and a large screen, and is read by axe, in light and dark. The pictures
 // in pictures/ are taken where PICTURES is set.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
@@ -11,6 +11,8 @@ import { commanding, ended, jtc, picture, recover, staged, startBrowser, state, 
 
 const TABS = ['state', 'run', 'jog', 'teach', 'arm', 'plots', 'log'];
 const SIZES = [[360, 740], [800, 1180], [1400, 900]];
+// What axe looks at depends on the colours and on whether the page is a narrow one: twice is enough.
+const READ = ['360 light', '1400 dark'];
 let browser;
 before(async () => (browser = await startBrowser()));
 after(() => browser.close());
@@ -68,7 +70,7 @@ for (const colorScheme of ['light', 'dark']) {
       for (const tab of TABS) {
         await page.click(`#tab-${tab}`);
         await page.waitForTimeout(500);
-        await reads(page, `${tab} at ${width} px, ${colorScheme}`);
+        if (READ.includes(`${width} ${colorScheme}`)) await reads(page, `${tab} at ${width} px, ${colorScheme}`);
         await fits(page, `${tab} at ${width} px, ${colorScheme}`);
         await picture(page, `${tab}-${width}-${colorScheme}`);
       }
@@ -108,7 +110,7 @@ on('the question which arm this is can be read by everyone', { faults: 'format =
       const page = await look({ viewport: { width, height }, colorScheme });
       await state(page).getByRole('button', { name: 'Recover …' }).click();
       await page.getByRole('dialog').getByText('Is this an avena?').waitFor();
-      await reads(page, `which arm at ${width} px, ${colorScheme}`);
+      if (READ.includes(`${width} ${colorScheme}`)) await reads(page, `which arm at ${width} px, ${colorScheme}`);
       await fits(page, `which arm at ${width} px, ${colorScheme}`);
       await picture(page, `which-arm-${width}-${colorScheme}`);
       await page.context().close();

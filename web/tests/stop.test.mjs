@@ -38,9 +38,9 @@ on('Stop by one touch ends a motion, and says what it did', {}, async ({ agent, 
     // The press alone: nobody has to let go for it.
     const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
-    const said = says(page, /Stopped on the path in \d\.\d s; the arm is held/);
+    const said = await says(page, /Stopped on the path in \d\.\d s; the arm is held/);
     await page.mouse.down();
-    await said;
+    await said();
     await page.mouse.up();
   });
   await state(page).getByText('Holding').waitFor();
@@ -60,14 +60,14 @@ on('the space bar stops, also with a button in focus, and in a field it is a spa
   await moving(agent, async () => {
     await page.getByRole('button', { name: /^Theme/ }).focus();
     const before = await page.evaluate(() => document.documentElement.dataset.theme);
-    const said = says(page, /Stopped on the path/);
+    const said = await says(page, /Stopped on the path/);
     await page.keyboard.press('Space');
-    await said;
+    await said();
     assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), before, 'the button in focus was pressed, too');
   });
-  const said = says(page, /Nothing was moving; the arm is held/);
+  const said = await says(page, /Nothing was moving; the arm is held/);
   await page.keyboard.press('Space');
-  await said;
+  await said();
 });
 
 on('a dialog leaves Stop where it is', {}, async ({ agent, look }) => {
@@ -106,9 +106,9 @@ on("a viewer sees no command, and Stop works", {}, async ({ agent, look }) => {
     assert.equal(await page.locator('#panel').getByRole('button', { name: command, exact: true }).count(), 0, `${tab}: ${command}`);
   }
   await moving(agent, async () => {
-    const said = says(page, /Stopped on the path/);
+    const said = await says(page, /Stopped on the path/);
     await page.getByRole('button', { name: /STOP/ }).click();
-    await said;
+    await said();
   });
 });
 

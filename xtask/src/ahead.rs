@@ -1,7 +1,8 @@
 //! What later steps need, made at the lowest priority while the steps before them wait.
 //!
-//! Most tests wait: for a line as slow as a real one, for leases that lapse. What they leave of the processors builds the released programs,
-//! the boards' and the emulator. A build that fails says so in the step that needs it, which asks for the same and finds it made or not.
+//! Most tests wait: for a line as slow as a real one, for leases that lapse. What they leave of the processors builds the boards' programs,
+//! the emulator and the Python package. A build that fails says so in the step that needs it, which asks for the same and finds it made or not.
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
 use anyhow::Result;
@@ -9,35 +10,50 @@ use anyhow::Result;
 use crate::{book, emulate, firmware, package, python, shell, web};
 
 /// What is being made.
-pub struct Ahead(Option<JoinHandle<()>>);
+pub struct Ahead {
+    workspace_is_built: Option<Sender<()>>,
+    making: Option<JoinHandle<()>>,
+}
 
 impl Ahead {
     /// Begins with what takes longest.
     pub fn begin() -> Self {
-        let make = || shell::in_background(|| drop(make()));
-        Self(Some(std::thread::spawn(make)))
+        let (sender, receiver) = mpsc::channel();
+        let make = move || shell::in_background(|| drop(make(&receiver)));
+        Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
+    }
+
+    /// From now on the Python package can be built. Cargo builds one thing at a time in a folder: before, the steps would wait for
+    /// something of the lowest priority.
+    pub fn workspace_is_built(&self) {
+        if let Some(sender) = &self.workspace_is_built {
+            // An error: what is made before has failed, so nothing waits.
+            let _ = sender.send(());
+        }
     }
 }
 
 impl Drop for Ahead {
     fn drop(&mut self) {
-        if let Some(thread) = self.0.take() {
+        // Nobody waits any longer for the workspace.
+        self.workspace_is_built = None;
+        if let Some(thread) = self.making.take() {
             // A panic of it is none of the checks'.
             let _ = thread.join();
         }
     }
 }
 
-fn make() -> Result<()> {
+fn make(workspace_is_built: &Receiver<()>) -> Result<()> {
     python::environment("requirements.txt")?;
     // Without it the step that needs it is skipped.
     let _ = web::install_browser();
-    python::programs()?;
-    package::build()?;
     emulate::programs()?;
     firmware::lints()?;
     for board in firmware::BOARDS {
         firmware::build(board)?;
     }
-    book::build()
+    book::build()?;
+    workspace_is_built.recv()?;
+    package::build().map(drop)
 }

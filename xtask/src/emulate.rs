@@ -5,7 +5,7 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::shell::{self, run, run_lines, works};
-use crate::suite::count_results;
+use crate::suite::{self, count_results};
 use crate::tally::{Counts, Outcome, Tally};
 use crate::{firmware, python, size};
 
@@ -74,16 +74,9 @@ fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// The host program that drives the emulated board.
-fn build_jtc() -> Result<PathBuf> {
-    run(&mut shell::cargo(&["build", "--release", "--package", "jtc-cli"]))?;
-    Ok(shell::target().join("release/jtc"))
-}
-
-/// Builds what the emulated sessions run.
+/// Builds what the emulated sessions run beside the host program.
 pub fn programs() -> Result<()> {
     install_tools()?;
-    build_jtc()?;
     firmware::build_fast()?;
     lints()?;
     run(&mut cargo(&["test", "--release", "--no-run"]))?;
@@ -96,7 +89,7 @@ fn lints() -> Result<()> {
 
 fn tests() -> Result<Outcome> {
     install_tools()?;
-    let jtc = build_jtc()?;
+    let jtc = suite::programs()?.join("jtc");
     firmware::build_fast()?;
     lints()?;
     let mut counts = Counts::default();
@@ -111,7 +104,7 @@ fn tests() -> Result<Outcome> {
 
 /// From a robot description to a motion, on the program that is flashed.
 fn driving() -> Result<Outcome> {
-    let jtc = build_jtc()?;
+    let jtc = suite::programs()?.join("jtc");
     run(&mut cargo(&["build", "--release"]))?;
     let emulator = shell::target().join("emulator/release/openjtc-emulate");
     let mut script = shell::command(python::environment("requirements.txt")?);

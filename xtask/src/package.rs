@@ -6,6 +6,7 @@ use anyhow::{Context, Result, ensure};
 use crate::beside;
 use crate::python;
 use crate::shell::{self, Scratch, root, run};
+use crate::suite;
 use crate::tally::{Counts, Outcome, Tally};
 
 /// What builds it and what its tests need.
@@ -42,16 +43,7 @@ pub fn build() -> Result<PathBuf> {
     }
     let mut build = shell::command(programs.join("maturin"));
     build
-        .args([
-            "build",
-            "--profile",
-            "dev",
-            "--locked",
-            "--quiet",
-            "--compatibility",
-            "linux",
-            "--interpreter",
-        ])
+        .args(["build", "--release", "--locked", "--quiet", "--compatibility", "linux", "--interpreter"])
         .arg(&python);
     build.arg("--out").arg(&folder).arg("--manifest-path").arg("crates/openjtc-py/Cargo.toml");
     run(build.env("CARGO_TARGET_DIR", shell::target()))?;
@@ -90,7 +82,7 @@ fn fresh(wheel: &Path) -> Result<()> {
 fn tested(wheel: &Path) -> Result<Outcome> {
     let python = python::environment(REQUIREMENTS)?;
     run(python::pip_install(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
-    python::commands()?;
+    let programs = suite::programs()?;
     let scratch = Scratch::new("package")?;
     let mypy = |arguments: &[&str]| {
         let mut mypy = shell::command(&python);
@@ -99,12 +91,11 @@ fn tested(wheel: &Path) -> Result<Outcome> {
     };
     mypy(&["mypy", "--strict", "--package", "openjtc", "--cache-dir", "cache"])?;
     mypy(&["mypy.stubtest", "openjtc._native"])?;
-    let release = shell::target().join("release");
     let mut tests = shell::command(&python);
     tests
         .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "3"])
         .arg(root().join("crates/openjtc-py/tests"));
-    tests.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom"));
+    tests.env("JTC", programs.join("jtc")).env("UCOM", programs.join("ucom"));
     tests.env("OPENJTC_ROBOTS", python::robots());
     tests.env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "agg").current_dir(scratch.path());
     let ended = beside::run(&mut tests, &scratch.path().join("log"))?;

@@ -7,7 +7,8 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::beside::{self, Ended};
-use crate::shell::{self, apt_install, cargo, command, root, run, works};
+use crate::shell::{self, apt_install, command, root, run, works};
+use crate::suite;
 use crate::tally::{Outcome, Tally};
 use crate::web;
 
@@ -97,32 +98,6 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// Builds the commands.
-pub fn commands() -> Result<()> {
-    for package in ["jtc-cli", "ucom-cli"] {
-        run(&mut cargo(&["build", "--release", "--package", package]))?;
-    }
-    Ok(())
-}
-
-/// Builds what the references run.
-pub fn programs() -> Result<()> {
-    // What the demo runs comes first.
-    commands()?;
-    for (package, example) in [
-        ("jtc-dynamics", "reference"),
-        ("jtc-sim", "free_fall"),
-        ("jtc-plan", "plans"),
-        ("jtc-plan", "poses"),
-        ("can-link", "echo"),
-        ("can-link", "socketcand_server"),
-        ("can-link", "slcan_adapter"),
-    ] {
-        run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
-    }
-    Ok(())
-}
-
 /// A step for each reference; `demo` is where the demo left its files.
 pub fn checks(tally: &mut Tally, demo: &Path) {
     let mut python = None;
@@ -132,7 +107,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     });
     let mut built = false;
     tally.step("programs for the references", || {
-        programs()?;
+        suite::programs()?;
         built = true;
         Ok(Outcome::Passed)
     });

@@ -3,8 +3,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::firmware;
-use crate::shell::{self, cargo};
+use crate::shell;
+use crate::{firmware, suite};
 
 /// Bytes that the controller may take with its trajectory: 432 000 of points, and 40 KiB of the board's fast memory for all else, the
 /// stored arm included. The receive buffers of 60 000 bytes come beside it.
@@ -12,15 +12,7 @@ pub const LIMIT: u64 = 432_000 + 40 * 1024;
 
 /// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.
 pub fn controller_bytes() -> Result<u64> {
-    let text = shell::read(&mut cargo(&[
-        "run",
-        "--quiet",
-        "--release",
-        "--package",
-        "jtc-core",
-        "--example",
-        "tick",
-    ]))?;
+    let text = shell::read(&mut shell::command(suite::programs()?.join("examples/tick")))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
     line.context("the example `tick` of jtc-core printed no controller_bytes")?
         .trim()

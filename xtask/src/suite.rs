@@ -25,12 +25,15 @@ struct Program {
     tests: Vec<String>,
 }
 
-/// Every test of the workspace, and those in its documentation; their own counts are summed up.
-pub fn run() -> Result<Outcome> {
-    let programs = build()?;
+/// Every test of the workspace, and those in its documentation; their own counts are summed up. Calls `built` when cargo has built the
+/// workspace.
+pub fn run(built: impl FnOnce()) -> Result<Outcome> {
+    let tests = build()?;
+    programs()?;
+    built();
     let mut counts = Counts::default();
-    let failures = run_all(programs, &mut counts)?;
-    let mut documentation = cargo(&["test", "--workspace", "--no-fail-fast", "--doc"]);
+    let failures = run_all(tests, &mut counts)?;
+    let mut documentation = cargo(&["test", "--release", "--workspace", "--no-fail-fast", "--doc"]);
     let documented = run_lines(&mut documentation, |line| count_results(line, &mut counts));
     for failure in &failures {
         println!("failed: {failure}");
@@ -44,10 +47,18 @@ pub fn run() -> Result<Outcome> {
     Ok(Outcome::Counted(counts))
 }
 
-/// Builds the test programs, and no examples: the lints compile those.
+/// Builds the commands and the examples, with the dependencies that the tests are built with; the folder in which they are.
+///
+/// One package alone would use other features of the dependencies, so that half of them were built once more.
+pub fn programs() -> Result<PathBuf> {
+    shell::run(&mut cargo(&["build", "--release", "--workspace", "--bins", "--examples"]))?;
+    Ok(shell::target().join("release"))
+}
+
+/// Builds the test programs.
 fn build() -> Result<Vec<Program>> {
-    let mut build =
-        cargo(&["test", "--workspace", "--tests", "--no-run", "--message-format=json-render-diagnostics"]);
+    let mut build = cargo(&["test", "--release", "--workspace", "--tests", "--no-run"]);
+    build.arg("--message-format=json-render-diagnostics");
     let messages = shell::read(&mut build)?;
     let mut programs = Vec::new();
     for message in messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok()) {

@@ -27,6 +27,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
 
     let before = tree();
     let ahead = (!quick && only.is_none()).then(Ahead::begin);
+    let built = || ahead.iter().for_each(Ahead::workspace_is_built);
     let mut tally = Tally::new(only);
     tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
     tally.step("every rule has a test that names it", || passed(rules::check()));
@@ -37,18 +38,20 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("every dependency is documented", || passed(dependencies::check()));
     tally.step("licences, sources and bans of dependencies", || passed(deny::check()));
     tally.step("lints", || {
-        run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
-        let without_formats =
-            ["clippy", "--package", "jtc-host", "--no-default-features", "--", "-D", "warnings"];
-        passed(run(&mut cargo(&without_formats)))
+        let lint = |what: &[&str]| {
+            let mut clippy = cargo(&["clippy", "--release"]);
+            run(clippy.args(what).args(["--", "-D", "warnings"]))
+        };
+        lint(&["--workspace", "--all-targets"])?;
+        passed(lint(&["--package", "jtc-host", "--no-default-features"]))
     });
     web::steps(&mut tally);
-    tally.step("tests, properties and fuzz regressions", suite::run);
+    tally.step("tests, properties and fuzz regressions", || suite::run(built));
     if !quick {
         tally.step("builds for the board (no_std)", || passed(board_builds()));
         tally.step("memory of the controller", || passed(size::check()));
         tally.step("documentation", || {
-            let mut doc = cargo(&["doc", "--workspace", "--no-deps"]);
+            let mut doc = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
         // From here on they are run.
@@ -100,8 +103,8 @@ fn board_builds() -> Result<()> {
 
 /// The newcomer's command, into a directory of its own; what it wrote is looked at.
 fn demo(out: &Path) -> Result<()> {
-    let mut demo = cargo(&["run", "--release", "--quiet", "--", "demo", "--speed", "max", "--json", "--out"]);
-    let text = shell::read(demo.arg(out))?;
+    let mut demo = shell::command(suite::programs()?.join("jtc"));
+    let text = shell::read(demo.args(["demo", "--speed", "max", "--json", "--out"]).arg(out))?;
     let last = text.lines().rev().find(|line| line.starts_with('{')).unwrap_or(&text);
     let report: Value = serde_json::from_str(last).context("the demo's --json output is no JSON object")?;
     check_demo_figures(&report)?;

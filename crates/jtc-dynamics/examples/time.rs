@@ -1,6 +1,6 @@
 //! Prints what a call costs: lines of a name and nanoseconds, the least of many batches of calls.
 //!
-//! `cargo run --release -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see
+//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see
 //! `lines/mod.rs`). `references/dynamics/anchors.py --ours` makes such a file and times other implementations
 //! beside this one.
 mod lines;

@@ -1,6 +1,6 @@
 //! Plans random motions and judges each by its samples.
 //!
-//!     cargo run --release -p jtc-plan --example campaign -- [CASES [SEED]]
+//!     cargo run --profile dist -p jtc-plan --example campaign -- [CASES [SEED]]
 //!
 //! Prints the seed of every case that is wrong, and ends with 1 if there was one.
 use std::collections::BTreeMap;

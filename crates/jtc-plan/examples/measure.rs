@@ -1,7 +1,7 @@
 //! Measures what planning takes, and how good motions that are limited in jerk are, on fixed random waypoints.
 //!
-//!     cargo run --release -p jtc-plan --example measure -- speed
-//!     cargo run --release -p jtc-plan --example measure -- quality [CASES [SEED]]
+//!     cargo run --profile dist -p jtc-plan --example measure -- speed
+//!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
 //!
 //! `speed` prints time of the processor in ms, the least of some plans. `quality` prints a line for each kind of path: the sums and the
 //! worst of durations as shares of those without a limit of jerk, and how many motions became slower with all limits doubled. With a

@@ -1,4 +1,4 @@
-//! Throughput of the CRC and of the stream parser, one JSON object: `cargo run --release -p jtc-wire --example throughput`.
+//! Throughput of the CRC and of the stream parser, one JSON object: `cargo run --profile dist -p jtc-wire --example throughput`.
 use std::hint::black_box;
 
 use crc::{CRC_16_XMODEM, Crc, Table};

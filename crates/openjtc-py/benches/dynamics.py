@@ -4,7 +4,7 @@
 
 Pinocchio (`pip install pin`) is called in a loop over the states, which is the only way that its bindings have for these functions, but for
 what its `parallel` extension computes for a batch, where the wheel has it. Of several rounds the best is printed: other programs can
-only slow one down. Build the package with optimisation first (`maturin develop --release`).
+only slow one down. Build the package with optimisation first (`maturin develop --profile dist`).
 """
 
 import argparse

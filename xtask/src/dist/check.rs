@@ -23,9 +23,7 @@ pub fn steps(tally: &mut Tally) {
 }
 
 fn cheaply() -> Result<()> {
-    crate::python::commands()?;
-    let release = shell::target().join("release");
-    let [first, second] = assembled_twice(&release)?;
+    let [first, second] = assembled_twice(&crate::suite::programs()?)?;
     for (first, second) in first.iter().zip(&second) {
         ensure!(first.bytes == second.bytes, "{} is other bytes when it is made again", first.name);
         println!("{}: {} B, twice the same", first.name, first.bytes.len());

@@ -1,4 +1,4 @@
-//! How soon a Stop is on the line, one JSON object: `cargo run --release -p jtc-client --example stops [N]`, N Stops under each load.
+//! How soon a Stop is on the line, one JSON object: `cargo run --profile dist -p jtc-client --example stops [N]`, N Stops under each load.
 //!
 //! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller behind it. Whoever looks is in a process of its own.
 #[cfg(unix)]

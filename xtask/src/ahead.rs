@@ -23,11 +23,11 @@ impl Ahead {
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 
-    /// From now on the Python package can be built. Cargo builds one thing at a time in a folder: before, the steps would wait for
-    /// something of the lowest priority.
+    /// Allows the build of the Python package. Cargo lets one build at a time use a target folder: begun earlier, this one would hold up
+    /// the steps at the lowest priority.
     pub fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
-            // An error: what is made before has failed, so nothing waits.
+            // An error means that an earlier build has failed and the thread has ended.
             let _ = sender.send(());
         }
     }
@@ -35,7 +35,7 @@ impl Ahead {
 
 impl Drop for Ahead {
     fn drop(&mut self) {
-        // Nobody waits any longer for the workspace.
+        // If the workspace was not built, this ends the thread's wait for it.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
             // A panic of it is none of the checks'.

@@ -74,7 +74,7 @@ fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Builds what the emulated sessions run beside the host program.
+/// Builds all that the emulated sessions run, except the host program.
 pub fn programs() -> Result<()> {
     install_tools()?;
     firmware::build_fast()?;

@@ -24,7 +24,8 @@ pub fn target() -> PathBuf {
 pub fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
-    // What cargo told this program of its own package: ring would be built anew after each cargo that a person has run, and all behind it.
+    // Cargo sets these for xtask's own package. Build scripts that read them, as ring's does, would run again each time that a person runs
+    // cargo in between.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {

@@ -47,9 +47,9 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
     Ok(Outcome::Counted(counts))
 }
 
-/// Builds the commands and the examples, with the dependencies that the tests are built with; the folder in which they are.
+/// Builds the commands and the examples with the dependencies that the tests have. Returns their folder.
 ///
-/// One package alone would use other features of the dependencies, so that half of them were built once more.
+/// Cargo chooses features for the packages that it is given. For one package it would build half of the dependencies a second time.
 pub fn programs() -> Result<PathBuf> {
     shell::run(&mut cargo(&["build", "--release", "--workspace", "--bins", "--examples"]))?;
     Ok(shell::target().join("release"))

@@ -224,6 +224,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
+    /// A jog comes to rest, and what follows of it is refused. Returns whether there was one.
+    pub(crate) fn stop_jog(&mut self) -> bool {
+        let jogging = self.motion.set.jogging();
+        if jogging {
+            self.motion.set.end_jog();
+            self.extensions.refuse_jogs();
+        }
+        jogging
+    }
+
     fn holds_at_rest(&self) -> bool {
         self.state == ControllerState::HoldPos && self.at_rest()
     }

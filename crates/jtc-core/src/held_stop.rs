@@ -48,10 +48,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
             self.leave_path(ExecCommand::Pause);
         }
-        if self.motion.set.jogging() {
-            self.motion.set.end_jog();
-            self.extensions.refuse_jogs();
-        }
+        self.stop_jog();
     }
 
     /// The encoders of joints do not fit (J-35): the arm comes to rest and is held, also out of Teaching.

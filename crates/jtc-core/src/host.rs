@@ -361,12 +361,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
         // A Stop or a Pause holds the arm: it also ends Teaching, and calls off Teaching that has not begun.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
+        if command != ExecCommand::Execute && self.stop_jog() {
+            return Ok(());
+        }
         match (self.trajectory, command) {
-            (_, ExecCommand::Stop | ExecCommand::Pause) if self.motion.set.jogging() => {
-                self.motion.set.end_jog();
-                self.extensions.refuse_jogs();
-                Ok(())
-            }
             // J-33: what was stopped is not to be gone on with.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>

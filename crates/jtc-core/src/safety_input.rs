@@ -44,10 +44,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if self.trajectory == TrajectoryState::Execute {
             self.leave_path(ExecCommand::Stop);
         }
-        if self.motion.set.jogging() {
-            self.motion.set.end_jog();
-            self.extensions.refuse_jogs();
-        }
+        self.stop_jog();
     }
 
     /// The arm moves by command or is led, with the torque of every joint. Where drives are still to be enabled, a joint yields, or moves for

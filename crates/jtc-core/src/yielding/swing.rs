@@ -1,0 +1,86 @@
+//! The swing of a joint that is lighter than its inertia in the arm file: what brakes it is too hard for it, because measured speeds are late.
+use crate::remembered::remembered;
+
+/// A half of a swing ends within this time, ms, and has at least this speed, rad/s.
+const HALF_MS: u8 = 80;
+const HALF_SPEED: f32 = 0.15;
+/// A swing is two halves in turn. The second has at least this share of the speed of the first: a shove and the return of the spring are two
+/// halves as well, but the second is slow.
+const LASTS: f32 = 0.5;
+/// Each swing makes the joint softer by this factor, until it is as soft as the second says.
+const SOFTER: f32 = 0.5;
+const SOFTEST: f32 = 0.2;
+/// Time without a swing after which the joint is harder again by a step, and time between further steps, ms.
+const HARDENS_MS: (u16, u16) = (300, 100);
+
+/// Whether a joint swings, and how much softer it yields for that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Swing {
+    /// Highest speed in this direction, rad/s, signed, and since when the joint moves so, ms.
+    peak: f32,
+    half_ms: u8,
+    /// Highest speed of the half before, if that was one of a swing.
+    before: f32,
+    /// How much softer everything is, and since when it has been, ms.
+    soft: f32,
+    soft_ms: u16,
+}
+
+remembered!(Swing { peak, half_ms, before, soft, soft_ms });
+
+impl Swing {
+    pub const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
+
+    /// A tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
+    pub fn step(&mut self, velocity: f64) -> f64 {
+        let velocity = velocity as f32;
+        if velocity * self.peak < 0.0 {
+            let speed = self.peak.abs();
+            let swings = self.half_ms < HALF_MS && speed > HALF_SPEED;
+            if swings && self.before > 0.0 && speed > LASTS * self.before {
+                (self.soft, self.soft_ms) = ((SOFTER * self.soft).max(SOFTEST), 0);
+            }
+            self.before = if swings { speed } else { 0.0 };
+            (self.peak, self.half_ms) = (velocity, 0);
+        } else if velocity.abs() > self.peak.abs() {
+            self.peak = velocity;
+        }
+        self.half_ms = self.half_ms.saturating_add(1);
+        if self.soft < 1.0 {
+            self.soft_ms += 1;
+            if self.soft_ms >= HARDENS_MS.0 {
+                (self.soft, self.soft_ms) = ((self.soft / SOFTER).min(1.0), HARDENS_MS.0 - HARDENS_MS.1);
+            }
+        }
+        self.soft.into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint that comes back fast, again and again, becomes softer each time, and harder again when it does not; one that a push has moved and
+    /// a spring takes back does not.
+    #[test]
+    fn j68_what_swings_becomes_softer_for_a_while() {
+        let swing = |half_ms: usize, speeds: [f64; 2]| {
+            let mut swing = Swing::NONE;
+            for ms in 0..6 * half_ms {
+                swing.step(speeds[ms / half_ms % 2]);
+            }
+            swing
+        };
+        let mut swings = swing(20, [0.3, -0.3]);
+        assert_eq!(
+            swings.soft, SOFTEST,
+            "of five turns the first ends no swing, and the second has none before it"
+        );
+        for (ms, harder) in [(300, 2.0 * SOFTEST), (100, 4.0 * SOFTEST), (100, 1.0)] {
+            assert_eq!((0..ms).fold(0.0, |_, _| swings.step(0.01)), f64::from(harder));
+        }
+        assert_eq!(swing(20, [0.3, -0.1]).soft, 1.0, "shoves, and the spring");
+        assert_eq!(swing(20, [0.1, -0.1]).soft, 1.0, "too slow to matter");
+        assert_eq!(swing(100, [0.3, -0.3]).soft, 1.0, "no swing of a loop");
+    }
+}

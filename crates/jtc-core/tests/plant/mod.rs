@@ -1,4 +1,5 @@
-//! An arm of metal behind the [`Rig`]: rigid bodies, rotors, LuGre friction, and drives with a coarse encoder and a late speed.
+//! An arm of metal behind the [`Rig`]: rigid bodies, rotors, rigid or elastic gears, LuGre friction, and drives with a coarse encoder and a
+//! late speed.
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
@@ -16,6 +17,10 @@ const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
 /// Integration steps in a millisecond: the bristles are stiff.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
+/// kg·m² that turn with the link behind an elastic gear, beside the link: the gear's own output side.
+const GEAR_OUTPUT: f64 = 0.01;
+/// s: damping of an elastic gear, N·m·s/rad, for each N·m/rad of its stiffness.
+const GEAR_DAMPING: f64 = 5e-4;
 
 /// LuGre friction of a joint (Canudas de Wit et al. 1995): bristles that stick, then slip along Stribeck's curve.
 #[derive(Clone, Copy, Debug)]
@@ -79,6 +84,23 @@ impl LuGre {
     }
 }
 
+/// Elastic gears: each is a spring and a damper between its motor and its link. The motors' angles and speeds are those of the output side.
+struct Gears {
+    /// N·m/rad.
+    stiffness: f64,
+    /// Of the motors, rad.
+    q: [f64; 6],
+    /// Of the motors, rad/s.
+    v: [f64; 6],
+}
+
+impl Gears {
+    /// Torque of gear `j` on its link, N·m.
+    fn torque(&self, j: usize, q: f64, v: f64) -> f64 {
+        self.stiffness * (self.q[j] - q + GEAR_DAMPING * (self.v[j] - v))
+    }
+}
+
 /// Reproducible pseudo-random numbers.
 pub struct Random(pub u64);
 
@@ -134,6 +156,8 @@ pub struct Plant {
     pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
     bristles: [f64; 6],
+    /// Rigid gears, if there are none.
+    gears: Option<Gears>,
     pub q: [f64; 6],
     pub v: [f64; 6],
     /// Torque of a hand or a collision, N·m.
@@ -176,6 +200,7 @@ impl Plant {
             rotor: config.joints.map(|j| j.rotor_inertia),
             friction,
             bristles: [0.0; 6],
+            gears: None,
             q,
             v: [0.0; 6],
             push: [0.0; 6],
@@ -193,6 +218,15 @@ impl Plant {
             rotor: arm.config.joints.map(|j| j.rotor_inertia),
             ..Self::new(model, friction, q)
         }
+    }
+
+    /// The same with elastic gears of so many N·m/rad, twisted as the load wants it. The drives measure the position of the link and the
+    /// speed of the motor; rotors and friction are on the motors' side.
+    pub fn elastic(mut self, stiffness: f64) -> Self {
+        let load = self.dynamics.gravity_torque(&self.q);
+        let q = core::array::from_fn(|j| self.q[j] + load[j] / stiffness);
+        self.gears = Some(Gears { stiffness, q, v: [0.0; 6] });
+        self
     }
 
     /// A rig that holds another arm.
@@ -241,28 +275,24 @@ impl Plant {
     }
 
     fn step(&mut self, rig: &Rig) {
-        let before = self.q;
+        let enabled: [bool; 6] =
+            core::array::from_fn(|j| rig.nodes[j].report.state == jtc_bus::NodeState::ENABLED);
+        let braked: [bool; 6] = core::array::from_fn(|j| self.brakes && !enabled[j]);
+        let drive: [f64; 6] = core::array::from_fn(|j| if enabled[j] { rig.torque[j] } else { 0.0 });
+        let before = self.motors().0;
         let mut mass = self.dynamics.mass_matrix(&self.q);
         let bias = self.dynamics.inverse(&self.q, &self.v, &[0.0; 6]);
-        let free: [bool; 6] = core::array::from_fn(|j| {
-            !self.brakes || rig.nodes[j].report.state == jtc_bus::NodeState::ENABLED
-        });
         for j in 0..6 {
-            mass[j][j] += if free[j] { self.rotor[j] } else { 1e9 };
-            if !free[j] {
-                self.v[j] = 0.0;
+            let motor = if braked[j] { 1e9 } else { self.rotor[j] };
+            mass[j][j] += if self.gears.is_some() { GEAR_OUTPUT } else { motor };
+            if braked[j] {
+                *self.motor_speed(j) = 0.0;
             }
         }
         let inverse = inverted(mass);
-        let drive = rig.torque;
         for _ in 0..SUBSTEPS {
-            let mut torque = [0.0; 6];
-            for j in 0..6 {
-                let on =
-                    if rig.nodes[j].report.state == jtc_bus::NodeState::ENABLED { drive[j] } else { 0.0 };
-                torque[j] =
-                    on + self.push[j] - bias[j] - self.friction[j].step(&mut self.bristles[j], self.v[j], DT);
-            }
+            let torque: [f64; 6] =
+                core::array::from_fn(|j| self.push[j] - bias[j] + self.joint_torque(j, drive[j], braked[j]));
             for j in 0..6 {
                 let a: f64 = (0..6).map(|k| inverse[j][k] * torque[k]).sum();
                 self.v[j] += a * DT;
@@ -271,11 +301,37 @@ impl Plant {
                 self.q[j] += self.v[j] * DT;
             }
         }
+        let after = self.motors().0;
         for j in 0..6 {
             let counts = |q: f64| (q / MOTOR_STEP).floor();
-            self.speeds[j][self.ticks % 10] = (counts(self.q[j]) - counts(before[j])) * MOTOR_STEP / 0.001;
+            self.speeds[j][self.ticks % 10] = (counts(after[j]) - counts(before[j])) * MOTOR_STEP / 0.001;
         }
         self.ticks += 1;
+    }
+
+    /// What joint `j` does to its link, N·m, if its drive gives `drive`: all that the drive leaves beside its friction, or what an elastic
+    /// gear transmits, whose motor it turns on by a step.
+    fn joint_torque(&mut self, j: usize, drive: f64, braked: bool) -> f64 {
+        let speed = *self.motor_speed(j);
+        let friction = self.friction[j].step(&mut self.bristles[j], speed, DT);
+        let Some(gears) = &mut self.gears else {
+            return drive - friction;
+        };
+        let torque = gears.torque(j, self.q[j], self.v[j]);
+        if !braked {
+            gears.v[j] += (drive - friction - torque) / self.rotor[j] * DT;
+            gears.q[j] += gears.v[j] * DT;
+        }
+        torque
+    }
+
+    /// Angles, rad, and speeds, rad/s, of the motors.
+    pub fn motors(&self) -> ([f64; 6], [f64; 6]) {
+        self.gears.as_ref().map_or((self.q, self.v), |gears| (gears.q, gears.v))
+    }
+
+    fn motor_speed(&mut self, j: usize) -> &mut f64 {
+        self.gears.as_mut().map_or(&mut self.v[j], |gears| &mut gears.v[j])
     }
 
     pub fn report(&self, rig: &mut Rig) {

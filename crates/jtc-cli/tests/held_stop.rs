@@ -1,7 +1,9 @@
 //! A held stop (J-69) at each front end of `jtc`: what was found stands there with joint, value, limit and age, and what to do about it.
 #![cfg(target_os = "linux")]
 
+use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
+use std::process::Stdio;
 use std::time::Duration;
 
 use cli_kit::trial::run;
@@ -11,6 +13,9 @@ use test_kit::patience::Patience;
 
 use crate::common::agent::{command_in, serve};
 use crate::common::{Sim, jtc};
+
+/// Time after which every joint has settled since it was enabled.
+const SETTLES: Duration = Duration::from_secs(8);
 
 /// 30 % of the 40 N·m of joint 5 are a push.
 const LIMIT: f64 = 12.0;
@@ -27,7 +32,7 @@ fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
 
 /// Pushes joint 5, harder than its friction holds, until `ask` finds a held stop. The joints have to have settled since they were enabled.
 fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
-    std::thread::sleep(Duration::from_secs(8));
+    std::thread::sleep(SETTLES);
     let mut looks = 0;
     until("a held stop", || {
         if looks % 20 == 0 {
@@ -141,4 +146,29 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     is_a_push(&get("/api/info")["reactions"]["last_held_stop"]);
     agent.kill().expect("it is there");
     agent.wait().expect("it ends");
+}
+
+/// The command that gives gains to an arm under torque ends when they have held it, or with the reason why the controller took them back.
+#[test]
+fn j71_params_push_waits_for_the_trial_of_its_gains() {
+    let mut sim = Sim::start(&["--no-throttle"]).held();
+    std::thread::sleep(SETTLES);
+    let avena = include_str!("../../../arms/avena.toml");
+    let arm =
+        |kp: &str| sim.file(&format!("{kp}.toml"), &avena.replace("kp = 4000.0", &format!("kp = {kp}")));
+    let (first, second) = (arm("3900.0"), arm("3800.0"));
+    let tried = sim.json(&["params", "push", &first], 0);
+    assert_eq!(tried["gains_tried"], true, "{tried}");
+
+    let mut push = sim.command(&["--json", "params", "push", &second]);
+    let mut push = push.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let told = BufReader::new(push.stderr.take().expect("a pipe")).lines();
+    let mut told = told.map(|line| line.expect("text"));
+    assert!(told.any(|line| line.contains("on trial")));
+    sim.write_line("push 5 38 0.5");
+    let output = push.wait_with_output().expect("it ends");
+    let failure: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(failure["error"]["code"], "held-stop", "{failure}");
+    let status = sim.json(&["status"], 0);
+    assert_eq!(status["held_stop"]["code"], "held-stop-gains", "{status}");
 }

@@ -61,18 +61,22 @@ fn push(
         pushed.push(*p);
     });
     done?;
+    let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
     // What was neither sent nor is missing: the controller had it before, from whom is not known.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
-        "pushed": pushed, "kept": kept, "differences": differences, "not_given": not_given,
+        "pushed": pushed, "gains_tried": tried, "kept": kept, "differences": differences, "not_given": not_given,
         "state": status.state.name(), "missing_parameters": missing,
     });
     out.result(&value, || {
         let sent: Vec<&str> = pushed.iter().map(|p| p.parameter.name()).collect();
         let mut text = format!("sent: {}\n", sent.join(", "));
+        if tried {
+            text += "the new gains have held the arm for two seconds: they stay\n";
+        }
         if !kept.is_empty() {
             text += &format!("not sent, as the controller was given before: {}\n", kept.join(", "));
         }
@@ -92,6 +96,11 @@ fn push(
         text
     });
     Ok(())
+}
+
+/// Waits for what comes of gains that an arm under torque was given. Returns whether they were tried.
+pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
+    Ok(session.await_trial(|| out.note("the gains are on trial for two seconds"))?)
 }
 
 /// Refuses gains that do not keep the arm stable: that of the files, or the one that the controller has.

@@ -1,13 +1,18 @@
 //! Friction, gains and arm model to the controller.
 
+use std::time::Duration;
+
 use jtc_core::Config;
-use jtc_wire::{DataStatus, FrameType};
+use jtc_wire::{ControllerState, DataStatus, FrameType, Reactions};
 
 use super::{Parameter, Session};
 use crate::arm::ParameterSet;
-use crate::error::{Error, LinkError, ParametersError};
+use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::frame;
 use crate::port::Port;
+
+/// How long gains that are given under torque are on trial (J-71), and the time until the controller has told of it.
+const TRIAL: Duration = Duration::from_millis(2_500);
 
 /// A parameter that the controller confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -26,7 +31,8 @@ impl<P: Port> Session<P> {
     /// Sends what `set` has, after all of it was checked; `done` is called after each.
     ///
     /// Gains that are given while the arm is held are on trial for two seconds: the controller takes them back if the arm does not stand
-    /// them, and holds it in a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
+    /// them, and holds it in a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71). [`Session::await_trial`] waits for what comes of
+    /// it.
     ///
     /// # Errors
     ///
@@ -85,6 +91,35 @@ impl<P: Port> Session<P> {
             all.push(pushed);
         }
         Ok(all)
+    }
+
+    /// Waits while gains that have just been given are on trial (J-71); `begun` is called first if they are. Call it right after
+    /// [`Session::push`] or [`Session::push_arm`]. Returns whether there was a trial: there is none without torque, and on a device without
+    /// extensions.
+    ///
+    /// # Errors
+    ///
+    /// [`StateError::HeldStop`] when the controller took them back, or stopped the arm for another reason meanwhile,
+    /// [`StateError::Device`] when the arm was released; the [`LinkError`]s of the line.
+    pub fn await_trial(&mut self, begun: impl FnOnce()) -> Result<bool, Error> {
+        let age = |reactions: Reactions| reactions.stop.map(|(_, ms)| ms);
+        let state = self.fresh_status()?.state;
+        let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
+        let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
+        begun();
+        // The arm may have been in a held stop before.
+        let before = age(reactions).unwrap_or(u32::MAX);
+        let end = self.port.now() + TRIAL;
+        while self.port.now() < end {
+            let status = self.next_status()?;
+            if status.state == ControllerState::Error {
+                return Err(StateError::Device { status: Box::new(status) }.into());
+            }
+            if status.is_held_stop() && self.reactions().and_then(age).is_some_and(|ms| ms < before) {
+                self.without_held_stop(&status)?;
+            }
+        }
+        Ok(true)
     }
 }
 

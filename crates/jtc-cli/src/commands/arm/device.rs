@@ -10,7 +10,7 @@ use jtc_host::{Error, LinkError, Session};
 use serde_json::json;
 
 use super::super::info::hash;
-use super::super::named_arm;
+use super::super::{named_arm, params};
 use crate::args::{AcceptArgs, LinkArgs, OverwriteArgs};
 use crate::limits;
 use crate::link::LinkPort;
@@ -49,9 +49,11 @@ pub(super) fn push(
         session.push_arm(&arm, report).map(|pushed| (pushed, None))
     }
     .map_err(|e| refused(e, &arm))?;
+    let tried = params::await_trial(&mut session, out)?;
     let now = arm.hash().ok().flatten().unwrap_or_default();
     let value = json!({
-        "arm": arm.name, "hash": hash(now), "parts": pushed, "stored_number": stored, "differences": [],
+        "arm": arm.name, "hash": hash(now), "parts": pushed, "gains_tried": tried,
+        "stored_number": stored, "differences": [],
     });
     out.result(&value, || {
         let line = format!("the controller has arm {}, hash {}: read back, nothing differs", arm.name, hash(now));

@@ -65,12 +65,13 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Cargo in `emulator/`.
+/// Cargo in `emulator/`. What it takes from `crates/` has other features there than in the workspace: its warnings are errors, too.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));
     cargo.env("CARGO_TARGET_DIR", shell::target().join("emulator"));
     cargo.env("OPENJTC_FIRMWARE", firmware::directory());
+    cargo.env("RUSTFLAGS", "-D warnings");
     cargo
 }
 

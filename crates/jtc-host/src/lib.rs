@@ -19,6 +19,7 @@ pub mod plan;
 pub mod port;
 pub mod recording;
 pub mod report;
+pub mod run;
 pub mod sample;
 pub mod session;
 pub mod trajectory;

@@ -1,4 +1,6 @@
 //! Runs and moves: jobs, and what becomes of them.
+use std::sync::Arc;
+
 use agent_kit::api::{Body, Number, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -223,7 +225,7 @@ pub(super) async fn begin_run(
         return Err(replaced(&stored));
     }
     let what = format!("run of trajectory {number}, {}", stored.name);
-    let course = Course::Along(stored.trajectory.clone());
+    let course = Course::Along(Arc::new(stored.trajectory.clone()));
     begin(
         &agent,
         (&asker, after),

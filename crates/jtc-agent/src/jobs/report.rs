@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, html};
 use jtc_host::session::{LinkStatistics, Outcome, UploadReport};
-use jtc_host::{Arm, Error, MotionError};
+use jtc_host::{Arm, Error};
 
 use super::{Job, Task};
 
@@ -67,8 +67,8 @@ impl MotionReport {
         };
         let failure = if info.ending.is_fault() { digest.failure(&info, &info.ending) } else { None };
         let failure = failure.map(|found| match made.outcome {
-            Err(Error::Motion(MotionError::RunFault { status, .. })) => found.with_status(status),
-            _ => found,
+            Err(error) => found.with_error(error),
+            Ok(_) => found,
         });
         let row = |name: &str, value: String| (name.to_owned(), value);
         let job = Facts {

@@ -1,17 +1,20 @@
-//! A run: waits until the arm can be moved, checks, uploads, executes and follows, and reports each step.
-use std::cell::{Cell, RefCell};
+//! A run of a job: its steps go into the journal, and a Stop of another client ends it.
+use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use jtc_host::error::Facts;
-use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, MoveSpeed, Planner, RunCourse, RunStart, StartError};
+use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
-use jtc_host::session::{Flow, Outcome};
+use jtc_host::run::{self as runner, Ended, Leg, Observer, Phase, SampleReceiver, StartError};
+use jtc_host::session::{Flow, LinkStatistics, Outcome, Progress, UploadReport};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, LinkError, Port as _, Session, Trajectory};
 use jtc_wire::Status;
+use tokio::sync::oneshot;
+
+pub use jtc_host::run::Course;
 
 use super::report::{self, Made, MotionReport};
 use super::{Given, Happening, Task, Wish};
@@ -20,22 +23,6 @@ use crate::owner::ClientPort;
 
 /// How often is reported how far a motion is.
 const MOVING: Duration = Duration::from_secs(1);
-
-/// Where a run leads.
-#[derive(Clone, Debug)]
-pub enum Course {
-    /// Along a trajectory.
-    Along(Trajectory),
-    /// From where the arm stands to a place.
-    To {
-        /// The place.
-        target: Target,
-        /// The flange keeps to a straight line; else straight in joint space where that takes no longer.
-        line: bool,
-        /// Torque that the move leaves, % of each limit.
-        margin_pct: f64,
-    },
-}
 
 /// What is run, and how.
 #[derive(Clone, Debug)]
@@ -68,16 +55,10 @@ pub struct Done {
     pub given: Option<Given>,
 }
 
-/// A run on its way.
-struct Run<'a> {
-    task: &'a Task<'a>,
-    session: &'a mut Session<ClientPort>,
-}
-
 /// Runs what was ordered: how far it came, and what forbids it, or ended it in a fault.
 pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<ErrorObject>) {
     let mut done = Done::default();
-    let error = Run { task, session }.go(order, &mut done).err();
+    let error = go(task, session, order, &mut done).err();
     (done, error)
 }
 
@@ -87,244 +68,230 @@ struct Site {
     options: CheckOptions,
 }
 
-impl Run<'_> {
-    fn go(&mut self, order: &Order, done: &mut Done) -> Result<(), ErrorObject> {
-        let task = self.task;
-        let waits = |what| task.note(format!("waiting until {what}"));
-        let ready = self.session.ready_to_move(waits, || task.is_halted());
-        let mut status = ready.map_err(|error| self.before_motion(&error))?;
-        let site = self.site(order)?;
-        let move_speed = self.session.move_speed(order.speed_percent);
-        let move_speed = move_speed.map_err(|error| ErrorObject::of(&error.into()))?;
-        let trajectory = self.trajectory(order, &site, &status, move_speed)?;
-        closed(&trajectory, order, &site)?;
-        for n in 1..=order.repeat.max(1) {
-            let course = RunCourse {
-                trajectory: &trajectory,
-                then: (n == 1 && order.repeat > 1).then_some(&trajectory),
-                approach_pct: order.approach.then_some(move_speed.percent),
-            };
-            let start = course.start(&site.arm, &status.positions(), &site.options);
-            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
-            if is_approach {
-                move_speed
-                    .note("speed_percent")
-                    .into_iter()
-                    .for_each(|words| task.note(format!("approach {words}")));
-                if !self.motion("approach", &checked, &site, done)? {
-                    return Ok(());
-                }
-                // From where the approach ended, not from where it should have.
-                status = self.fresh_status()?;
-                let again =
-                    CheckedTrajectory::check(&trajectory, &site.arm, &status.positions(), &site.options);
-                checked = again.map_err(|e| ErrorObject::of(&e.into()))?;
-            }
-            if !self.motion("motion", &checked, &site, done)? {
-                return Ok(());
-            }
-            done.runs = n;
-            task.journal.write(Happening::Finished { job: task.job, runs: n });
-            if n < order.repeat {
-                status = self.fresh_status()?;
-            }
+fn go(
+    task: &Task<'_>,
+    session: &mut Session<ClientPort>,
+    order: &Order,
+    done: &mut Done,
+) -> Result<(), ErrorObject> {
+    let waits = |what| task.note(format!("waiting until {what}"));
+    let ready = session.ready_to_move(waits, || task.is_halted());
+    let status = ready.map_err(|error| before_motion(task, &error))?;
+    let site = site(task, session, order).map_err(|error| ErrorObject::of(&error))?;
+    let move_speed = session.move_speed(order.speed_percent);
+    let move_speed = move_speed.map_err(|error| ErrorObject::of(&error.into()))?;
+    let trajectory = trajectory(task, order, &site, &status, move_speed)?;
+    let runs = runner::Order {
+        arm: &site.arm,
+        options: &site.options,
+        trajectory: &trajectory,
+        later: &trajectory,
+        runs: order.repeat,
+        approach_pct: order.approach.then_some(move_speed.percent),
+    };
+    let mut job = RunJob {
+        task,
+        site: &site,
+        move_speed,
+        done,
+        link: session.statistics(),
+        upload_shown: 0,
+        began: Duration::ZERO,
+        digest: Rc::default(),
+        reported: Instant::now(),
+        wish: None,
+    };
+    let Ended { last, cut } = runner::run(session, &runs, &status, &mut job)?;
+    match last.outcome {
+        _ if cut => Err(task.stopped()),
+        Ok(Outcome::Finished(_)) => {
+            done.finished = true;
+            Ok(())
         }
-        done.finished = true;
-        Ok(())
+        Ok(Outcome::Stopped(_)) => Ok(()),
+        Err(error) => Err(before_motion(task, &error)),
     }
+}
 
-    fn fresh_status(&mut self) -> Result<Status, ErrorObject> {
-        self.session.fresh_status().map_err(|e| ErrorObject::of(&e.into()))
-    }
+/// The arm of the controller, where it can be asked; else that of the agent.
+fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Result<Site, Error> {
+    let device = session.device_config()?;
+    let arm = if session.has_extensions() { session.device_arm()? } else { task.arm.clone() };
+    let accept_device_limits = order.accept_device_limits;
+    Ok(Site { arm, options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() } })
+}
 
-    /// The arm of the controller, where it can be asked; else that of the agent.
-    fn site(&mut self, order: &Order) -> Result<Site, ErrorObject> {
-        let mut ask = || -> Result<Site, Error> {
-            let device = self.session.device_config()?;
-            let arm = if self.session.has_extensions() {
-                self.session.device_arm()?
-            } else {
-                self.task.arm.clone()
-            };
-            let accept_device_limits = order.accept_device_limits;
-            Ok(Site {
-                arm,
-                options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() },
-            })
-        };
-        ask().map_err(|error| ErrorObject::of(&error))
-    }
-
-    /// What is run.
-    fn trajectory(
-        &self,
-        order: &Order,
-        site: &Site,
-        status: &Status,
-        move_speed: MoveSpeed,
-    ) -> Result<Trajectory, ErrorObject> {
-        match &order.course {
-            Course::Along(trajectory) => match order.speed_percent {
-                None | Some(100.0) => Ok(trajectory.clone()),
-                Some(percent) => plan::at_speed(trajectory, percent).map_err(|e| plan_error(&e)),
-            },
-            Course::To { target, line, margin_pct } => {
-                let (config, friction) =
-                    (site.arm.config_on_device(&site.options.device), site.arm.friction());
-                let planner = Planner {
-                    model: Some(&site.arm.model),
-                    friction: friction.as_ref(),
-                    speed_pct: move_speed.percent,
-                    margin_pct: *margin_pct,
-                    ..Planner::new(&config)
-                };
-                let planned = planner.to_target(&site.arm.model, &status.positions(), target, *line);
-                let planned = planned.map_err(|e| plan_error(&e).message(e.of_move()))?;
-                let of_speed = move_speed.note("speed_percent").map(|words| format!("move {words}"));
-                let low = planned.verdict.margin.and_then(|margin| margin.warning());
-                planned.notes.into_iter().chain(of_speed).chain(low).for_each(|text| self.task.note(text));
-                Ok(planned.trajectory)
-            }
+/// What is run.
+fn trajectory(
+    task: &Task<'_>,
+    order: &Order,
+    site: &Site,
+    status: &Status,
+    move_speed: MoveSpeed,
+) -> Result<Arc<Trajectory>, ErrorObject> {
+    let (device, here) = (&site.options.device, status.positions());
+    let speed = (move_speed, "speed_percent");
+    let planned = order.course.planned(&site.arm, device, &here, order.speed_percent, speed);
+    let planned = planned.map_err(|error| {
+        let object = ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error));
+        match order.course {
+            Course::Along(_) => object,
+            Course::To { .. } => object.message(error.of_move()),
         }
+    })?;
+    planned.notes.into_iter().for_each(|text| task.note(text));
+    Ok(planned.trajectory)
+}
+
+/// A run on its way.
+struct RunJob<'a> {
+    task: &'a Task<'a>,
+    site: &'a Site,
+    move_speed: MoveSpeed,
+    done: &'a mut Done,
+    /// The link before the upload of the motion.
+    link: LinkStatistics,
+    /// Tenths of the upload that were reported.
+    upload_shown: usize,
+    /// When the motion began, since 1970.
+    began: Duration,
+    digest: Rc<RefCell<Digest>>,
+    reported: Instant,
+    /// Who waits for what comes of the last wish.
+    wish: Option<oneshot::Sender<Result<(), ErrorObject>>>,
+}
+
+impl Observer<ClientPort> for RunJob<'_> {
+    type Failure = ErrorObject;
+
+    fn refused(&mut self, error: StartError) -> ErrorObject {
+        not_begun(&error)
     }
 
-    /// Uploads and executes one motion. False: it was stopped.
-    fn motion(
-        &mut self,
-        phase: &str,
-        checked: &CheckedTrajectory,
-        site: &Site,
-        done: &mut Done,
-    ) -> Result<bool, ErrorObject> {
-        let task = self.task;
-        let Task { job, journal, wishes, .. } = *task;
-        if task.is_halted() {
-            return Err(task.stopped());
+    fn failed(&mut self, error: Error) -> ErrorObject {
+        before_motion(self.task, &error)
+    }
+
+    /// A person who stopped an arm at rest wants it to stay there.
+    fn is_cancelled(&mut self) -> bool {
+        self.task.is_halted()
+    }
+
+    fn checked(&mut self, phase: Phase, checked: &CheckedTrajectory) {
+        let Task { job, journal, .. } = *self.task;
+        if phase == Phase::Approach
+            && let Some(words) = self.move_speed.note("speed_percent")
+        {
+            self.task.note(format!("approach {words}"));
         }
-        let phase = || phase.to_owned();
         journal.write(Happening::Checked {
             job,
-            phase: phase(),
+            phase: phase.name().to_owned(),
             duration_s: checked.trajectory().duration_s(),
             points: checked.trajectory().points.len(),
             warnings: checked.verdict().warnings().map(ToString::to_string).collect(),
         });
-        let (mut shown, link) = (0, self.session.statistics());
-        let uploaded = self.session.upload(checked, |progress| {
-            let (segments_done, segments) = (progress.segments_done, progress.segments);
-            // A tenth of it at a time.
-            if segments_done * 10 >= (shown + 1) * segments.max(1) {
-                shown = segments_done * 10 / segments.max(1);
-                journal.write(Happening::Uploading { job, phase: phase(), segments_done, segments });
-            }
-            if task.is_halted() { Flow::Cancel } else { Flow::Continue }
-        });
-        let upload = uploaded.map_err(|error| self.before_motion(&error))?;
-        let (time_s, bytes, retries) = (upload.time_s, upload.bytes, upload.retries);
-        journal.write(Happening::Uploaded { job, phase: phase(), time_s, bytes, retries });
-        // Somebody who stopped an arm that stood still meant that it is to stand.
-        if task.is_halted() {
-            return Err(task.stopped());
-        }
-        let duration_s = checked.trajectory().duration_s();
-        journal.write(Happening::Executing { job, phase: phase(), duration_s });
-        let digest = Rc::new(RefCell::new(Digest::new()));
-        let (taken, mut reported, wish) = (Rc::clone(&digest), Instant::now(), Cell::new(None));
-        let began = host_kit::unix_time();
-        task.commander.motion_begins();
-        let outcome = self.session.run_unkept(
-            checked,
-            move |sample| taken.borrow_mut().push(sample),
-            |status| {
-                if reported.elapsed() >= MOVING && status.is_executing() {
-                    reported = Instant::now();
-                    journal.write(Happening::Moving { job, phase: phase(), point: status.point });
-                }
-                let Ok(Wish { flow, done }) = wishes.try_recv() else { return Flow::Continue };
-                wish.set(Some(done));
-                flow
-            },
-            |_, did| {
-                if let Some(done) = wish.take() {
-                    // Whoever wished it may have gone.
-                    let _ = done.send(match did {
-                        Ok(()) => Ok(()),
-                        Err(error) => Err(ErrorObject::of(error)),
-                    });
-                }
-            },
-        );
-        task.commander.motion_ended(wishes);
-        let digest = digest.take();
-        done.summary = Some(digest.summary(&RecordingInfo::of(&site.arm)));
-        let made = Made {
-            phase: &phase(),
-            before: done.runs,
-            outcome: &outcome,
-            upload: &upload,
-            link: self.session.statistics().since(&link),
-            began,
-            port: self.session.port().name(),
-            baud: self.session.port().baud(),
-        };
-        done.report = MotionReport::new(task, &site.arm, digest, &made).map(Arc::new);
-        match outcome {
-            Ok(Outcome::Finished(_)) => Ok(true),
-            Ok(Outcome::Stopped(_)) => Ok(false),
-            Err(error) => Err(self.before_motion(&error)),
+        self.upload_shown = 0;
+    }
+
+    fn uploading(&mut self, phase: Phase, progress: &Progress) {
+        let Task { job, journal, .. } = *self.task;
+        let (segments_done, segments) = (progress.segments_done, progress.segments);
+        // A tenth of it at a time.
+        if segments_done * 10 >= (self.upload_shown + 1) * segments.max(1) {
+            self.upload_shown = segments_done * 10 / segments.max(1);
+            let phase = phase.name().to_owned();
+            journal.write(Happening::Uploading { job, phase, segments_done, segments });
         }
     }
 
-    /// Why a motion was not begun: an error, or somebody who stopped it.
-    fn before_motion(&self, error: &Error) -> ErrorObject {
-        match error {
-            Error::Cancelled => self.task.stopped(),
-            Error::Link(LinkError::Denied { .. }) if self.task.is_halted() => self.task.stopped(),
-            error => ErrorObject::of(error),
+    fn uploaded(&mut self, phase: Phase, upload: &UploadReport) {
+        let Task { job, journal, .. } = *self.task;
+        let (time_s, bytes, retries) = (upload.time_s, upload.bytes, upload.retries);
+        journal.write(Happening::Uploaded { job, phase: phase.name().to_owned(), time_s, bytes, retries });
+    }
+
+    fn begins(
+        &mut self,
+        _: &mut Session<ClientPort>,
+        phase: Phase,
+        checked: &CheckedTrajectory,
+    ) -> Result<SampleReceiver, ErrorObject> {
+        let Task { job, journal, commander, .. } = *self.task;
+        let (phase, duration_s) = (phase.name().to_owned(), checked.trajectory().duration_s());
+        journal.write(Happening::Executing { job, phase, duration_s });
+        self.digest.replace(Digest::new());
+        (self.reported, self.began) = (Instant::now(), host_kit::unix_time());
+        commander.motion_begins();
+        let digest = Rc::clone(&self.digest);
+        Ok(Box::new(move |sample| digest.borrow_mut().push(sample)))
+    }
+
+    fn status(&mut self, phase: Phase, status: &Status) -> Flow {
+        let Task { job, journal, wishes, .. } = *self.task;
+        if self.reported.elapsed() >= MOVING && status.is_executing() {
+            self.reported = Instant::now();
+            let phase = phase.name().to_owned();
+            journal.write(Happening::Moving { job, phase, point: status.point });
+        }
+        let Ok(Wish { flow, done }) = wishes.try_recv() else { return Flow::Continue };
+        self.wish = Some(done);
+        flow
+    }
+
+    fn applied(&mut self, _: Flow, result: &Result<(), Error>) {
+        if let Some(done) = self.wish.take() {
+            // The client may have disconnected.
+            let _ = done.send(result.as_ref().copied().map_err(ErrorObject::of));
         }
     }
+
+    fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), ErrorObject> {
+        let (task, done) = (self.task, &mut *self.done);
+        task.commander.motion_ended(task.wishes);
+        let digest = self.digest.take();
+        done.summary = Some(digest.summary(&RecordingInfo::of(&self.site.arm)));
+        let now = session.statistics();
+        let made = Made {
+            phase: leg.phase.name(),
+            before: done.runs,
+            outcome: &leg.outcome,
+            upload: &leg.upload,
+            link: now.since(&self.link),
+            began: self.began,
+            port: session.port().name(),
+            baud: session.port().baud(),
+        };
+        done.report = MotionReport::new(task, &self.site.arm, digest, &made).map(Arc::new);
+        self.link = now;
+        if leg.phase == Phase::Motion && leg.is_finished() {
+            done.runs += 1;
+            task.journal.write(Happening::Finished { job: task.job, runs: done.runs });
+        }
+        Ok(())
+    }
+
+    fn goes_on(&mut self, _: u32) {}
 }
 
-/// A motion that is repeated leads back to its start, or an approach does.
-fn closed(trajectory: &Trajectory, order: &Order, site: &Site) -> Result<(), ErrorObject> {
-    if order.repeat <= 1 || order.approach {
-        return Ok(());
+/// Why a motion was not begun, or failed: an error, or a client that stopped it.
+fn before_motion(task: &Task<'_>, error: &Error) -> ErrorObject {
+    match error {
+        Error::Cancelled => task.stopped(),
+        Error::Link(LinkError::Denied { .. }) if task.is_halted() => task.stopped(),
+        error => ErrorObject::of(error),
     }
-    let Some((first, last)) = trajectory.points.first().zip(trajectory.points.last()) else { return Ok(()) };
-    let limit = site.arm.config_on_device(&site.options.device).start_tolerance_rad;
-    let (joint, far) = plan::furthest_joint(&first.position, &last.position);
-    if far <= limit {
-        return Ok(());
-    }
-    let message = format!(
-        "it ends {far:.3} rad from where it begins ({joint}), more than {limit} rad: it cannot be repeated as it is; nothing was sent"
-    );
-    let object =
-        ErrorObject::new("open-path", message, "`approach` leads back to its first point before each run");
-    let facts = Facts { joint: Some(joint), value: Some(far), limit: Some(limit), ..Facts::default() };
-    Err(object.with(&facts))
 }
 
 /// Why nothing of the run was begun.
-fn not_begun(error: StartError) -> ErrorObject {
+fn not_begun(error: &StartError) -> ErrorObject {
+    let object = ErrorObject::diagnosed(error).with(&Facts::of_start(error));
     match error {
-        StartError::Check(error) => ErrorObject::of(&error.into()),
-        StartError::Elsewhere(error) => {
-            ErrorObject::of(&error.into()).next("ask for the run with approach: true")
-        }
-        StartError::Approach(error) => approach_error(&error),
+        StartError::Check(_) => object,
+        StartError::Elsewhere(_) => object.next("ask for the run with approach: true"),
+        StartError::Approach(_) => object.next(
+            "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way",
+        ),
+        StartError::Open(_) => object.next("`approach` leads back to its first point before each run"),
     }
-}
-
-/// There is no such motion.
-fn plan_error(error: &plan::PlanError) -> ErrorObject {
-    ErrorObject::diagnosed(error).with(&Facts::of_plan(error))
-}
-
-/// The trajectory itself may be sound: what is refused is the way to it.
-fn approach_error(error: &plan::ApproachError) -> ErrorObject {
-    let message =
-        format!("the straight way from where the arm stands to the first point is refused: {error}");
-    let next = "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way";
-    ErrorObject::new("approach", message, next).with(&Facts::of_approach(error))
 }

@@ -144,7 +144,7 @@ impl Plc {
         }
         self.ask_to_move(commander, halt)?;
         let order = RunOrder {
-            course: Course::Along(stored.trajectory.clone()),
+            course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
             // The register always has a number: its default is no speed that was named.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),

@@ -2,33 +2,28 @@
 
 mod approach;
 mod conclude;
-mod leg;
 mod outputs;
+mod terminal;
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
 
-use cli_kit::{ErrorKind, Failure, Output};
-use jtc_host::plan::{MoveSpeed, RunCourse, RunStart, StartError, furthest_joint};
-use jtc_host::port::Port;
-use jtc_host::recording::{Format, RecordingInfo};
-use jtc_host::report::Summary;
+use cli_kit::{Failure, Output};
+use jtc_host::plan::MoveSpeed;
+use jtc_host::recording::Format;
+use jtc_host::run::{OpenPath, Order, run as run_all};
 use jtc_host::session::UploadOptions;
-use jtc_host::trajectory::Trajectory;
-use jtc_host::{CheckError, CheckOptions, CheckedTrajectory, Error, Session};
+use jtc_host::{CheckOptions, Error, Session};
 use jtc_wire::Status;
 
 use super::job::{Job, stem, typed};
-use super::run_report;
 use crate::args::{ExecuteArgs, RunArgs};
 use crate::limits;
 use crate::link::LinkPort;
 use crate::operator::Operator;
 use crate::progress::Progress;
-use conclude::{Done, Finished, Legs, conclude};
-use leg::{APPROACH, Leg, Reel, cancelled};
+use conclude::conclude;
 use outputs::Outputs;
+use terminal::{Terminal, cancelled};
 
 /// What a motion is run with, whichever command asks for it.
 #[derive(Clone, Debug)]
@@ -151,22 +146,16 @@ fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failur
     for warning in verdict.warnings() {
         out.note(format!("warning: {warning}"));
     }
-    let ends = job.trajectory.points.first().zip(job.trajectory.points.last());
-    let gap = |(first, last): (&jtc_host::Point, &jtc_host::Point)| {
-        Some(furthest_joint(&first.position, &last.position))
-            .filter(|(_, far)| *far > job.config.start_tolerance_rad)
-    };
-    match ends.and_then(gap) {
-        Some((joint, far)) if course.repeat > 1 && !course.approach => {
-            let message = format!(
-                "{} ends {far:.3} rad from where it begins ({joint}), more than {} rad: it cannot be repeated as it is; nothing was sent",
-                course.words, job.config.start_tolerance_rad
-            );
-            Err(Failure::new(ErrorKind::Refused, "open-path", message)
-                .hint("`--approach` leads back to its first point before each run; or let the path end where it begins"))
-        }
-        _ => Ok(()),
+    let open = OpenPath::between(&job.trajectory, &job.trajectory, job.config.start_tolerance_rad);
+    match open.filter(|_| course.repeat > 1 && !course.approach) {
+        Some(open) => Err(open_path(&open, course)),
+        None => Ok(()),
     }
+}
+
+/// The failure of a run that cannot be repeated.
+fn open_path(open: &OpenPath, course: &Course) -> Failure {
+    Failure { message: format!("{}: {open}", course.words), ..Failure::of(open) }
 }
 
 fn drive(
@@ -197,149 +186,21 @@ fn drive(
         ));
     }
     operator.speed = session.has_extensions().then_some((speed * 100.0).round() as u8);
-    let mut stage = Stage { course, job, move_speed, outputs, out, reel: None };
-    let legs = stage.legs(&mut session, &mut operator, status)?;
+    let options = job.options(course);
+    let later = job.later.clone();
+    let order = Order {
+        arm: &job.arm,
+        options: &options,
+        trajectory: &job.trajectory,
+        later: later.as_ref().map_or(&job.trajectory, |(later, _)| later),
+        runs: course.repeat.max(1) + later.as_ref().map_or(0, |(_, often)| *often),
+        approach_pct: course.approach.then_some(move_speed.percent),
+    };
+    let mut terminal = Terminal::new(course, job, &order, move_speed, outputs, &mut operator);
+    let ended = run_all(&mut session, &order, &status, &mut terminal)?;
+    let taken = terminal.taken();
     drop(operator);
-    let Stage { outputs, reel, .. } = stage;
-    // Each motion begins it before it moves.
-    let reel = reel.unwrap_or_else(|| Reel::of(RecordingInfo::of(&job.arm), None, Duration::ZERO));
-    conclude(job, legs, reel, &session, outputs, out)
-}
-
-/// A run in the making.
-struct Stage<'a> {
-    course: &'a Course,
-    job: &'a mut Job,
-    /// Of an approach.
-    move_speed: MoveSpeed,
-    outputs: Outputs,
-    out: &'a Output,
-    reel: Option<Reel>,
-}
-
-impl Stage<'_> {
-    /// All motions, until one is not finished or all are done.
-    fn legs(
-        &mut self,
-        session: &mut Session<LinkPort>,
-        operator: &mut Operator,
-        mut status: Status,
-    ) -> Result<Legs, Failure> {
-        let mut done = Finished::default();
-        let repeat = self.repeat();
-        for n in 1..=repeat {
-            let (checked, phase) = self.next(&status, n)?;
-            let mut leg = self.leg(session, &checked, phase, operator)?;
-            let mut verdict = checked.verdict().clone();
-            if phase == APPROACH && leg.is_finished() {
-                self.approached(n == 1, leg, &mut done);
-                // From where the approach ended, not from where it should have.
-                let checked = self.job.checked(&self.job.trajectory, &session.fresh_status()?, self.course);
-                let checked = checked.map_err(|e| self.job.not_checked(e, self.out))?;
-                verdict = checked.verdict().clone();
-                leg = self.leg(session, &checked, "motion", operator)?;
-            }
-            let over = n == repeat || !leg.is_finished();
-            let cut = !over && operator.wants_the_end();
-            if over || cut {
-                return Ok(Legs { done, last: leg, verdict, cut });
-            }
-            self.out.note(format!("run {n} of {repeat} finished"));
-            self.take(&leg, &mut done);
-            if let Some((later, _)) = &self.job.later {
-                let later = later.clone();
-                self.job.take(later);
-            }
-            status = session.fresh_status()?;
-        }
-        Err(cancelled("run"))
-    }
-
-    /// How many runs there are, the first one included.
-    fn repeat(&self) -> u32 {
-        self.course.repeat.max(1) + self.job.later.as_ref().map_or(0, |(_, often)| *often)
-    }
-
-    /// The motion of run `n` from where the arm stands, or the way to its first point where that is asked for and needed. Before the first
-    /// run those after it are checked as well.
-    fn next(&self, status: &Status, n: u32) -> Result<(CheckedTrajectory, &'static str), Failure> {
-        let (job, course, speed) = (&*self.job, self.course, self.move_speed);
-        let later = job.later.as_ref().map_or(&job.trajectory, |(later, _)| later);
-        let run = RunCourse {
-            trajectory: &job.trajectory,
-            then: (n == 1 && self.repeat() > 1).then_some(later),
-            approach_pct: course.approach.then_some(speed.percent),
-        };
-        match run.start(&job.arm, &status.positions(), &job.options(course)) {
-            Ok(RunStart { checked, is_approach: false }) => Ok((checked, "motion")),
-            Ok(RunStart { checked, is_approach: true }) => {
-                approach::note(&checked, course, speed, self.out);
-                Ok((checked, APPROACH))
-            }
-            Err(StartError::Check(error) | StartError::Elsewhere(error)) => {
-                Err(job.not_checked(error, self.out))
-            }
-            Err(StartError::Approach(error)) => Err(approach::not_possible(error, course, self.out)),
-        }
-    }
-
-    /// Runs one motion; the recording is begun with the first one.
-    fn leg(
-        &mut self,
-        session: &mut Session<LinkPort>,
-        checked: &CheckedTrajectory,
-        phase: &'static str,
-        operator: &mut Operator,
-    ) -> Result<Leg, Failure> {
-        let repeat = self.repeat();
-        let (job, course, out) = (&*self.job, self.course, self.out);
-        let source = session.port().name();
-        let (outputs, reel) = (&mut self.outputs, &mut self.reel);
-        let mut record = |phase: &str, start_unix_ns, now: Duration| {
-            if reel.is_none() {
-                let name = &course.name;
-                let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
-                let mut info = run_report::info(&job.arm, &source, &name, start_unix_ns);
-                info.commanded = Some(Arc::new(job.trajectory.clone()));
-                info.runs = Some(repeat);
-                if let Some((device, hash)) = &job.identity {
-                    (info.device, info.hash) = (Some(device.clone()), Some(*hash));
-                }
-                info.then = job.later.as_ref().map(|(later, _)| Arc::new(later.clone()));
-                let tape = outputs.begin(&info, out)?;
-                *reel = Some(Reel::of(info, tape, now));
-            }
-            let begun = reel.as_ref().map(|reel| {
-                let sink = reel.tape.as_ref().map(crate::tape::Tape::sink);
-                (sink, now.saturating_sub(reel.start).as_secs_f64().max(reel.until_s))
-            });
-            Ok(begun.unwrap_or_default())
-        };
-        let leg = Leg::run(session, checked, phase, operator, &mut record)?;
-        if let (Some(reel), Some(last)) = (reel, leg.samples.last()) {
-            reel.until_s = last.time_s + 1e-6;
-        }
-        Ok(leg)
-    }
-
-    /// An approach is over. The recording is that of the motion: before the first one it is begun again.
-    fn approached(&mut self, first: bool, leg: Leg, done: &mut Finished) {
-        if !first {
-            return self.take(&leg, done);
-        }
-        if let Some(Reel { info, tape, .. }) = self.reel.take() {
-            done.push(Done { phase: leg.phase, summary: Summary::of(&info, &leg.samples) });
-            if let Some(tape) = tape {
-                tape.abandon();
-            }
-        }
-    }
-
-    /// Its figures; its samples are in the recording.
-    fn take(&mut self, leg: &Leg, done: &mut Finished) {
-        let Some(reel) = &self.reel else { return };
-        done.push(Done { phase: leg.phase, summary: Summary::of(&reel.info, &leg.samples) });
-    }
+    conclude(job, ended, taken, &session, out)
 }
 
 /// Waits until the controller holds the arm with all drives enabled.
@@ -352,27 +213,9 @@ fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status,
 }
 
 impl Job {
-    /// A trajectory of this job, checked for a run from where the arm is.
-    fn checked(
-        &self,
-        trajectory: &Trajectory,
-        status: &Status,
-        course: &Course,
-    ) -> Result<CheckedTrajectory, CheckError> {
-        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &self.options(course))
-    }
-
     /// How its motions are checked.
     fn options(&self, course: &Course) -> CheckOptions {
         let accept_device_limits = course.accepts_device_limits();
         CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() }
-    }
-
-    /// Prints what forbids to run it.
-    fn not_checked(&self, error: CheckError, out: &Output) -> Failure {
-        match error {
-            CheckError::Refused(verdict) => self.refuse(&verdict, out),
-            other => other.into(),
-        }
     }
 }

@@ -9,6 +9,7 @@ use super::{CheckError, Error, ExtensionError, MotionError, StateError};
 use crate::check::{ProblemKind, Verdict};
 use crate::held_stop;
 use crate::plan::{ApproachError, MARGIN_PCT_MAX, PlanError};
+use crate::run::StartError;
 use crate::waypoints::WaypointError;
 use crate::{explain, words};
 
@@ -120,6 +121,22 @@ impl Facts {
             ApproachError::Plan(error) => Self::of_plan(error),
             ApproachError::Check(CheckError::Refused(verdict)) => Self::of_verdict(verdict),
             ApproachError::Check(_) => Self::default(),
+        }
+    }
+
+    /// Those of a motion that does not begin.
+    pub fn of_start(error: &StartError) -> Self {
+        match error {
+            StartError::Check(CheckError::Refused(verdict))
+            | StartError::Elsewhere(CheckError::Refused(verdict)) => Self::of_verdict(verdict),
+            StartError::Check(_) | StartError::Elsewhere(_) => Self::default(),
+            StartError::Approach(error) => Self::of_approach(error),
+            StartError::Open(open) => Self {
+                joint: Some(open.joint),
+                value: Some(open.distance),
+                limit: Some(open.tolerance),
+                ..Self::default()
+            },
         }
     }
 

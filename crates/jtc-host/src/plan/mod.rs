@@ -27,7 +27,6 @@ mod rest_of;
 mod sampled;
 mod samples;
 mod speed;
-mod start;
 #[cfg(test)]
 mod tests;
 mod way;
@@ -47,7 +46,6 @@ pub use lines::{Aside, furthest_aside};
 pub use margin::{MARGIN_PCT, MARGIN_PCT_MAX, margin_in_range, margin_of};
 pub use rest_of::rest_of;
 pub use speed::at_speed;
-pub use start::{RunCourse, RunStart, StartError};
 pub use way::{Way, WayOptions};
 
 use crate::check::{Checker, Problem, ProblemKind, TEMPERATURE, Verdict};

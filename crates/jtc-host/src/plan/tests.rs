@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::Arm;
 use crate::check::{CheckOptions, HOLD_SHARE};
+use crate::run::Order;
 
 fn pose() -> impl Strategy<Value = [f64; JOINTS]> {
     prop::array::uniform6(-1.5..1.5f64)
@@ -122,14 +123,15 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
         .unwrap();
     let here = [0.0, 1.585, 0.0, 0.0, 0.0, 0.0];
     let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
-    let course = RunCourse { trajectory: &t, then: None, approach_pct: Some(25.0) };
-    let start = course.start(&arm, &here, &options).expect("an approach");
+    let order =
+        Order { arm: &arm, options: &options, trajectory: &t, later: &t, runs: 1, approach_pct: Some(25.0) };
+    let start = order.start(1, &here).expect("an approach");
     assert!(start.is_approach);
     let points = &start.checked.trajectory().points;
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
     // Beyond the start tolerance only a jog leads back.
-    assert!(course.start(&arm, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0], &options).is_err());
+    assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
 /// A motion that is too fast for its torque is planned slower.

@@ -6,6 +6,7 @@ use jtc_bus::GRIPPER;
 use jtc_wire::{ControllerState, Joint, NodeState, Status, can_flag};
 use serde::Serialize;
 
+use crate::error::{Error, MotionError};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 use crate::words;
@@ -97,8 +98,22 @@ impl RunFailure {
         Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }
 
-    /// With what only the status knows: the errors that the drives report of themselves.
-    pub fn with_status(self, status: &Status) -> Self {
+    /// Returns what broke first in a run that ended with `error`.
+    pub fn of(error: &Error, info: &RecordingInfo, samples: &[Sample]) -> Self {
+        let found = Self::find(info, samples);
+        found.unwrap_or_else(|| Self::ended_by(info, samples, error.to_string())).with_error(error)
+    }
+
+    /// Adds what only the error of the run knows: the errors that the drives report of themselves.
+    pub fn with_error(self, error: &Error) -> Self {
+        match error {
+            Error::Motion(MotionError::RunFault { status, .. }) => self.with_status(status),
+            _ => self,
+        }
+    }
+
+    /// Adds the errors that the drives report of themselves.
+    pub(super) fn with_status(self, status: &Status) -> Self {
         let (causes, joint) = causes(&Words::of_status(status));
         if causes.is_empty() { self } else { Self { causes, joint: joint.or(self.joint), ..self } }
     }

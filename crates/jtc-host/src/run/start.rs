@@ -1,91 +1,127 @@
-//! The start of a run, the same for each program: nothing moves before the whole run passed its check (J-55).
-
+//! The start of a run: nothing moves before every motion of the run has passed its check (J-55).
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::JOINTS;
+use jtc_wire::Joint;
 
-use super::{ApproachError, approach, furthest_joint};
-use crate::arm::Arm;
-use crate::check::{CheckOptions, CheckedTrajectory};
+use super::Order;
+use crate::check::CheckedTrajectory;
 use crate::error::CheckError;
+use crate::plan::{ApproachError, approach, furthest_joint};
 use crate::trajectory::Trajectory;
-
-/// A run before its first motion.
-#[derive(Clone, Copy, Debug)]
-pub struct RunCourse<'a> {
-    /// Trajectory that is run first.
-    pub trajectory: &'a Trajectory,
-    /// Trajectory of the runs after the first one; `None`: the run has one motion.
-    pub then: Option<&'a Trajectory>,
-    /// Speed of an approach, % of the limits; `None`: the arm has to stand at the first point.
-    pub approach_pct: Option<f64>,
-}
 
 /// First motion of a run.
 #[derive(Clone, Debug)]
-pub struct RunStart {
-    /// The motion, checked from where the arm stands.
+pub struct Start {
+    /// Motion, checked from the position of the arm.
     pub checked: CheckedTrajectory,
-    /// It is the approach to the first point.
+    /// Set if the motion is the approach to the first point.
     pub is_approach: bool,
 }
 
-/// Why a run is not begun; nothing moves.
+/// Reason why a motion does not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// A trajectory of the run cannot be run.
+    /// A trajectory of the run was refused.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// The arm does not stand at the first point, nothing else is wrong, and no approach was requested.
+    /// The arm does not stand at the first point, nothing else is wrong, and the order has no approach.
     #[error(transparent)]
     Elsewhere(CheckError),
     /// An approach of the run is not possible.
-    #[error(transparent)]
+    #[error("the straight way from where the arm stands to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
+    /// A run cannot follow the one before.
+    #[error(transparent)]
+    Open(#[from] OpenPath),
 }
 
-impl RunCourse<'_> {
-    /// Returns the first motion of the run, for an arm that stands at `here` (rad). Every trajectory of the run was checked then, and every
-    /// approach, with the limits, the payload and the settings of the controller that `options` have.
+/// Path that ends too far from the first point of the next run.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "it ends {distance:.3} rad from where it begins ({joint}), more than {tolerance} rad: it cannot be repeated as it is; nothing was \
+     sent"
+)]
+pub struct OpenPath {
+    /// Joint with the largest distance.
+    pub joint: Joint,
+    /// Distance of this joint, rad.
+    pub distance: f64,
+    /// Largest distance at which a run begins, rad.
+    pub tolerance: f64,
+}
+
+impl OpenPath {
+    /// Compares the end of `before` with the first point of `next`. Returns `Some` if they are further apart than `tolerance` (rad).
+    pub fn between(before: &Trajectory, next: &Trajectory, tolerance: f64) -> Option<Self> {
+        let (last, first) = before.points.last().zip(next.points.first())?;
+        let (joint, distance) = furthest_joint(&last.position, &first.position);
+        (distance > tolerance).then_some(Self { joint, distance, tolerance })
+    }
+}
+
+impl Diagnose for StartError {
+    fn diagnosis(&self) -> Diagnosis {
+        match self {
+            Self::Check(error) | Self::Elsewhere(error) => error.diagnosis(),
+            Self::Approach(_) => Diagnosis::new(
+                ErrorKind::Refused,
+                "approach",
+                "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own",
+            ),
+            Self::Open(error) => error.diagnosis(),
+        }
+    }
+}
+
+impl Diagnose for OpenPath {
+    fn diagnosis(&self) -> Diagnosis {
+        let next =
+            "`--approach` leads back to its first point before each run; or let the path end where it begins";
+        Diagnosis::new(ErrorKind::Refused, "open-path", next)
+    }
+}
+
+impl Order<'_> {
+    /// Returns the motion that run `n` (from 1) begins with, for an arm that stands at `here` (rad). Before the first run it checks the
+    /// trajectories and the approaches of all runs, with the limits, the payload and the settings of the controller.
     ///
     /// # Errors
     ///
     /// [`StartError`].
-    pub fn start(
-        &self,
-        arm: &Arm,
-        here: &[f64; JOINTS],
-        options: &CheckOptions,
-    ) -> Result<RunStart, StartError> {
-        let first = match CheckedTrajectory::check(self.trajectory, arm, here, options) {
-            Ok(checked) => RunStart { checked, is_approach: false },
+    pub fn start(&self, n: u32, here: &[f64; JOINTS]) -> Result<Start, StartError> {
+        let trajectory = self.trajectory_of(n);
+        let first = match CheckedTrajectory::check(trajectory, self.arm, here, self.options) {
+            Ok(checked) => Start { checked, is_approach: false },
             Err(CheckError::Refused(verdict)) if verdict.is_only_elsewhere() => {
                 let Some(speed_pct) = self.approach_pct else {
                     return Err(StartError::Elsewhere(CheckError::Refused(verdict)));
                 };
-                let checked = approach(self.trajectory, arm, here, speed_pct, options)?;
-                RunStart { checked, is_approach: true }
+                let checked = approach(trajectory, self.arm, here, speed_pct, self.options)?;
+                Start { checked, is_approach: true }
             }
             Err(error) => return Err(error.into()),
         };
-        if let Some(then) = self.then {
-            let begin = then.points.first().map_or(*here, |point| point.position);
-            if then != self.trajectory {
-                CheckedTrajectory::check(then, arm, &begin, options)?;
-            }
-            self.returns(then, arm, options)?;
+        if n == 1 && self.runs > 1 {
+            self.check_later(here)?;
         }
         Ok(first)
     }
 
-    /// The approaches between the runs lead from the end of one trajectory to the first point of the next one.
-    fn returns(&self, then: &Trajectory, arm: &Arm, options: &CheckOptions) -> Result<(), StartError> {
-        let Some(speed_pct) = self.approach_pct else { return Ok(()) };
-        let tolerance = arm.config_on_device(&options.device).start_tolerance_rad;
-        for before in [self.trajectory, then] {
-            let ends = before.points.last().zip(then.points.first());
-            let Some((last, first)) = ends else { continue };
-            if furthest_joint(&last.position, &first.position).1 > tolerance {
-                approach(then, arm, &last.position, speed_pct, options)?;
-            }
+    /// Checks the runs after the first one, and that each leads to the next one.
+    fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
+        let next = self.later;
+        if next != self.trajectory {
+            let begin = next.points.first().map_or(*here, |point| point.position);
+            CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
+        }
+        let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
+        // The later runs follow each other only if there are two of them.
+        let before = [self.trajectory, next];
+        for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
+            let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
+            let Some(speed_pct) = self.approach_pct else { return Err(open.into()) };
+            let last = before.points.last().map_or(*here, |point| point.position);
+            approach(next, self.arm, &last, speed_pct, self.options)?;
         }
         Ok(())
     }
@@ -96,7 +132,8 @@ mod tests {
     use jtc_core::Config;
 
     use super::*;
-    use crate::check::ProblemKind;
+    use crate::Arm;
+    use crate::check::{CheckOptions, ProblemKind};
     use crate::plan::joint_move;
 
     const THERE: [f64; JOINTS] = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
@@ -106,27 +143,37 @@ mod tests {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
+    /// `runs` of `trajectory` and, after the first, of `later`.
+    struct Course<'a> {
+        trajectory: &'a Trajectory,
+        later: &'a Trajectory,
+        runs: u32,
+        approach_pct: Option<f64>,
+    }
+
     fn start(
-        course: RunCourse,
+        course: &Course<'_>,
         here: [f64; JOINTS],
         device: impl Fn(&mut Config),
-    ) -> Result<RunStart, StartError> {
+    ) -> Result<Start, StartError> {
         let mut options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
         device(&mut options.device);
-        course.start(&Arm::avena(), &here, &options)
+        let &Course { trajectory, later, runs, approach_pct } = course;
+        let arm = Arm::avena();
+        Order { arm: &arm, options: &options, trajectory, later, runs, approach_pct }.start(1, &here)
     }
 
     #[test]
     fn j55_an_approach_begins_only_where_the_start_position_is_the_only_problem() {
         let motion = trajectory(40.0);
-        let course = RunCourse { trajectory: &motion, then: None, approach_pct: Some(25.0) };
-        let begun = start(course, THERE, |_| ()).unwrap();
+        let course = Course { trajectory: &motion, later: &motion, runs: 1, approach_pct: Some(25.0) };
+        let begun = start(&course, THERE, |_| ()).unwrap();
         assert!(begun.is_approach);
         let end = begun.checked.trajectory().points.last().unwrap().position;
         assert!(furthest_joint(&end, &[0.0; JOINTS]).1 < 1e-3);
-        assert!(!start(course, [0.0; JOINTS], |_| ()).unwrap().is_approach);
-        let without = RunCourse { approach_pct: None, ..course };
-        assert!(matches!(start(without, THERE, |_| ()), Err(StartError::Elsewhere(_))));
+        assert!(!start(&course, [0.0; JOINTS], |_| ()).unwrap().is_approach);
+        let without = Course { approach_pct: None, ..course };
+        assert!(matches!(start(&without, THERE, |_| ()), Err(StartError::Elsewhere(_))));
         // Limits, payload and settings of the controller, and each kind of problem.
         let slow = |config: &mut Config| config.joints[1].velocity_max = 0.3;
         let weak = |config: &mut Config| config.joints[1].torque_max = 90.0;
@@ -134,7 +181,7 @@ mod tests {
         let short = |config: &mut Config| config.joints[1].position_max = 0.9;
         let changes: [&dyn Fn(&mut Config); 4] = [&slow, &weak, &loaded, &short];
         for (i, change) in changes.iter().enumerate() {
-            let error = start(course, THERE, change).unwrap_err();
+            let error = start(&course, THERE, change).unwrap_err();
             let StartError::Check(CheckError::Refused(verdict)) = &error else { panic!("{i}: {error}") };
             assert!(verdict.refusals().any(|p| p.kind == ProblemKind::StartPose), "{i}: {verdict}");
             assert!(verdict.refusals().any(|p| p.kind != ProblemKind::StartPose), "{i}: {verdict}");
@@ -143,22 +190,40 @@ mod tests {
         for point in &mut fast.points {
             point.velocity[1] *= 2.5;
         }
-        let error = start(RunCourse { trajectory: &fast, ..course }, THERE, |_| ()).unwrap_err();
+        let error = start(&Course { trajectory: &fast, later: &fast, ..course }, THERE, |_| ()).unwrap_err();
         assert!(matches!(error, StartError::Check(_)), "{error}");
     }
 
     #[test]
     fn j55_the_runs_after_the_first_one_and_their_approaches_are_checked_before_it() {
         let (motion, mut outside) = (trajectory(50.0), trajectory(50.0));
-        let course = RunCourse { trajectory: &motion, then: Some(&motion), approach_pct: Some(25.0) };
-        assert!(start(course, [0.0; JOINTS], |_| ()).is_ok());
+        let course = Course { trajectory: &motion, later: &motion, runs: 3, approach_pct: Some(25.0) };
+        assert!(start(&course, [0.0; JOINTS], |_| ()).is_ok());
         if let Some(point) = outside.points.last_mut() {
             point.position[1] = 2.0;
         }
-        let then = RunCourse { then: Some(&outside), ..course };
-        assert!(matches!(start(then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
+        let then = Course { later: &outside, ..course };
+        assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
         // The pose at its end is left at the speed of an approach: too fast for what the controller allows there.
-        let none = RunCourse { approach_pct: Some(0.0), ..course };
-        assert!(matches!(start(none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
+        let none = Course { approach_pct: Some(0.0), ..course };
+        assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
+    }
+
+    #[test]
+    fn j55_a_path_that_does_not_lead_back_is_not_repeated_without_an_approach() {
+        let motion = trajectory(50.0);
+        let course = |runs| Course { trajectory: &motion, later: &motion, runs, approach_pct: None };
+        assert!(start(&course(1), [0.0; JOINTS], |_| ()).is_ok());
+        let error = start(&course(2), [0.0; JOINTS], |_| ()).unwrap_err();
+        let StartError::Open(open) = &error else { panic!("{error}") };
+        assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
+        assert_eq!(error.diagnosis().code, "open-path");
+        // Only a third run would begin where the second one ends.
+        let there = motion.points.last().unwrap().position;
+        let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
+        let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };
+        let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
+        assert!(twice.is_ok(), "{twice:?}");
+        assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
     }
 }

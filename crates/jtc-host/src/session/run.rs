@@ -36,34 +36,19 @@ impl<P: Port> Session<P> {
     ///
     /// `each` is called with each status and returns what to do: go on, pause, resume, stop. An observer that was set before is replaced.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
-        self.run_observed(checked, |_| {}, each, |_, _| {})
-    }
-
-    /// The same; `observe` is called with each sample as it comes, to record it while the arm moves, and `done` as by
-    /// [`Session::follow_with`].
-    pub fn run_observed(
-        &mut self,
-        checked: &CheckedTrajectory,
-        mut observe: impl FnMut(&Sample) + 'static,
-        each: impl FnMut(&Status) -> Flow,
-        done: impl FnMut(Flow, &Result<(), Error>),
-    ) -> Run {
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);
-        let observe = move |sample: &Sample| {
-            observe(sample);
-            taken.borrow_mut().push(*sample);
-        };
-        let outcome = self.run_unkept(checked, observe, each, done);
+        let outcome = self.run_with(checked, move |sample| taken.borrow_mut().push(*sample), each, |_, _| {});
         Run { outcome, samples: samples.take() }
     }
 
-    /// The same for a run of any length: its samples are kept by `observe`, or by nobody.
+    /// Like [`Session::run`], for a run of any length: `observe` receives each sample as it comes, and `done` each [`Flow`] with what came of
+    /// it, as in [`Session::follow_with`].
     ///
     /// # Errors
     ///
     /// Those of [`Session::execute`] and [`Session::follow`].
-    pub fn run_unkept(
+    pub fn run_with(
         &mut self,
         checked: &CheckedTrajectory,
         mut observe: impl FnMut(&Sample) + 'static,

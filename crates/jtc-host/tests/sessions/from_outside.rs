@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use jtc_core::JOINTS;
-use jtc_host::plan::{Planner, RunCourse};
+use jtc_host::plan::Planner;
 use jtc_host::port::sim::SimPort;
+use jtc_host::run::Order;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session, Trajectory};
 use jtc_sim::{SimConfig, World};
@@ -58,8 +59,15 @@ fn j58_an_arm_outside_a_limit_approaches_a_trajectory() {
     let motion = to([0.3, 0.0, -0.2, 0.0, 0.0, 0.0]);
     let mut session = held_at(high + 0.017);
     let here = session.fresh_status().unwrap().positions();
-    let course = RunCourse { trajectory: &motion, then: None, approach_pct: Some(50.0) };
-    let start = course.start(&arm, &here, &CheckOptions::default()).unwrap();
+    let order = Order {
+        arm: &arm,
+        options: &CheckOptions::default(),
+        trajectory: &motion,
+        later: &motion,
+        runs: 1,
+        approach_pct: Some(50.0),
+    };
+    let start = order.start(1, &here).unwrap();
     assert!(start.is_approach);
     finishes(&mut session, &start.checked);
 }

@@ -8,6 +8,7 @@ mod imported;
 mod link;
 mod presence;
 mod recover;
+mod runs;
 mod scripted;
 
 use std::time::Duration;

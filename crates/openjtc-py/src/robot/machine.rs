@@ -93,7 +93,7 @@ impl Machine {
         let session = Session::new(AnyPort::new(port, Arc::clone(&shared)));
         let named = target.arm.is_some();
         let mut machine = Self { session, arm, named, shared, tape, time_passes, teaching: false };
-        machine.observe();
+        observe(&mut machine.session, &machine.shared);
         if let Some(speed) = speed {
             machine.bring_up(stored, asked)?;
             pace.set(speed);
@@ -143,12 +143,6 @@ impl Machine {
             Ok(_) => {}
             Err(_) => std::thread::sleep(IDLE),
         }
-    }
-
-    /// Publishes every status from now on, whatever the session does.
-    pub fn observe(&mut self) {
-        let shared = Arc::clone(&self.shared);
-        self.session.observe(move |_, status| shared.publish(status));
     }
 
     /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.
@@ -254,4 +248,10 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
         Some(owner) => agent(&owner.url, target),
         None => Ok(Box::new(SerialPort::open(path, baud)?)),
     }
+}
+
+/// Publishes every status from now on, whatever the session does.
+pub fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
+    let shared = Arc::clone(shared);
+    session.observe(move |_, status| shared.publish(status));
 }

@@ -1,36 +1,32 @@
-//! A motion from the wish to the figures: ready, checked, uploaded, executed, followed.
+//! A run of Python: its progress, its samples, and what its thread is asked meanwhile.
 
-use std::cell::Cell;
 use std::path::PathBuf;
 use std::rc::Rc;
+use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 
 use jtc_host::error::Facts;
-use jtc_host::plan::kinematics::Target;
-use jtc_host::plan::{self, ApproachError, MoveSpeed, Planner, RunCourse, RunStart, StartError};
+use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
-use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
+use jtc_host::run::{self as runner, Ended, Leg, Observer, Phase, SampleReceiver, StartError};
+use jtc_host::session::{self, Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{
     Arm, CheckOptions, CheckedTrajectory, Error, LinkError, MotionError, Port as _, PortError, Sample,
+    Session,
 };
 use jtc_wire::{Status, TrajectoryState};
 
-use super::machine::Machine;
+pub use jtc_host::run::Course;
+
+use super::machine::{Machine, observe};
+use super::port::AnyPort;
 use super::recording::Recording;
-use super::shared::{Asked, Progress};
+use super::shared::{Asked, Progress, Shared};
+use super::tape::Tape;
 use super::worker::lock;
 use crate::error::Failure;
-
-/// Where a motion leads.
-pub enum Course {
-    /// Along a trajectory.
-    Along(Arc<Trajectory>),
-    /// From where the arm stands to this place; `line`: with the flange on a straight line; `margin_pct`: torque that the move leaves, % of
-    /// each limit.
-    To { target: Target, line: bool, margin_pct: f64 },
-}
 
 /// What is run, and how.
 pub struct Order {
@@ -50,15 +46,6 @@ pub struct Order {
     pub record: Option<(PathBuf, bool)>,
     /// How far it is, for whoever looks.
     pub progress: Arc<Mutex<Progress>>,
-}
-
-/// What is run on which arm.
-struct Way<'a> {
-    order: &'a Order,
-    trajectory: &'a Arc<Trajectory>,
-    arm: &'a Arm,
-    options: &'a CheckOptions,
-    move_speed: MoveSpeed,
 }
 
 /// What came of it.
@@ -114,7 +101,6 @@ impl Machine {
         };
         let move_speed = self.session.move_speed(order.speed)?;
         let (trajectory, mut notes) = trajectory(order, &arm, &options, &status, move_speed)?;
-        closed(&trajectory, order, &arm, &options)?;
         let speed = options.device.speed;
         *lock(&self.shared.speed) = Some(speed);
         if speed != 1.0 {
@@ -146,15 +132,34 @@ impl Machine {
             baud: self.session.port().baud(),
             notes,
         };
-        let way = Way { order, trajectory: &trajectory, arm: &arm, options: &options, move_speed };
-        let legs = self.legs(&way, asked, &mut ran, recording, status);
+        let runs = runner::Order {
+            arm: &arm,
+            options: &options,
+            trajectory: &trajectory,
+            later: &trajectory,
+            runs: order.repeat,
+            approach_pct: order.approach.then_some(move_speed.percent),
+        };
+        let mut follower = Follower {
+            order,
+            asked,
+            ran: &mut ran,
+            recording,
+            move_speed,
+            shared: Arc::clone(&self.shared),
+            tape: Rc::clone(&self.tape),
+            duration_s: 0.0,
+            waits: None,
+        };
+        let ended = runner::run(&mut self.session, &runs, &status, &mut follower);
         self.tape.pause();
-        match legs {
+        match ended {
             Err(failure) if !ran.moved => return Err(failure),
-            // Between two motions: that somebody stopped the arm is no failure of the run.
+            // Between two motions: a Stop is no failure of the run.
             Err(_) if asked.is_halted() && ran.outcome == "finished" => ran.outcome = "stopped",
             Err(failure) => (ran.outcome, ran.failure) = ("fault", Some(failure)),
-            Ok(()) => {}
+            Ok(Ended { cut: true, .. }) => ran.outcome = "stopped",
+            Ok(_) => {}
         }
         ran.link = self.session.statistics();
         ran.samples = self.tape.take();
@@ -165,165 +170,156 @@ impl Machine {
         };
         Ok(ran)
     }
+}
 
-    /// Each motion with the approach to it, from the status that was seen last.
-    fn legs(
-        &mut self,
-        way: &Way<'_>,
-        asked: &Asked,
-        ran: &mut Ran,
-        mut recording: Option<&mut Recording>,
-        mut status: Status,
-    ) -> Result<(), Failure> {
-        let Way { order, trajectory, arm, options, move_speed } = way;
-        for n in 1..=order.repeat {
-            let course = RunCourse {
-                trajectory,
-                then: (n == 1 && order.repeat > 1).then_some(trajectory),
-                approach_pct: order.approach.then_some(move_speed.percent),
-            };
-            let start = course.start(arm, &status.positions(), options);
-            let RunStart { mut checked, is_approach } = start.map_err(not_begun)?;
-            if is_approach {
-                ran.notes.extend(of_speed("approach", *move_speed).filter(|note| !ran.notes.contains(note)));
-                if !self.leg(&checked, (order, "approach"), asked, ran, None)? {
-                    return Ok(());
-                }
-                // From where the approach ended, not from where it should have.
-                status = self.session.fresh_status()?;
-                checked = CheckedTrajectory::check(trajectory, arm, &status.positions(), options)?;
-            }
-            if !self.leg(&checked, (order, "motion"), asked, ran, recording.as_deref_mut())? {
-                return Ok(());
-            }
-            status = self.session.fresh_status()?;
-        }
-        Ok(())
+/// A run of Python on its way.
+struct Follower<'a> {
+    order: &'a Order,
+    asked: &'a Asked,
+    ran: &'a mut Ran,
+    recording: Option<&'a mut Recording>,
+    /// Speed of an approach.
+    move_speed: MoveSpeed,
+    shared: Arc<Shared>,
+    tape: Rc<Tape>,
+    /// Of the motion, s.
+    duration_s: f64,
+    /// The thread that waits for what comes of its request.
+    waits: Option<Sender<Result<(), Failure>>>,
+}
+
+impl Observer<AnyPort> for Follower<'_> {
+    type Failure = Failure;
+
+    fn refused(&mut self, error: StartError) -> Failure {
+        not_begun(&error)
     }
 
-    /// Uploads and executes one motion; false where it did not come to its end.
-    fn leg(
+    fn failed(&mut self, error: Error) -> Failure {
+        // A Stop explains every other error.
+        if self.asked.is_halted() { Error::Cancelled.into() } else { error.into() }
+    }
+
+    fn is_cancelled(&mut self) -> bool {
+        self.asked.is_halted()
+    }
+
+    fn checked(&mut self, phase: Phase, checked: &CheckedTrajectory) {
+        self.duration_s = checked.trajectory().duration_s();
+        let note = of_speed("approach", self.move_speed).filter(|_| phase == Phase::Approach);
+        let new = note.filter(|note| !self.ran.notes.contains(note));
+        self.ran.notes.extend(new);
+    }
+
+    fn uploading(&mut self, _: Phase, progress: &session::Progress) {
+        self.order.report("upload", progress.segments_done as f64, progress.segments as f64);
+    }
+
+    fn uploaded(&mut self, _: Phase, upload: &UploadReport) {
+        self.ran.upload = Some(*upload);
+    }
+
+    fn begins(
         &mut self,
-        checked: &CheckedTrajectory,
-        (order, phase): (&Order, &'static str),
-        asked: &Asked,
-        ran: &mut Ran,
-        recording: Option<&mut Recording>,
-    ) -> Result<bool, Failure> {
-        let shared = Arc::clone(&self.shared);
-        let upload = self.session.upload(checked, |progress| {
-            order.report("upload", progress.segments_done as f64, progress.segments as f64);
-            if asked.is_halted() { Flow::Cancel } else { Flow::Continue }
-        });
-        // Why it broke off is known where somebody has stopped the arm.
-        asked.check()?;
-        ran.upload = Some(upload?);
-        if phase == "motion" {
-            let sink = recording.map(|recording| recording.sink(&ran.info)).transpose()?;
+        session: &mut Session<AnyPort>,
+        phase: Phase,
+        _: &CheckedTrajectory,
+    ) -> Result<SampleReceiver, Failure> {
+        if phase == Phase::Motion {
+            let sink = self.recording.as_mut().map(|recording| recording.sink(&self.ran.info)).transpose()?;
             self.tape.record(sink.flatten());
         }
-        let simulated = self.session.port().is_simulated();
-        let (tape, total) = (Rc::clone(&self.tape), checked.trajectory().duration_s());
-        // Both callbacks have it, one after the other.
-        let current = Cell::new(None);
-        let outcome = self.session.run_unkept(
-            checked,
-            move |sample| {
-                // The simulator takes one each millisecond by itself.
-                if !simulated {
-                    tape.push(sample);
-                }
-            },
-            |status| {
-                shared.publish(status);
-                order.report(phase, f64::from(status.point) * 1e-3, total);
-                if asked.is_halted() {
-                    return Flow::Stop;
-                }
-                let wish = lock(&shared.wishes).pop_front();
-                wish.map_or(Flow::Continue, |wish| {
-                    current.set(Some(wish.done));
-                    wish.flow
-                })
-            },
-            |flow, did| {
-                if let (Flow::Speed(percent), Ok(())) = (flow, did) {
-                    *lock(&shared.speed) = Some(f64::from(percent) / 100.0);
-                }
-                if let Some(done) = current.take() {
-                    let came = match did {
-                        Ok(()) => Ok(()),
-                        Err(error) => Err(Failure::with(error, error.facts())),
-                    };
-                    // Who wished it may have gone.
-                    let _ = done.send(came);
-                }
-            },
-        );
-        self.observe();
+        let (simulated, tape) = (session.port().is_simulated(), Rc::clone(&self.tape));
+        Ok(Box::new(move |sample| {
+            // The simulator takes one each millisecond by itself.
+            if !simulated {
+                tape.push(sample);
+            }
+        }))
+    }
+
+    fn status(&mut self, phase: Phase, status: &Status) -> Flow {
+        self.shared.publish(status);
+        self.order.report(phase.name(), f64::from(status.point) * 1e-3, self.duration_s);
+        if self.asked.is_halted() {
+            return Flow::Stop;
+        }
+        let wish = lock(&self.shared.wishes).pop_front();
+        wish.map_or(Flow::Continue, |wish| {
+            self.waits = Some(wish.done);
+            wish.flow
+        })
+    }
+
+    fn applied(&mut self, flow: Flow, result: &Result<(), Error>) {
+        if let (Flow::Speed(percent), Ok(())) = (flow, result) {
+            *lock(&self.shared.speed) = Some(f64::from(percent) / 100.0);
+        }
+        if let Some(waits) = self.waits.take() {
+            let came = result.as_ref().copied().map_err(|error| Failure::with(error, error.facts()));
+            // The thread may have gone.
+            let _ = waits.send(came);
+        }
+    }
+
+    fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
+        observe(session, &self.shared);
         self.tape.pause();
-        if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = outcome {
+        if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // Stopped before it began.
             self.shared.set_moves(false);
             return Err(Error::Cancelled.into());
         }
-        ran.moved = true;
-        self.shared.set_moves(outcome.as_ref().is_err_and(|error| self.may_move(error)));
-        match outcome {
-            Ok(Outcome::Finished(_)) => return Ok(true),
+        self.ran.moved = true;
+        self.shared.set_moves(leg.outcome.as_ref().is_err_and(|error| may_move(session, error)));
+        match &leg.outcome {
+            Ok(Outcome::Finished(_)) => {}
             Ok(Outcome::Stopped(_)) => {
-                ran.outcome = "stopped";
-                if !asked.is_halted() {
-                    // Somebody else did: what waits here was asked for before that, too.
+                self.ran.outcome = "stopped";
+                if !self.asked.is_halted() {
+                    // Another program did: what waits here was requested before that, too.
                     self.shared.halt();
                 }
             }
-            Err(error) => {
-                ran.outcome = "fault";
-                let samples = self.tape.take();
-                let found = RunFailure::find(&ran.info, &samples)
-                    .unwrap_or_else(|| RunFailure::ended_by(&ran.info, &samples, error.to_string()));
-                ran.broken = Some(match &error {
-                    Error::Motion(MotionError::RunFault { status, .. }) => found.with_status(status),
-                    _ => found,
-                });
-                samples.iter().for_each(|sample| self.tape.keep(sample));
-                let mut failure = Failure::from(error);
-                if failure.facts.joint.is_none() {
-                    failure.facts.joint = ran.broken.as_ref().and_then(|broken| broken.joint);
-                }
-                ran.failure = Some(failure);
-            }
+            Err(error) => self.broke(error),
         }
-        Ok(false)
+        Ok(())
     }
 
-    /// A run has ended in this error, and its motion may go on all the same: on its way, or paused and resumed by whoever does that.
-    fn may_move(&self, error: &Error) -> bool {
-        let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
-        matches!(error, Error::Motion(MotionError::LinkLost { .. }))
-            || self.session.last().is_some_and(|status| status.trajectory.is_in(&goes_on))
+    fn goes_on(&mut self, _: u32) {}
+}
+
+impl Follower<'_> {
+    /// The motion ended in an error.
+    fn broke(&mut self, error: &Error) {
+        self.ran.outcome = "fault";
+        let samples = self.tape.take();
+        let broken = RunFailure::of(error, &self.ran.info, &samples);
+        samples.iter().for_each(|sample| self.tape.keep(sample));
+        let mut failure = Failure::with(error, error.facts());
+        failure.facts.joint = failure.facts.joint.or(broken.joint);
+        (self.ran.failure, self.ran.broken) = (Some(failure), Some(broken));
     }
+}
+
+/// A motion has ended in this error, and the arm may move all the same: on its way, or paused and resumed by another program.
+fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
+    let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
+    matches!(error, Error::Motion(MotionError::LinkLost { .. }))
+        || session.last().is_some_and(|status| status.trajectory.is_in(&goes_on))
 }
 
 /// Why nothing of the run was begun.
-fn not_begun(error: StartError) -> Failure {
+fn not_begun(error: &StartError) -> Failure {
+    let failure = Failure::with(error, Facts::of_start(error));
     match error {
-        StartError::Check(error) => error.into(),
-        StartError::Elsewhere(error) => {
-            Failure::from(error).next("pass approach=True: the arm is moved to the first point")
-        }
-        StartError::Approach(error) => no_approach(&error),
+        StartError::Check(_) => failure,
+        StartError::Elsewhere(_) => failure.next("pass approach=True: the arm is moved to the first point"),
+        StartError::Approach(_) => failure.next(
+            "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own",
+        ),
+        StartError::Open(_) => failure.next("approach=True leads back to its first point before each run"),
     }
-}
-
-/// The way to the first point cannot be gone.
-fn no_approach(error: &ApproachError) -> Failure {
-    let facts = Facts::of_approach(error);
-    let message =
-        format!("the straight way from where the arm stands to the first point is refused: {error}");
-    let next = "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own";
-    Failure { facts: Box::new(facts), ..Failure::refused("approach", message, next) }
 }
 
 /// What is run, and what was changed for it.
@@ -334,48 +330,16 @@ fn trajectory(
     status: &Status,
     move_speed: MoveSpeed,
 ) -> Result<(Arc<Trajectory>, Vec<String>), Failure> {
-    match &order.course {
-        Course::Along(trajectory) => match order.speed {
-            None | Some(100.0) => Ok((Arc::clone(trajectory), Vec::new())),
-            Some(percent) => Ok((Arc::new(plan::at_speed(trajectory, percent)?), Vec::new())),
-        },
-        Course::To { target, line, margin_pct } => {
-            let (config, friction) = (arm.config_on_device(&options.device), arm.friction());
-            let planner = Planner {
-                model: Some(&arm.model),
-                friction: friction.as_ref(),
-                speed_pct: move_speed.percent,
-                margin_pct: *margin_pct,
-                ..Planner::new(&config)
-            };
-            let planned = planner.to_target(&arm.model, &status.positions(), target, *line);
-            let planned =
-                planned.map_err(|error| Failure { message: error.of_move(), ..Failure::from(error) })?;
-            let low = planned.verdict.margin.and_then(|margin| margin.warning());
-            let notes = planned.notes.into_iter().chain(of_speed("move", move_speed)).chain(low).collect();
-            Ok((Arc::new(planned.trajectory), notes))
-        }
-    }
+    let speed = (move_speed, "`speed=`");
+    let planned = order.course.planned(arm, &options.device, &status.positions(), order.speed, speed);
+    let planned = planned.map_err(|error| match order.course {
+        Course::Along(_) => Failure::from(error),
+        Course::To { .. } => Failure { message: error.of_move(), ..Failure::from(error) },
+    })?;
+    Ok((planned.trajectory, planned.notes))
 }
 
 /// A default speed in words.
 fn of_speed(what: &str, speed: MoveSpeed) -> Option<String> {
     speed.note("`speed=`").map(|words| format!("{what} {words}"))
-}
-
-/// A motion that is repeated leads back to its start, or an approach does.
-fn closed(trajectory: &Trajectory, order: &Order, arm: &Arm, options: &CheckOptions) -> Result<(), Failure> {
-    let ends = trajectory.points.first().zip(trajectory.points.last());
-    let Some((first, last)) = ends.filter(|_| order.repeat > 1 && !order.approach) else { return Ok(()) };
-    let limit = arm.config_on_device(&options.device).start_tolerance_rad;
-    let (joint, far) = plan::furthest_joint(&first.position, &last.position);
-    if far <= limit {
-        return Ok(());
-    }
-    let message = format!(
-        "it ends {far:.3} rad from where it begins ({joint}), more than {limit} rad: it cannot be repeated as it is; nothing was sent"
-    );
-    let facts = Facts { joint: Some(joint), value: Some(far), limit: Some(limit), ..Facts::default() };
-    let next = "approach=True leads back to its first point before each run";
-    Err(Failure { facts: Box::new(facts), ..Failure::refused("open-path", message, next) })
 }

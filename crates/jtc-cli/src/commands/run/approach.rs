@@ -2,15 +2,13 @@
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::CheckError;
-use jtc_host::check::CheckedTrajectory;
 use jtc_host::plan::{ApproachError, MoveSpeed};
 use serde_json::json;
 
-use super::{APPROACH, Course};
+use super::Course;
 
 /// Prints how long an approach takes, and at which speed.
-pub fn note(checked: &CheckedTrajectory, course: &Course, speed: MoveSpeed, out: &Output) {
-    let duration_s = checked.trajectory().duration_s();
+pub fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Output) {
     let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
 }
@@ -27,7 +25,7 @@ pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Fail
         return failure;
     }
     let error = failure.to_json();
-    let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
+    let value = json!({ "outcome": "refused", "phase": "approach", "verdict": verdict, "error": error });
     out.result(&value, String::new);
     out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
     Failure::printed(failure.kind)
@@ -41,7 +39,7 @@ fn refused(why: &str, file: &str) -> Failure {
         "nothing moved, and {file} itself passed: bring the arm nearer to its first point (`jtc traj info {file}` shows it), by hand \
          with `jtc teach on` and `jtc teach off`, or with a trajectory of your own around what is in the way"
     );
-    Failure::new(ErrorKind::Refused, APPROACH, message).hint(hint)
+    Failure::new(ErrorKind::Refused, "approach", message).hint(hint)
 }
 
 #[cfg(test)]

@@ -3,38 +3,25 @@
 use std::collections::VecDeque;
 
 use cli_kit::{ErrorKind, Failure, Output, table};
-use jtc_host::check::Verdict;
 use jtc_host::port::Port;
-use jtc_host::recording::{Ending, RecordingInfo};
+use jtc_host::recording::Ending;
 use jtc_host::report::{Digest, Facts, ReportInput, RunFailure, Summary};
+use jtc_host::run::{Ended, Phase};
 use jtc_host::session::Outcome;
-use jtc_host::{Error, MotionError, Session};
+use jtc_host::{Error, Session};
 use serde_json::{Value, json};
 
 use super::super::job::Job;
 use super::super::run_report;
-use super::leg::{APPROACH, Leg, Reel};
-use super::outputs::Outputs;
+use super::terminal::{Reel, Taken};
 use crate::link::LinkPort;
 
 /// Motions whose figures are kept: many runs must not fill the memory of a PC.
 const KEPT: usize = 1000;
 
-/// The motions of a run, in their order.
-pub struct Legs {
-    /// Those that were finished, with their figures.
-    pub done: Finished,
-    /// The one that ended the run.
-    pub last: Leg,
-    /// What the check found of it.
-    pub verdict: Verdict,
-    /// It was finished, and the person ended the run before the next one.
-    pub cut: bool,
-}
-
 /// A motion that was finished.
 pub struct Done {
-    pub phase: &'static str,
+    pub phase: Phase,
     pub summary: Summary,
 }
 
@@ -50,7 +37,7 @@ pub struct Finished {
 
 impl Finished {
     pub fn push(&mut self, done: Done) {
-        self.runs += usize::from(done.phase != APPROACH);
+        self.runs += usize::from(done.phase != Phase::Approach);
         if self.kept.len() == KEPT {
             self.kept.pop_front();
             self.left_out += 1;
@@ -68,37 +55,27 @@ fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     }
 }
 
-/// A run that ended in a fault is what one wants to look at most: what broke first in it.
-fn what_broke(info: &RecordingInfo, leg: &Leg) -> Option<RunFailure> {
-    let error = leg.outcome.as_ref().err()?;
-    let found = RunFailure::find(info, &leg.samples);
-    let found = found.unwrap_or_else(|| RunFailure::ended_by(info, &leg.samples, error.to_string()));
-    Some(match error {
-        Error::Motion(MotionError::RunFault { status, .. }) => found.with_status(status),
-        _ => found,
-    })
-}
-
 /// Writes the files of a run and prints how it ended.
 pub fn conclude(
     job: &Job,
-    legs: Legs,
-    reel: Reel,
+    ended: Ended,
+    taken: Taken,
     session: &Session<LinkPort>,
-    outputs: Outputs,
     out: &Output,
 ) -> Result<(), Failure> {
-    let Legs { done, last, verdict, cut } = legs;
+    let Ended { last, cut } = ended;
+    let Taken { done, samples, reel, outputs } = taken;
     let Reel { mut info, tape, .. } = reel;
     let link = session.statistics();
     let facts = [Facts::of_link(&last.upload, &link, session.port().baud())];
-    let broken = what_broke(&info, &last);
+    // A person wants to see of a run that failed what broke first.
+    let broken = last.outcome.as_ref().err().map(|error| RunFailure::of(error, &info, &samples));
     let word = if cut { "stopped" } else { word(&last.outcome) };
-    let digest = Digest::of(&last.samples);
+    let digest = Digest::of(&samples);
     let summary = digest.summary(&info);
-    let Leg { phase, upload, outcome, .. } = last;
-    let where_ =
-        if phase == APPROACH { format!(" on the {APPROACH} to the first point") } else { String::new() };
+    let (phase, verdict) = (last.phase, last.checked.verdict());
+    let (upload, outcome) = (last.upload, last.outcome);
+    let where_ = if phase == Phase::Approach { " on the approach to the first point" } else { "" };
     let reason = match &outcome {
         Ok(_) if cut => format!("ended between two runs, {} were done", done.runs + 1),
         Ok(_) => where_.trim_start().to_owned(),
@@ -121,13 +98,13 @@ pub fn conclude(
     let runs = runs(&done, (phase, word, &summary));
     let value = json!({
         "outcome": word,
-        "phase": phase,
+        "phase": phase.name(),
         "recorded_s": summary.recorded_s,
         "executed_s": summary.executed_s,
         "samples": summary.samples,
         "joints": summary.joints,
         "runs": runs,
-        "runs_finished": done.runs + usize::from(word == "finished" && phase != APPROACH || cut),
+        "runs_finished": done.runs + usize::from(word == "finished" && phase == Phase::Motion || cut),
         "runs_left_out": done.left_out,
         "failure": broken,
         "verdict": verdict,
@@ -160,14 +137,14 @@ pub fn conclude(
 }
 
 /// Every motion of the run as JSON, approaches among them; the last one ended it.
-fn runs(done: &Finished, last: (&'static str, &'static str, &Summary)) -> Vec<Value> {
+fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     let before = done.kept.iter().map(|d| (d.phase, "finished", &d.summary));
-    let mut number = done.runs - done.kept.iter().filter(|d| d.phase != APPROACH).count();
-    let value = |(phase, outcome, summary): (&str, &str, &Summary)| {
-        number += usize::from(phase != APPROACH);
+    let mut number = done.runs - done.kept.iter().filter(|d| d.phase == Phase::Motion).count();
+    let value = |(phase, outcome, summary): (Phase, &str, &Summary)| {
+        number += usize::from(phase == Phase::Motion);
         json!({
-            "run": (phase != APPROACH).then_some(number),
-            "phase": phase,
+            "run": (phase == Phase::Motion).then_some(number),
+            "phase": phase.name(),
             "outcome": outcome,
             "executed_s": summary.executed_s,
             "joints": summary.joints,
@@ -184,7 +161,7 @@ fn each_run(runs: &[Value], left_out: usize) -> String {
             let most = joints.filter_map(|joint| joint[key].as_f64()).reduce(f64::max);
             most.map_or("-".into(), |v| cli_kit::figure(v * scale, digits))
         };
-        let name = run["run"].as_u64().map_or(APPROACH.into(), |n| format!("run {n}"));
+        let name = run["run"].as_u64().map_or("approach".into(), |n| format!("run {n}"));
         vec![
             name,
             run["outcome"].as_str().unwrap_or_default().into(),
@@ -213,11 +190,11 @@ mod tests {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);
         let mut done = Finished::default();
         for n in 0..3_001 {
-            let phase = if n % 3 == 2 { APPROACH } else { "motion" };
+            let phase = if n % 3 == 2 { Phase::Approach } else { Phase::Motion };
             done.push(Done { phase, summary: summary.clone() });
         }
         assert_eq!((done.kept.len(), done.runs, done.left_out), (1000, 2001, 2001));
-        let runs = runs(&done, ("motion", "stopped", &summary));
+        let runs = runs(&done, (Phase::Motion, "stopped", &summary));
         assert_eq!(runs.len(), 1001);
         let number = |i: usize| runs[i]["run"].as_u64();
         assert_eq!((number(1000), number(999), number(998)), (Some(2002), Some(2001), None));

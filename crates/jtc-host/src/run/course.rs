@@ -1,0 +1,76 @@
+//! Where a run leads.
+use std::sync::Arc;
+
+use jtc_core::{Config, JOINTS};
+
+use crate::arm::Arm;
+use crate::plan::kinematics::Target;
+use crate::plan::{MoveSpeed, PlanError, Planner, at_speed};
+use crate::trajectory::Trajectory;
+
+/// Where a run leads.
+#[derive(Clone, Debug)]
+pub enum Course {
+    /// Along a trajectory.
+    Along(Arc<Trajectory>),
+    /// From where the arm stands to a pose.
+    To {
+        /// Pose.
+        target: Target,
+        /// Set if the flange keeps to a straight line; else the joints move in proportion to each other if that takes no longer.
+        line: bool,
+        /// Torque that the move leaves, % of each limit.
+        margin_pct: f64,
+    },
+}
+
+/// Trajectory of a run.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Trajectory at its speed.
+    pub trajectory: Arc<Trajectory>,
+    /// What the planner tells the user about it.
+    pub notes: Vec<String>,
+}
+
+impl Course {
+    /// Returns the trajectory, for an arm that stands at `here` (rad) on a controller with the settings `device`. `speed_pct`: % of the
+    /// speed of a trajectory that is given; `move_speed`: speed of a move, which the option `option` sets.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError`]; for a move [`PlanError::of_move`] has the better message.
+    pub fn planned(
+        &self,
+        arm: &Arm,
+        device: &Config,
+        here: &[f64; JOINTS],
+        speed_pct: Option<f64>,
+        (move_speed, option): (MoveSpeed, &str),
+    ) -> Result<Planned, PlanError> {
+        match self {
+            Self::Along(trajectory) => {
+                let trajectory = match speed_pct {
+                    None | Some(100.0) => Arc::clone(trajectory),
+                    Some(percent) => Arc::new(at_speed(trajectory, percent)?),
+                };
+                Ok(Planned { trajectory, notes: Vec::new() })
+            }
+            Self::To { target, line, margin_pct } => {
+                let (config, friction) = (arm.config_on_device(device), arm.friction());
+                let planner = Planner {
+                    model: Some(&arm.model),
+                    friction: friction.as_ref(),
+                    speed_pct: move_speed.percent,
+                    margin_pct: *margin_pct,
+                    ..Planner::new(&config)
+                };
+                let planned = planner.to_target(&arm.model, here, target, *line)?;
+                let of_speed = move_speed.note(option).map(|words| format!("move {words}"));
+                let low = planned.verdict.margin.and_then(|margin| margin.warning());
+                let notes = planned.notes.into_iter().chain(of_speed).chain(low).collect();
+                Ok(Planned { trajectory: Arc::new(planned.trajectory), notes })
+            }
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! A run: the motions of an [`Order`], each one checked, uploaded, executed and followed to its end.
+//!
+//! The procedure stands here once. A front end (the command line, the agent, Python) implements [`Observer`]: it shows the steps, decides
+//! what happens to the motion, and keeps its samples.
+mod course;
+mod start;
+
+use std::cell::RefCell;
+
+use jtc_core::JOINTS;
+use jtc_wire::Status;
+
+use crate::arm::Arm;
+use crate::check::{CheckOptions, CheckedTrajectory};
+use crate::error::Error;
+use crate::port::Port;
+use crate::sample::Sample;
+use crate::session::{Flow, Outcome, Progress, Session, UploadReport};
+use crate::trajectory::Trajectory;
+pub use course::{Course, Planned};
+pub use start::{OpenPath, Start, StartError};
+
+/// Motions of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Order<'a> {
+    /// Arm of the controller.
+    pub arm: &'a Arm,
+    /// Settings of the controller, and how each motion is checked and uploaded.
+    pub options: &'a CheckOptions,
+    /// Trajectory of the first run.
+    pub trajectory: &'a Trajectory,
+    /// Trajectory of the runs after the first one.
+    pub later: &'a Trajectory,
+    /// Number of runs; 0 counts as 1.
+    pub runs: u32,
+    /// Speed of an approach, % of the limits. `None`: the arm must stand at the first point of each run.
+    pub approach_pct: Option<f64>,
+}
+
+impl<'a> Order<'a> {
+    fn trajectory_of(&self, n: u32) -> &'a Trajectory {
+        if n <= 1 { self.trajectory } else { self.later }
+    }
+}
+
+/// Purpose of a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Straight motion to the first point.
+    Approach,
+    /// Motion along the trajectory.
+    Motion,
+}
+
+impl Phase {
+    /// Name in events and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Approach => "approach",
+            Self::Motion => "motion",
+        }
+    }
+}
+
+/// One motion of a run, after its end.
+#[derive(Debug)]
+pub struct Leg {
+    /// Purpose.
+    pub phase: Phase,
+    /// Trajectory and verdict of its check.
+    pub checked: CheckedTrajectory,
+    /// Figures of its upload.
+    pub upload: UploadReport,
+    /// End of the motion: an error of [`Session::execute`] or [`Session::follow`] if it failed.
+    pub outcome: Result<Outcome, Error>,
+}
+
+impl Leg {
+    /// Returns true if the motion reached its last point.
+    pub fn is_finished(&self) -> bool {
+        matches!(self.outcome, Ok(Outcome::Finished(_)))
+    }
+}
+
+/// End of a run.
+#[derive(Debug)]
+pub struct Ended {
+    /// Last motion of the run.
+    pub last: Leg,
+    /// Set if the last motion finished, and the observer cancelled the run before the next one.
+    pub cut: bool,
+}
+
+/// Receiver of the samples of a motion, called while the arm moves.
+pub type SampleReceiver = Box<dyn FnMut(&Sample)>;
+
+/// A front end of a run. Each method is called by [`run`], in the order in which they stand here.
+pub trait Observer<P: Port> {
+    /// Failure in the words of the front end.
+    type Failure;
+
+    /// Converts the reason why a motion does not begin.
+    fn refused(&mut self, error: StartError) -> Self::Failure;
+
+    /// Converts an error before a motion began; [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
+    fn failed(&mut self, error: Error) -> Self::Failure;
+
+    /// Returns true once the run is to end before its next motion. In motion [`Observer::status`] decides.
+    fn is_cancelled(&mut self) -> bool;
+
+    /// The next motion has passed its check.
+    fn checked(&mut self, phase: Phase, checked: &CheckedTrajectory);
+
+    /// A part of the motion was uploaded.
+    fn uploading(&mut self, phase: Phase, progress: &Progress);
+
+    /// The whole motion was uploaded.
+    fn uploaded(&mut self, phase: Phase, upload: &UploadReport);
+
+    /// The motion begins when this returns. Returns what receives its samples.
+    ///
+    /// # Errors
+    ///
+    /// The run ends with this failure, and the motion does not begin.
+    fn begins(
+        &mut self,
+        session: &mut Session<P>,
+        phase: Phase,
+        checked: &CheckedTrajectory,
+    ) -> Result<SampleReceiver, Self::Failure>;
+
+    /// A status arrived in motion. Returns what happens to the motion.
+    fn status(&mut self, phase: Phase, status: &Status) -> Flow;
+
+    /// What [`Observer::status`] returned was applied, with this result. A speed or a resume that was refused does not end the motion.
+    fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
+
+    /// The motion has ended.
+    ///
+    /// # Errors
+    ///
+    /// The run ends with this failure.
+    fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
+
+    /// Run `n` (from 1) has finished, and another one follows.
+    fn goes_on(&mut self, n: u32);
+}
+
+/// Runs all motions of `order` on an arm that was held at `status`, until one does not finish. **The arm moves.**
+///
+/// # Errors
+///
+/// A failure before a motion begins. The end of a motion is no failure of this procedure: see [`Leg::outcome`].
+pub fn run<P: Port, O: Observer<P>>(
+    session: &mut Session<P>,
+    order: &Order<'_>,
+    status: &Status,
+    observer: &mut O,
+) -> Result<Ended, O::Failure> {
+    let mut here = status.positions();
+    let mut n = 1;
+    loop {
+        let start = order.start(n, &here).map_err(|error| observer.refused(error))?;
+        let mut checked = start.checked;
+        if start.is_approach {
+            let last = motion(session, Phase::Approach, checked, observer)?;
+            if !last.is_finished() {
+                return Ok(Ended { last, cut: false });
+            }
+            // The approach may have ended a little beside the first point.
+            here = positions(session, observer)?;
+            let again = CheckedTrajectory::check(order.trajectory_of(n), order.arm, &here, order.options);
+            checked = again.map_err(|error| observer.refused(error.into()))?;
+        }
+        let last = motion(session, Phase::Motion, checked, observer)?;
+        let over = n >= order.runs || !last.is_finished();
+        if over || observer.is_cancelled() {
+            return Ok(Ended { last, cut: !over });
+        }
+        observer.goes_on(n);
+        here = positions(session, observer)?;
+        n += 1;
+    }
+}
+
+fn positions<P: Port, O: Observer<P>>(
+    session: &mut Session<P>,
+    observer: &mut O,
+) -> Result<[f64; JOINTS], O::Failure> {
+    let status = session.fresh_status().map_err(|error| observer.failed(error.into()))?;
+    Ok(status.positions())
+}
+
+/// Uploads, executes and follows one motion.
+fn motion<P: Port, O: Observer<P>>(
+    session: &mut Session<P>,
+    phase: Phase,
+    checked: CheckedTrajectory,
+    observer: &mut O,
+) -> Result<Leg, O::Failure> {
+    if observer.is_cancelled() {
+        return Err(observer.failed(Error::Cancelled));
+    }
+    observer.checked(phase, &checked);
+    let upload = session.upload(&checked, |progress| {
+        observer.uploading(phase, progress);
+        if observer.is_cancelled() { Flow::Cancel } else { Flow::Continue }
+    });
+    let upload = upload.map_err(|error| observer.failed(error))?;
+    observer.uploaded(phase, &upload);
+    if observer.is_cancelled() {
+        return Err(observer.failed(Error::Cancelled));
+    }
+    let receiver = observer.begins(session, phase, &checked)?;
+    let both = RefCell::new(&mut *observer);
+    let outcome = session.run_with(
+        &checked,
+        receiver,
+        |status| both.borrow_mut().status(phase, status),
+        |flow, result| both.borrow_mut().applied(flow, result),
+    );
+    let leg = Leg { phase, checked, upload, outcome };
+    observer.ended(session, &leg)?;
+    Ok(leg)
+}

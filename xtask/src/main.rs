@@ -16,6 +16,7 @@ mod links;
 mod package;
 mod panics;
 mod paths;
+mod plain_words;
 mod prove;
 mod python;
 mod rules;
@@ -65,6 +66,9 @@ Usage: cargo xtask COMMAND
                                --twice: made again by a copy of the checkout in another folder, and compared
                                --check: the packages installed, used and removed in a fresh Debian (needs root)
   size                         static memory of the controller against its limit, and of the boards' programs by region
+  plain-words [PART] [--update]
+                               count the marks of unclear sentences; with PART, a crate or a folder, list them
+                               --update: keep the counts in xtask/plain-words.txt, which may only fall
   help                         this text
 ";
 
@@ -95,6 +99,7 @@ fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
         "book" => book::main(rest),
         "dist" => dist::main(rest),
         "size" => size::main(rest),
+        "plain-words" => plain_words::main(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");
             Ok(ExitCode::SUCCESS)

@@ -9,8 +9,8 @@ use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{
-    book, deny, dependencies, dist, emulate, firmware, links, package, python, rules, size, suite,
-    test_files, web, worked_bytes,
+    book, deny, dependencies, dist, emulate, firmware, links, package, plain_words, python, rules, size,
+    suite, test_files, web, worked_bytes,
 };
 
 /// Crates that run on the board.
@@ -33,6 +33,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("every rule has a test that names it", || passed(rules::check()));
     tally.step("every file with tests is in a program", || passed(test_files::check()));
     tally.step("worked bytes of the protocol page", || passed(worked_bytes::check()));
+    tally.step("plain words", || passed(plain_words::check()));
     tally.step("links between documents", || passed(links::check()));
     tally.step("the book has every page", || passed(book::check()));
     tally.step("every dependency is documented", || passed(dependencies::check()));

@@ -1,0 +1,144 @@
+//! The prose of a file: comments and strings of a program, paragraphs of a page.
+use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
+
+/// A comment, a string or a paragraph, in one line.
+#[derive(Debug, Default, PartialEq)]
+pub struct Text {
+    pub words: String,
+    /// Where each line of the file begins in `words`, and its number.
+    lines: Vec<(usize, usize)>,
+}
+
+impl Text {
+    /// The line of the file that has this byte of `words`.
+    pub fn line_at(&self, offset: usize) -> usize {
+        // A mark may begin with the end of the sentence before.
+        let before = |(start, _): &&(usize, usize)| *start <= offset + 2;
+        self.lines.iter().rev().find(before).map_or(1, |(_, number)| *number)
+    }
+
+    fn push(&mut self, line: &str, number: usize) {
+        if !self.words.is_empty() {
+            self.words.push(' ');
+        }
+        self.lines.push((self.words.len(), number));
+        self.words.push_str(line.trim());
+    }
+}
+
+/// The prose of a file with this extension.
+pub fn of(source: &str, extension: &str) -> Vec<Text> {
+    match extension {
+        "rs" => rust(source),
+        "md" => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, Some(line)))),
+        "py" | "pyi" | "toml" => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, hash(line)))),
+        _ => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, slashes(line)))),
+    }
+}
+
+/// Lines that follow each other are one text, outside fenced code. A list item begins a new one.
+fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<Text> {
+    let (mut texts, mut open, mut fenced) = (Vec::new(), Text::default(), false);
+    for (number, line) in lines {
+        let line = line.map(str::trim);
+        let fence = line.is_some_and(|line| line.starts_with("```"));
+        fenced ^= fence;
+        let prose = line.filter(|line| !fenced && !fence && !line.is_empty());
+        let begins = prose.is_none_or(|line| line.starts_with(['-', '|', '#', '*']));
+        if begins && !open.words.is_empty() {
+            texts.push(std::mem::take(&mut open));
+        }
+        if let Some(line) = prose {
+            open.push(line.trim_start_matches(['-', '|', '#', '*', ' ']), number);
+        }
+    }
+    texts.extend((!open.words.is_empty()).then_some(open));
+    texts
+}
+
+/// A comment of Python or TOML, and what may be a line of a docstring.
+fn hash(line: &str) -> Option<&str> {
+    let line = line.trim();
+    match line.split_once("# ") {
+        Some((_, comment)) => Some(comment),
+        None => Some(line.trim_matches('"')).filter(|line| is_prose(line)),
+    }
+}
+
+/// A comment of TypeScript or of a page, and what may be a line of a longer one.
+fn slashes(line: &str) -> Option<&str> {
+    let line = line.trim();
+    match line.split_once("// ") {
+        Some((_, comment)) => Some(comment),
+        None => is_prose(line).then_some(line),
+    }
+}
+
+/// Most of it are words.
+fn is_prose(line: &str) -> bool {
+    let words =
+        line.split_whitespace().filter(|word| word.chars().all(|c| c.is_alphabetic() || ",.'’".contains(c)));
+    let count = line.split_whitespace().count();
+    count >= 4 && 4 * words.count() >= 3 * count
+}
+
+fn rust(source: &str) -> Vec<Text> {
+    let (mut texts, mut comment, mut at, mut number) = (Vec::new(), Vec::new(), 0, 1);
+    for token in tokenize(source, FrontmatterAllowed::No) {
+        let text = &source[at..at + token.len as usize];
+        match token.kind {
+            TokenKind::LineComment { .. } => {
+                comment.push((number, Some(text.trim_start_matches(['/', '!']))));
+            }
+            TokenKind::Whitespace => {}
+            kind => {
+                texts.extend(paragraphs(comment.drain(..)));
+                if let TokenKind::Literal {
+                    kind: LiteralKind::Str { .. } | LiteralKind::RawStr { .. }, ..
+                } = kind
+                {
+                    let words = text.trim_matches(['r', '#', '"']);
+                    if words.split_whitespace().count() >= 3 {
+                        let lines = words.lines().enumerate();
+                        texts.extend(paragraphs(
+                            lines.map(|(i, line)| (number + i, Some(line.trim_end_matches('\\')))),
+                        ));
+                    }
+                }
+            }
+        }
+        at += token.len as usize;
+        number += text.matches('\n').count();
+    }
+    texts.extend(paragraphs(comment.drain(..)));
+    texts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(source: &str, extension: &str) -> Vec<String> {
+        of(source, extension).into_iter().map(|text| text.words).collect()
+    }
+
+    #[test]
+    fn comments_and_strings_of_a_program_are_texts_and_its_words_are_not() {
+        let source = "//! Stops\n//! the arm.\n//!\n//! ```\n//! where\n//! ```\nfn a<T>() where T: Copy {\n    b(\"one two \\\n      three\", 'c');\n}\n";
+        assert_eq!(words(source, "rs"), ["Stops the arm.", "one two three"]);
+        assert_eq!(of(source, "rs")[0].line_at(7), 2);
+    }
+
+    #[test]
+    fn paragraphs_of_a_page_are_texts() {
+        let page = "# Title\n\nOne\ntwo.\n- item\n\n```sh\ncode\n```\nlast\n";
+        assert_eq!(words(page, "md"), ["Title", "One two.", "item", "last"]);
+    }
+
+    #[test]
+    fn comments_of_python_and_typescript_are_texts() {
+        assert_eq!(words("x = 1  # Stops it.\ny = x\n", "py"), ["Stops it."]);
+        assert_eq!(words("\"\"\"Stop the arm on its path.\"\"\"\n", "py"), ["Stop the arm on its path."]);
+        assert_eq!(words("const a = 1; // Stops it.\nb();\n", "ts"), ["Stops it."]);
+    }
+}

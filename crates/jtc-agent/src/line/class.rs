@@ -1,21 +1,21 @@
-//! What a frame of a host may do, and who may send it.
+//! Classes of host frames: what a frame may do, and which client may send it.
 use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, Response};
 
-/// What a frame of a host does.
+/// Effect of a host frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// It asks, and changes nothing: of anyone who was let in.
+    /// Reads and changes nothing. Every client may send it.
     Ask,
-    /// Stop or Pause: of anyone who was let in, ahead of all else.
+    /// Stop or Pause. Every client may send it, and it overtakes all other frames.
     Halt(ExecCommand),
-    /// It may begin a motion that nobody wants any more after a Stop.
+    /// May begin a motion. Refused if the client requested it before a Stop.
     Motion,
-    /// It changes something else: of the one who commands.
+    /// Changes something else. Only the holder of the lease may send it.
     Command,
 }
 
 impl Class {
-    /// The class of a frame.
+    /// Returns the class of a frame.
     pub fn of(frame: FrameRef<'_>) -> Self {
         use FrameType::*;
         match frame.frame_type {
@@ -31,13 +31,13 @@ impl Class {
         }
     }
 
-    /// Only the one who commands may send it.
+    /// Returns true if only the holder of the lease may send the frame.
     pub fn needs_lease(self) -> bool {
         matches!(self, Self::Motion | Self::Command)
     }
 }
 
-/// A whole good frame of a host, and what it does.
+/// Complete valid frame of a host, and its class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct HostFrame {
     pub bytes: Vec<u8>,
@@ -46,31 +46,31 @@ pub(super) struct HostFrame {
 }
 
 impl HostFrame {
-    /// `None` where the bytes are no such frame.
+    /// Returns `None` if the bytes are not a valid frame of a host.
     pub fn parse(bytes: Vec<u8>) -> Option<Self> {
         let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
         let (frame_type, class) = (frame.frame_type, Class::of(frame));
         Some(Self { bytes, frame_type, class })
     }
 
-    /// It reads the log of the flight recorder, which records nothing meanwhile (J-56): not for everyone who may look.
+    /// Returns true if the frame reads the log of the flight recorder. Viewers may not send it, because the recorder pauses meanwhile (J-56).
     pub fn reads_log(&self) -> bool {
         let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
     }
 
-    /// The frame that a device returns to it beside the record.
+    /// Type of the frame that the controller returns in addition to the record.
     pub fn returns(&self) -> Option<FrameType> {
         returned_by(self.frame_type)
     }
 
-    /// The record of a frame that never gets to the device.
+    /// Record for a frame that is refused before it reaches the controller.
     pub fn refusal(&self) -> Response {
         Response::good(self.frame_type, DataStatus::NotAllowed, self.bytes.len() as u16)
     }
 }
 
-/// The arm may be another one behind it (J-51 to J-55).
+/// Returns true if the frame may change which arm the controller has (J-51 to J-55).
 pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     matches!(
@@ -89,7 +89,7 @@ pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     )
 }
 
-/// The frame that a device returns to a request of this type beside the record.
+/// Type of the frame that the controller returns to this request in addition to the record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {
         FrameType::GetInfo => Some(FrameType::Info),

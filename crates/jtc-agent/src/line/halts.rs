@@ -1,4 +1,4 @@
-//! Stops and Pauses on their way: ahead of all else, until the device has taken them.
+//! Queue of Stops and Pauses: sent before all other frames, and repeated until the controller has confirmed them.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -8,19 +8,20 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::class::HostFrame;
 
-/// A record is awaited for so long, and three statuses on the line, before the frame is sent again.
+/// Time, in addition to that of three statuses on the line, after which a frame without a record is sent again.
 const AWAITED: Duration = Duration::from_millis(150);
-/// So often one is sent as soon as that is over; after that once in a while, until the device is there again.
+/// Number of times that a frame is sent at this interval.
 const TRIES: u32 = 20;
+/// Interval after that, until the controller answers.
 const LATER: Duration = Duration::from_secs(1);
 
-/// A Stop or a Pause, and who has asked for it.
+/// A Stop or a Pause, and the clients that have requested it.
 #[derive(Debug)]
 struct Halt {
     command: ExecCommand,
     askers: Vec<ClientId>,
     tries: u32,
-    /// When it is sent again.
+    /// Time at which it is sent again.
     again_at: Duration,
 }
 
@@ -32,18 +33,18 @@ impl Halt {
     }
 }
 
-/// Those that are on their way. However many ask, one waits for the line, and each of them has its record.
+/// Stops and Pauses without a record. Requests share one frame, and each client receives its record.
 #[derive(Debug, Default)]
 pub(super) struct Halts {
     waiting: Option<Halt>,
-    /// Written, and without a record.
+    /// Written frames, oldest first.
     written: VecDeque<Halt>,
-    /// A frame that may begin a motion has been written behind the last of them.
+    /// Set if a frame that may begin a motion was written after the last of them.
     motion_since: bool,
 }
 
 impl Halts {
-    /// A client asks for one. A Stop takes the place of a Pause, never the other way.
+    /// Adds the request of a client. A Stop replaces a Pause, never the reverse.
     pub fn ask(&mut self, client: ClientId, command: ExecCommand) {
         let covers = |halt: &Halt| halt.command == ExecCommand::Stop || halt.command == command;
         if let Some(waiting) = &mut self.waiting {
@@ -62,12 +63,12 @@ impl Halts {
         }
     }
 
-    /// The frame that is to be written before all others.
+    /// Frame that must be written before all others.
     pub fn frame(&self) -> Option<HostFrame> {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
-    /// It was written; the line has carried it at `at`.
+    /// The frame was written; its last byte leaves the line at `at`.
     pub fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;
@@ -83,7 +84,7 @@ impl Halts {
         self.motion_since = true;
     }
 
-    /// The record of the first of them: who is to have it. One that says that the frame arrived damaged has it sent again.
+    /// A record arrived for the oldest written frame. Returns the clients that receive it. If the frame did not arrive undamaged, it is sent again.
     pub fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {
@@ -93,7 +94,7 @@ impl Halts {
         halt.askers.into_iter().map(|asker| (asker, *response)).collect()
     }
 
-    /// Those whose record does not come are sent again. Returns whether one has been sent many times now.
+    /// Repeats the frames whose record is overdue. Returns true if one of them was sent [`TRIES`] times by now.
     pub fn look(&mut self, now: Duration) -> bool {
         let mut many = false;
         while let Some(halt) = self.written.pop_front_if(|halt| now >= halt.again_at) {
@@ -104,7 +105,7 @@ impl Halts {
     }
 
     fn again(&mut self, halt: Halt) {
-        // Behind a Stop a Pause would take its place.
+        // A Pause after a Stop would replace it.
         if let Some(stop) = self.written.iter_mut().find(|halt| halt.command == ExecCommand::Stop) {
             return halt.askers.into_iter().for_each(|asker| stop.ask(asker));
         }
@@ -119,18 +120,18 @@ impl Halts {
         }
     }
 
-    /// When one is to be written, or sent again.
+    /// Time at which a frame is written or repeated next.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
 
-    /// What was asked for, and sent more than once because the device does not take it.
+    /// Command that was sent more than once because the controller does not confirm it; a Stop rather than a Pause.
     pub fn untaken(&self) -> Option<ExecCommand> {
         let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
     }
 
-    /// All have their records.
+    /// Returns true if every request has its record.
     pub fn are_done(&self) -> bool {
         self.waiting.is_none() && self.written.is_empty()
     }

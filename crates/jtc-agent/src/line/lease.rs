@@ -1,11 +1,11 @@
-//! The lease: one client commands at a time, and all see who.
+//! The lease: at most one client at a time may send commands. All clients see which one.
 use std::time::Duration;
 
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
-/// Who stops the arm of a client that has gone.
+/// Name that is reported for a Stop by the policy of a client that has disconnected.
 pub(super) const POLICY: &str = "the policy of a client that has gone";
-/// No halt: what a client does was asked for before its policy ended it.
+/// Not a number of a Stop: the policy of the client has ended its requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
 /// Who commands.
@@ -69,17 +69,17 @@ pub enum Denied {
 }
 
 impl SharedLine {
-    /// Who commands.
+    /// Lease, if a client holds it.
     pub fn lease(&self) -> Option<&Lease> {
         self.lease.as_ref()
     }
 
-    /// Takes, or renews, the lease. `lasts`: for how long without renewal, also where the client takes it later by a command or is given it;
-    /// `None`: as long as the client is there.
+    /// Takes or renews the lease. `lasts`: duration without renewal, also for a lease that the client gets later by a command or from another
+    /// client; `None`: while the client is connected.
     ///
     /// # Errors
     ///
-    /// [`Denied`] when another client has it, which is then asked to let it go, or when this one may not command.
+    /// [`Denied`] if another client holds the lease, which is then asked to release it, or if this client may not hold it.
     pub fn take_lease(
         &mut self,
         client: ClientId,
@@ -96,26 +96,26 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Lets the lease go: to the client that has asked for it, if one has.
+    /// Releases the lease. The client that has requested it, if any, gets it.
     ///
     /// # Errors
     ///
     /// [`Denied::NotHolder`].
     pub fn release_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
-        // Whoever lets it go in a motion leaves that to itself.
+        // A client that releases the lease in motion lets the motion go on.
         self.bequeath(self.name(client), Policy::Continue);
         let next = lease.wanted_by.filter(|next| self.clients.contains_key(next));
         self.set_lease(next.map(|holder| self.lease_of(holder, now)));
         Ok(())
     }
 
-    /// Asks the one who commands to let it go. The first who asks keeps its place as long as it waits: until it gets the lease, goes, or has not
-    /// shown for as long as its own lease would last that it is there.
+    /// Requests the lease from its holder. The first client that requests it keeps its place until it gets the lease, disconnects, or has sent
+    /// nothing for as long as its own lease would last.
     ///
     /// # Errors
     ///
-    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] when nobody commands: it can be taken.
+    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] if no client holds the lease: it can be taken.
     pub fn want_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(Introduction { name, role: Role::Operator, .. }) = self.introduction(client).cloned() else {
             return Err(Denied::Viewer);
@@ -133,29 +133,29 @@ impl SharedLine {
         Ok(())
     }
 
-    /// A client that has asked for the lease is there.
+    /// Returns true if a client that has requested the lease still waits.
     fn waits(&self, id: ClientId, now: Duration) -> bool {
         self.clients.get(&id).is_some_and(|client| {
             client.lasts.is_none_or(|lasts| now.saturating_sub(client.shown_at) < lasts)
         })
     }
 
-    /// The client shows that it is there.
+    /// Notes that the client is present.
     fn show(&mut self, id: ClientId, now: Duration) {
         if let Some(client) = self.clients.get_mut(&id) {
             client.shown_at = now;
         }
     }
 
-    /// Nothing comes from a client any more: the one that commands is put out, and its motion follows its policy. If it wakes it has to come
-    /// again, and to look at what others have done meanwhile.
+    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. If the client wakes it must connect again,
+    /// and see what other clients have done meanwhile.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);
         }
     }
 
-    /// The client commands; it takes the lease where nobody has it.
+    /// Checks that the client holds the lease. Gives it the lease if no client holds it.
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         if self.lease.is_none() {
@@ -164,7 +164,7 @@ impl SharedLine {
         Ok(())
     }
 
-    /// The client commands, or could take the lease.
+    /// Checks that the client holds the lease, or could take it.
     pub(super) fn could_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         if self.introduction(id).ok_or(Denied::Gone)?.role != Role::Operator {
             return Err(Denied::Viewer);
@@ -176,13 +176,13 @@ impl SharedLine {
                 let age_ms = now.saturating_sub(lease.since).as_millis() as u64;
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
-            // What it began goes on without it by its policy alone.
+            // Its policy alone decides about what it began.
             None if self.is_over(id) => Err(Denied::NotHolder),
             None => Ok(()),
         }
     }
 
-    /// The client shows that it is there: its lease, where it has it, lasts anew.
+    /// Notes that the client is present, and renews its lease if it holds it.
     pub fn renew(&mut self, id: ClientId, now: Duration) {
         self.end_lapsed(now);
         self.show(id, now);
@@ -192,13 +192,13 @@ impl SharedLine {
         }
     }
 
-    /// The lease of this client has lapsed, and its policy has ended what it did.
+    /// Returns true if the lease of this client has lapsed, and its policy has ended its motion.
     fn is_over(&self, id: ClientId) -> bool {
         let client = self.clients.get(&id);
         client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
     }
 
-    /// One that this client has from now on.
+    /// Lease of this client from now on.
     fn lease_of(&self, holder: ClientId, now: Duration) -> Lease {
         let lasts = self.clients.get(&holder).and_then(|client| client.lasts);
         Lease { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
@@ -216,7 +216,7 @@ impl SharedLine {
         }
     }
 
-    /// The one who commanded does not any more.
+    /// Ends the lease of `holder`, and applies its policy.
     pub(super) fn end_lease(&mut self, holder: ClientId, policy: Policy, now: Duration) {
         let next = self.lease.as_ref().and_then(|lease| lease.wanted_by);
         let next = next.filter(|next| self.clients.contains_key(next));
@@ -226,7 +226,7 @@ impl SharedLine {
         if self.hold(POLICY, command, now) {
             self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
         } else if let Some(client) = self.clients.get_mut(&holder) {
-            // Nobody else is held up, and what it was about to move stays.
+            // Other clients are not affected. The motion that this client was about to begin does not begin.
             client.asked_after = NOT_ASKED;
         }
     }

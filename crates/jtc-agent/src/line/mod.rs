@@ -1,8 +1,13 @@
-//! Many clients on the line of one controller, without I/O: bytes and time go in, bytes come out.
+//! Shares the line of one controller between many clients. Without I/O: bytes and time go in, bytes come out.
 //!
-//! A client speaks the protocol of the line as if it were alone: it sends frames, and receives every status with the records of its own
-//! frames only. That is why every program that can use a serial port can use a shared line. What is added is who may send what: questions
-//! from anyone who was let in, a Stop and a Pause from the same ahead of all else, everything else from the one who has the [`Lease`].
+//! Each client speaks the protocol of the line as if it were alone. It sends frames, and receives every status with the records of its own
+//! frames only. So every program that can use a serial port can use a shared line. The shared line decides which client may send which frame:
+//!
+//! - every client may send questions, and a Stop or a Pause, which overtakes all other frames;
+//! - only the holder of the [`Lease`] may send everything else.
+//!
+//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last one moves nothing, even if its frames
+//! arrive later.
 mod class;
 mod client;
 mod device;
@@ -35,51 +40,51 @@ use moving::Moving;
 use outbox::Outbox;
 use supervision::Supervision;
 
-/// Records that do not come within this time behind their frame do not come any more.
+/// Time after a frame within which its record arrives. Later it is given up.
 const RECORD_TIME: Duration = Duration::from_secs(2);
-/// Nor do frames that a request returns.
+/// Time after a record within which the frame arrives that the request returns. Later it is given up.
 const RETURN_TIME: Duration = Duration::from_millis(500);
-/// For so long after somebody else's Stop nobody can ask for a motion: what asks may have been on its way before.
+/// Hold-off after a Stop or a Pause of another client: a request for a motion that arrives in this time may have been sent before the Stop.
 const CALM: Duration = Duration::from_secs(3);
-/// And for so long after one that was refused for that.
+/// Time by which each refused attempt extends the hold-off.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
-/// A frame that was written and has no record yet.
+/// A written frame whose record has not arrived yet.
 struct Sent {
     client: ClientId,
     kind: u8,
-    /// It was given up in the middle: its record is a bad one.
+    /// Set if the frame was abandoned halfway: the controller then answers with a bad record.
     abandoned: bool,
-    /// When the line will have carried it.
+    /// Time at which the last byte leaves the line.
     at: Duration,
 }
 
-/// What a device is to return beside a record.
+/// A frame that the controller returns in addition to a record.
 struct Return {
     client: ClientId,
     kind: FrameType,
     until: Duration,
 }
 
-/// One line, many clients.
+/// The line of one controller, and its clients.
 pub struct SharedLine {
     clients: BTreeMap<ClientId, Client>,
     next_id: u64,
     outbox: Outbox,
     sent: VecDeque<Sent>,
     returns: Option<Return>,
-    /// Whose frame was sent last: the next client has its turn.
+    /// Client whose frame was sent last. Clients take turns.
     last_turn: ClientId,
     lease: Option<Lease>,
     halts: Halts,
-    /// How many halts there were, who asked for the last, and for what.
+    /// Last Stop or Pause: its number, who requested it, and which of the two.
     halted: (u64, String, ExecCommand),
-    /// No motion begins before that was not asked for by the one who asked for the last halt.
+    /// End of the hold-off. Until then only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
     moving: Moving,
-    /// Whose policy acts on what moves while nobody commands: that of the last who did.
+    /// Last holder of the lease, whose policy applies to the motion while no client holds the lease.
     left: (String, Policy),
-    /// What was reported last.
+    /// Will that was reported last.
     will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
@@ -88,13 +93,13 @@ pub struct SharedLine {
     counts: Counts,
 }
 
-/// The owner of the line itself, which acts for clients that have gone and for those that have no end of the line of their own.
+/// The owner of the line. It acts for clients that have disconnected, and for those without a connection of their own.
 pub const OWNER: ClientId = ClientId(0);
-/// Stands for all who have asked for a Stop or a Pause.
+/// Stands for all clients that have requested a Stop or a Pause.
 const HALTS: ClientId = ClientId(u64::MAX);
 
 impl SharedLine {
-    /// A line at this rate, Bd, if it has one.
+    /// Creates a line with this rate in Bd; `None` for a line without a rate.
     pub fn new(baud: Option<u32>) -> Self {
         Self {
             clients: BTreeMap::new(),
@@ -118,18 +123,18 @@ impl SharedLine {
         }
     }
 
-    /// A client comes.
+    /// Adds a client.
     pub fn join(&mut self, introduction: Introduction) -> ClientId {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // It knows of what was stopped before; what it is to do may have been asked for before that.
+        // It may make requests after the Stops that came before it; but its user may have decided before them, so the hold-off applies.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
 
-    /// A client goes. What it has sent and is not on the line yet is dropped; its motion follows its policy.
+    /// Removes a client. Drops its frames that are not on the line yet, and applies its policy to its motion.
     pub fn leave(&mut self, client: ClientId, now: Duration) {
         let Some(gone) = self.clients.remove(&client) else { return };
         if let Some((outgoing, _)) = self.outbox.writing()
@@ -144,40 +149,40 @@ impl SharedLine {
         }
     }
 
-    /// How a client has presented itself.
+    /// Name, role and policy of a client.
     pub fn introduction(&self, client: ClientId) -> Option<&Introduction> {
         self.clients.get(&client).map(|client| &client.introduction)
     }
 
-    /// The policy of a client from now on.
+    /// Sets the policy of a client.
     pub fn set_policy(&mut self, client: ClientId, policy: Policy) {
         if let Some(client) = self.clients.get_mut(&client) {
             client.introduction.policy = policy;
         }
     }
 
-    /// How many clients there are.
+    /// Number of clients.
     pub fn clients(&self) -> usize {
         self.clients.len()
     }
 
-    /// The last status, and when it came.
+    /// Last status, and the time at which it arrived.
     pub fn status(&self) -> Option<&(Duration, Status)> {
         self.status.as_ref()
     }
 
-    /// Stops or pauses the motion for a client, ahead of all else: what is sent already and not on the line yet is dropped. It is sent again
-    /// until the device has taken it. `name`: who it is, for those who ask why their frames were not passed on.
+    /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it. Drops all frames that need
+    /// the lease and are not on the line yet. `name` is reported to the clients whose frames are dropped.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);
     }
 
-    /// The same for somebody who has no end of the line, or not at hand; `client` is the one who may go on at once, where it is one.
+    /// Like [`halt`](Self::halt), for a requester without a connection to the line. The hold-off does not apply to `client`.
     pub fn halt_for(&mut self, client: Option<ClientId>, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
     }
 
-    /// `asker` has the record, `own` may go on at once.
+    /// `asker` receives the record. The hold-off does not apply to `own`.
     fn halt_by(&mut self, asker: ClientId, own: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
         self.halted = (self.halted.0 + 1, name.clone(), command);
@@ -188,7 +193,7 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // Whoever stops an arm wants it held: one that is taught, or will be as soon as it stands, is loose.
+        // A Stop means that the arm is held. In Teaching, or if Teaching begins as soon as the arm stands, it would be compliant.
         if self.moving.may_teach(self.status.as_ref()) {
             self.moving.end_teaching(now);
         }
@@ -209,7 +214,7 @@ impl SharedLine {
         }
     }
 
-    /// Bytes that a client has sent, in any pieces.
+    /// Takes bytes that a client has sent, in pieces of any length.
     pub fn from_client(&mut self, id: ClientId, mut bytes: &[u8], now: Duration) {
         loop {
             let Some(client) = self.clients.get_mut(&id) else { return };
@@ -220,7 +225,7 @@ impl SharedLine {
             };
             client.heard_at = now;
             let allowed = client.allow(now);
-            // A Stop counts also of one who is put out for what else it has sent.
+            // A Stop is taken even if the client is disconnected for its other frames.
             if allowed.is_ok() || matches!(frame.class, Class::Halt(_)) {
                 self.take_frame(id, frame, now);
             }
@@ -234,7 +239,7 @@ impl SharedLine {
         if let Class::Halt(command) = frame.class {
             let (name, before) = (self.name(id), self.halted.0);
             self.halt(id, &name, command, now);
-            // What it stops itself on its way, it goes on from.
+            // The client knows of its own Stop.
             if let Some(client) = self.clients.get_mut(&id)
                 && client.asked_after == before
             {
@@ -261,11 +266,11 @@ impl SharedLine {
         }
     }
 
-    /// This frame may be sent by this client.
+    /// Checks that this client may send this frame.
     fn may_send(&mut self, id: ClientId, frame: &HostFrame, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         let motion = frame.class == Class::Motion;
-        // An upload that leads to no motion any more ends at once.
+        // An upload ends at once if its motion was stopped.
         if (motion || frame.frame_type == FrameType::Trajectory) && self.is_halted(id) {
             return Err(self.stopped(id));
         }
@@ -275,7 +280,7 @@ impl SharedLine {
         self.may_command(id, now)
     }
 
-    /// Nobody else has stopped the arm just now. `again`: where somebody has, what insists for so long waits for as long behind that.
+    /// Returns an error during the hold-off after another client's Stop. Each refused attempt extends the hold-off to `again` from now.
     fn is_calm(&mut self, id: ClientId, now: Duration, again: Duration) -> Result<(), Denied> {
         match self.clients.get_mut(&id) {
             Some(client) if now < client.calm_until => {
@@ -286,27 +291,28 @@ impl SharedLine {
         }
     }
 
-    /// What this client was asked for is not done.
+    /// Refusal of a request that a Stop or a Pause has overtaken.
     pub(super) fn stopped(&self, id: ClientId) -> Denied {
         Denied::Stopped { by: self.halted_by(id).to_owned() }
     }
 
-    /// Who has stopped or paused what this client was asked for.
+    /// Name of the client whose Stop or Pause has overtaken the requests of this client.
     pub fn halted_by(&self, id: ClientId) -> &str {
         if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
     }
 
-    /// A client asks for what may move the arm, knowing of the halt number `after`. From then on only that moves it: a Stop or a Pause behind
-    /// that halt takes it back, however long it has waited since.
+    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. Any later one revokes the
+    /// permission, even while the request still waits.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another one commands, or somebody else has just stopped the arm.
+    /// [`Denied`] if another client holds the lease, during the hold-off, and if a later Stop or Pause exists.
     pub fn ask_to_move(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
         self.ask(id, after, Duration::ZERO, now)
     }
 
-    /// The same for what is asked for again and again as long as somebody holds a key down: it has to be let go before it moves the arm anew.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a request that is repeated while a key is pressed. Each refused repetition extends the hold-off,
+    /// so the arm moves again only after the key was released.
     ///
     /// # Errors
     ///
@@ -315,7 +321,7 @@ impl SharedLine {
         self.ask(id, after, CALM_AGAIN, now)
     }
 
-    /// The client could ask for a jog, as far as others are concerned; one that insists behind a Stop waits on.
+    /// Returns an error if another client prevents a jog of this client now. Each refused attempt extends the hold-off.
     ///
     /// # Errors
     ///
@@ -325,7 +331,7 @@ impl SharedLine {
         self.is_calm(id, now, CALM_AGAIN)
     }
 
-    /// The client could ask for what may move the arm, as far as others are concerned.
+    /// Returns an error if another client prevents a motion of this client now.
     ///
     /// # Errors
     ///
@@ -347,39 +353,39 @@ impl SharedLine {
         Ok(())
     }
 
-    /// What this client has asked for was stopped or paused since.
+    /// Returns true if a Stop or a Pause came after the client's last request for a motion.
     pub fn is_halted(&self, id: ClientId) -> bool {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// The last halt that this client has asked for its motion after; that before it came, where it has not.
+    /// Number of the last Stop or Pause before the client's last request for a motion; before it connected, if it has made none.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }
 
-    /// Stops and Pauses of others since this client came.
+    /// Stops and Pauses of other clients since this client connected.
     pub fn halts_of_others(&self, id: ClientId) -> jtc_host::port::Halts {
         self.clients.get(&id).map(|client| client.halts).unwrap_or_default()
     }
 
-    /// Number of the last halt.
+    /// Number of the last Stop or Pause.
     pub fn last_halt(&self) -> u64 {
         self.halted.0
     }
 
-    /// Who asked for the last halt, and for what.
+    /// Requester of the last Stop or Pause, and which of the two it was.
     pub fn last_halt_by(&self) -> (&str, ExecCommand) {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Brings the arm to rest for the end of the owner. What somebody still prepares moves it no more.
+    /// Stops the arm because the agent ends. Motions that clients still prepare do not begin.
     pub fn end(&mut self, now: Duration) {
         self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
         self.moving.end_teaching(now);
     }
 
-    /// Ends whatever moves the arm, for the owner. Where nothing seems to move it is sent as well, as a status is older than the last
-    /// command, and the device refuses it then; that holds nobody else up. Returns whether something may have moved.
+    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to stand, because the last status is older than the last
+    /// command; the controller may refuse it then, and other clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.moving.may_move(self.status.as_ref(), now);
         if moved {
@@ -391,12 +397,12 @@ impl SharedLine {
         moved
     }
 
-    /// The arm may be moving, or may begin to. In doubt it may.
+    /// Returns true unless the arm certainly stands and no motion is about to begin.
     pub fn may_move(&self, now: Duration) -> bool {
         self.moving.may_move(self.status.as_ref(), now)
     }
 
-    /// Nothing waits for the line, nor for a record of a Stop.
+    /// Returns true if no frame waits for the line and no Stop waits for its record.
     pub fn is_idle(&self) -> bool {
         self.halts.are_done() && self.moving.due().is_none() && self.outbox.is_free()
     }
@@ -406,7 +412,7 @@ impl SharedLine {
         self.events.push_back(LineEvent::Lease(lease));
     }
 
-    /// A frame of this client is not passed on.
+    /// Refuses a frame of this client.
     fn refuse(&mut self, id: ClientId, frame: &HostFrame, denied: Denied) {
         let event = LineEvent::Denied { client: id, frame_type: frame.frame_type, denied: denied.clone() };
         self.events.push_back(event);
@@ -416,7 +422,7 @@ impl SharedLine {
         self.deliver(id, Delivery::Denied(denied));
     }
 
-    /// Gives a client something to read.
+    /// Queues something for a client to read.
     pub fn deliver(&mut self, id: ClientId, delivery: Delivery) {
         if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.deliver(delivery)) {
             self.put_out(id, reason, self.now());
@@ -428,29 +434,29 @@ impl SharedLine {
         self.leave(client, now);
     }
 
-    /// What a client has not had yet; `None` when there is no such client any more.
+    /// Takes what is queued for a client; `None` if the client is disconnected.
     pub fn take_deliveries(&mut self, client: ClientId) -> Option<Vec<Delivery>> {
         self.clients.get_mut(&client).map(Client::take_deliveries)
     }
 
-    /// What has happened since the last call.
+    /// Takes the events since the last call.
     pub fn take_events(&mut self) -> Vec<LineEvent> {
         let events: Vec<LineEvent> = self.events.drain(..).collect();
         events.iter().for_each(|event| self.counts.count(event));
         events
     }
 
-    /// How often each has happened, as far as [`take_events`](Self::take_events) has returned it.
+    /// Number of events of each kind that [`take_events`](Self::take_events) has returned.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// What came from the device.
+    /// Counters of the bytes and statuses that the controller has sent.
     pub fn received(&self) -> StatusCounters {
         self.receiver.counters()
     }
 
-    /// About now: when the last status came.
+    /// Approximate time: the arrival of the last status.
     fn now(&self) -> Duration {
         self.status.map_or(Duration::ZERO, |(at, _)| at)
     }

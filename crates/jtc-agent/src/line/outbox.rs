@@ -1,7 +1,7 @@
-//! What goes to the device: whole frames, one after the other, a few bytes ahead of the line.
+//! Transmit queue of the line: whole frames, one after the other, a few bytes ahead of the line.
 //!
-//! Bytes that an operating system has taken cannot be taken back. So no more than [`AHEAD`] of them are ever on their way, and a Stop
-//! need not wait for the rest of a long frame: that is abandoned, and the device knows by the gap behind it (J-05).
+//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] of them are queued there. A Stop does not wait for
+//! the remainder of a long frame: the frame is abandoned, and the controller detects that by the gap after it (J-05).
 use std::time::Duration;
 
 use jtc_host::port::line_time;
@@ -9,31 +9,31 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::class::HostFrame;
 
-/// Most bytes of a frame on their way at once: 256 (J-05), less what the end of a byte and of a hand-over may be taken for, early by a byte
-/// each time that the system holds one up.
+/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin, because each delay of the system makes the estimate of
+/// the line up to a byte too early.
 const AHEAD: usize = 250;
-/// Silence behind an abandoned frame: the 5 ms of J-03, and as much as adapters may take off it.
+/// Silence after an abandoned frame: the 5 ms of J-03, and what adapters may shorten it by.
 const GAP: Duration = Duration::from_millis(8);
-/// Rests of frames up to this are sent before a Stop: it takes no longer than the gap would.
+/// Remainders of frames up to this length, in bytes, are sent before a Stop: that takes no longer than the gap.
 const SHORT: usize = 64;
-/// Fewest bytes of a longer frame that are written at once.
+/// Least number of bytes of a longer frame that are written at once.
 const PIECE: usize = 64;
 
-/// A frame on its way to the device.
+/// A frame for the controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outgoing {
-    /// Who sent it.
+    /// Client that sent it.
     pub client: ClientId,
-    /// All of it.
+    /// Whole frame.
     pub frame: HostFrame,
 }
 
-/// What has become of a frame.
+/// End of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Passed {
     /// Its last byte was written.
     Written(Outgoing),
-    /// It was given up in the middle.
+    /// It was abandoned halfway.
     Abandoned(Outgoing),
 }
 
@@ -43,21 +43,21 @@ struct Writing {
     at: usize,
 }
 
-/// Paces what is written on a line, and lets what is urgent overtake.
+/// Paces the bytes of a line, and lets an urgent frame overtake.
 pub struct Outbox {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
     writing: Option<Writing>,
     /// When the line will have carried everything that was written.
     free_at: Duration,
-    /// When it begins to carry what is being handed over, where some is.
+    /// Time at which the line begins to carry the bytes that are being handed over.
     begins_at: Option<Duration>,
-    /// The silence behind an abandoned frame lasts until then.
+    /// End of the silence after an abandoned frame.
     silent_until: Duration,
 }
 
 impl Outbox {
-    /// Of a line at this rate, Bd, if it has one.
+    /// Creates the queue of a line with this rate in Bd; `None` for a line without a rate.
     pub fn new(baud: Option<u32>) -> Self {
         Self {
             baud,
@@ -74,7 +74,7 @@ impl Outbox {
         self.free_at
     }
 
-    /// The frame that overtakes all others, if there is one.
+    /// Sets the frame that overtakes all others.
     pub fn set_urgent(&mut self, urgent: Option<Outgoing>) {
         self.urgent = urgent;
     }
@@ -84,23 +84,23 @@ impl Outbox {
         self.baud
     }
 
-    /// A frame can be begun.
+    /// Returns true if a frame can begin.
     pub fn is_free(&self) -> bool {
         self.writing.is_none() && self.urgent.is_none()
     }
 
-    /// Begins a frame; only where [`is_free`](Self::is_free).
+    /// Begins a frame; call it only if [`is_free`](Self::is_free) returns true.
     pub fn begin(&mut self, outgoing: Outgoing) {
         self.writing = Some(Writing { outgoing, at: 0 });
     }
 
-    /// When [`next`](Self::next) may have more to write than it has now; `None`: when there is more to send.
+    /// Time at which [`next`](Self::next) may have more to write; `None` if nothing waits.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // One that is abandoned for it is so when there would be room for a piece of it.
+            // A frame that is abandoned for it is abandoned when the next piece would fit.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -111,13 +111,13 @@ impl Outbox {
         Some(now.max(self.free_at.saturating_sub(line_time(ahead, self.baud))))
     }
 
-    /// What is to be written now, and what has become of frames with that.
+    /// Returns the bytes to write now, and the frames that end with them.
     pub fn next(&mut self, now: Duration) -> (Vec<u8>, Vec<Passed>) {
         let (mut bytes, mut passed) = (Vec::new(), Vec::new());
         if now < self.silent_until {
             return (bytes, passed);
         }
-        // Bytes that fit: the whole of a line without a rate, in pieces all the same, for what overtakes.
+        // A line without a rate has nothing queued; its frames are written in pieces all the same, so that a Stop can overtake.
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
@@ -127,7 +127,7 @@ impl Outbox {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // A piece of a frame may be ahead of it, no more. What is written before there is room comes no sooner.
+            // At most a piece of a frame may be ahead of it. Writing earlier would not make it arrive sooner.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -161,14 +161,14 @@ impl Outbox {
         (bytes, passed)
     }
 
-    /// The system has taken the bytes only now: where the line had nothing else to carry it began later, and is free later.
+    /// The system has accepted the bytes only now. If the line was idle it began later, and is free later.
     pub fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
         }
     }
 
-    /// Gives up the frame that has been begun. True when the device has seen a part of it.
+    /// Abandons the frame that has begun. Returns it, and true if the controller has received a part of it.
     pub fn give_up(&mut self, now: Duration) -> Option<(Outgoing, bool)> {
         let writing = self.writing.take()?;
         if writing.at > 0 {
@@ -177,13 +177,13 @@ impl Outbox {
         Some((writing.outgoing, writing.at > 0))
     }
 
-    /// Bytes that are left of a frame that has been begun.
+    /// Bytes that are left of a frame that has begun.
     fn rest(&self) -> Option<usize> {
         let writing = self.writing.as_ref().filter(|writing| writing.at > 0)?;
         Some(writing.outgoing.frame.bytes.len() - writing.at)
     }
 
-    /// The frame that has been begun, and how much of it was written.
+    /// Frame that has begun, and the number of its bytes that were written.
     pub fn writing(&self) -> Option<(&Outgoing, usize)> {
         self.writing.as_ref().map(|w| (&w.outgoing, w.at))
     }

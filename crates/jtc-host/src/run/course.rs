@@ -1,4 +1,4 @@
-//! Where a run leads.
+//! Course of a run: a trajectory, or a pose to reach.
 use std::sync::Arc;
 
 use jtc_core::{Config, JOINTS};
@@ -8,12 +8,12 @@ use crate::plan::kinematics::Target;
 use crate::plan::{MoveSpeed, PlanError, Planner, at_speed};
 use crate::trajectory::Trajectory;
 
-/// Where a run leads.
+/// Course of a run.
 #[derive(Clone, Debug)]
 pub enum Course {
     /// Along a trajectory.
     Along(Arc<Trajectory>),
-    /// From where the arm stands to a pose.
+    /// From the present position of the arm to a pose.
     To {
         /// Pose.
         target: Target,
@@ -29,7 +29,7 @@ pub enum Course {
 pub struct Planned {
     /// Trajectory at its speed.
     pub trajectory: Arc<Trajectory>,
-    /// What the planner tells the user about it.
+    /// Notes of the planner for the user.
     pub notes: Vec<String>,
 }
 

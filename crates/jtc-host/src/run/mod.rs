@@ -62,7 +62,7 @@ impl Phase {
     }
 }
 
-/// One motion of a run, after its end.
+/// Motion of a run, after its end.
 #[derive(Debug)]
 pub struct Leg {
     /// Purpose.
@@ -105,7 +105,7 @@ pub trait Observer<P: Port> {
     /// Converts an error before a motion began; [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
-    /// Returns true once the run is to end before its next motion. In motion [`Observer::status`] decides.
+    /// Returns true once the run must end before its next motion. In motion [`Observer::status`] decides.
     fn is_cancelled(&mut self) -> bool;
 
     /// The next motion has passed its check.
@@ -132,7 +132,7 @@ pub trait Observer<P: Port> {
     /// A status arrived in motion. Returns what happens to the motion.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
-    /// What [`Observer::status`] returned was applied, with this result. A speed or a resume that was refused does not end the motion.
+    /// The flow that [`Observer::status`] returned was applied, with this result. A refused speed or resume does not end the motion.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
     /// The motion has ended.
@@ -150,7 +150,7 @@ pub trait Observer<P: Port> {
 ///
 /// # Errors
 ///
-/// A failure before a motion begins. The end of a motion is no failure of this procedure: see [`Leg::outcome`].
+/// A failure before a motion begins. A motion that fails ends the run with `Ok`: see [`Leg::outcome`].
 pub fn run<P: Port, O: Observer<P>>(
     session: &mut Session<P>,
     order: &Order<'_>,
@@ -167,7 +167,7 @@ pub fn run<P: Port, O: Observer<P>>(
             if !last.is_finished() {
                 return Ok(Ended { last, cut: false });
             }
-            // The approach may have ended a little beside the first point.
+            // The approach may have ended a little away from the first point.
             here = positions(session, observer)?;
             let again = CheckedTrajectory::check(order.trajectory_of(n), order.arm, &here, order.options);
             checked = again.map_err(|error| observer.refused(error.into()))?;

@@ -218,7 +218,7 @@ mod tests {
         let StartError::Open(open) = &error else { panic!("{error}") };
         assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
         assert_eq!(error.diagnosis().code, "open-path");
-        // Only a third run would begin where the second one ends.
+        // Only a third run would begin at the end of the second one.
         let there = motion.points.last().unwrap().position;
         let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
         let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };

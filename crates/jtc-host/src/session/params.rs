@@ -94,8 +94,8 @@ impl<P: Port> Session<P> {
     }
 
     /// Waits while gains that have just been given are on trial (J-71); `begun` is called first if they are. Call it right after
-    /// [`Session::push`] or [`Session::push_arm`]. Returns whether there was a trial: there is none without torque, and on a device without
-    /// extensions.
+    /// [`Session::push`] or [`Session::push_arm`]. Returns whether there was a trial; without torque, and on a device without extensions, there
+    /// was not.
     ///
     /// # Errors
     ///

@@ -16,7 +16,7 @@ use super::{Sim, motion, ready};
 struct Diary {
     steps: Vec<String>,
     samples: Rc<RefCell<usize>>,
-    /// It cancels the run after so many questions.
+    /// Number of questions after which it cancels the run.
     cancels_at: Option<usize>,
     asked: usize,
     /// In motion it wants a stop at this point, ms.
@@ -84,7 +84,7 @@ impl Observer<SimPort> for Diary {
     }
 }
 
-/// Runs `trajectory` so often on an arm that is held in the zero pose, with approaches.
+/// Runs `trajectory` `runs` times on an arm that is held in the zero pose, with approaches.
 fn runs(diary: &mut Diary, session: &mut Sim, trajectory: &Trajectory, runs: u32) -> Result<Ended, String> {
     let (arm, options) = (Arm::avena(), CheckOptions::default());
     let approach_pct = Some(50.0);

@@ -78,9 +78,9 @@ impl<'a> Operator<'a> {
         })
     }
 
-    /// The command shall end.
+    /// The command must end. A Stop counts even if the motion reached its end before it: no other one follows.
     pub fn wants_the_end(&self) -> bool {
-        self.stop.asked()
+        self.stop.asked() || self.stopping
     }
 
     /// From now on keys count.

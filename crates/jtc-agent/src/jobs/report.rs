@@ -34,7 +34,7 @@ pub(super) struct Made<'a> {
     pub outcome: &'a Result<Outcome, Error>,
     /// Its upload.
     pub upload: &'a UploadReport,
-    /// The link since its upload began.
+    /// The link since the motion before it ended, or since the run began.
     pub link: LinkStatistics,
     /// When it began, since 1970.
     pub began: Duration,

@@ -149,7 +149,7 @@ struct RunJob<'a> {
     site: &'a Site,
     move_speed: MoveSpeed,
     done: &'a mut Done,
-    /// The link before the upload of the motion.
+    /// The link at the end of the motion before.
     link: LinkStatistics,
     /// Tenths of the upload that were reported.
     upload_shown: usize,
@@ -248,6 +248,8 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), ErrorObject> {
         let (task, done) = (self.task, &mut *self.done);
+        // A wish of the last status is not applied: its client learns that the motion has ended.
+        self.wish = None;
         task.commander.motion_ended(task.wishes);
         let digest = self.digest.take();
         done.summary = Some(digest.summary(&RecordingInfo::of(&self.site.arm)));

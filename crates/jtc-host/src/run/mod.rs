@@ -135,7 +135,7 @@ pub trait Observer<P: Port> {
     /// The flow that [`Observer::status`] returned was applied, with this result. A refused speed or resume does not end the motion.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
-    /// The motion has ended.
+    /// The motion has ended. What [`Observer::status`] returned for its last status was not applied.
     ///
     /// # Errors
     ///

@@ -90,21 +90,22 @@ impl Order<'_> {
     /// [`StartError`].
     pub fn start(&self, n: u32, here: &[f64; JOINTS]) -> Result<Start, StartError> {
         let trajectory = self.trajectory_of(n);
-        let first = match CheckedTrajectory::check(trajectory, self.arm, here, self.options) {
-            Ok(checked) => Start { checked, is_approach: false },
-            Err(CheckError::Refused(verdict)) if verdict.is_only_elsewhere() => {
-                let Some(speed_pct) = self.approach_pct else {
-                    return Err(StartError::Elsewhere(CheckError::Refused(verdict)));
-                };
-                let checked = approach(trajectory, self.arm, here, speed_pct, self.options)?;
-                Start { checked, is_approach: true }
-            }
+        let elsewhere = match CheckedTrajectory::check(trajectory, self.arm, here, self.options) {
+            Ok(checked) => Ok(checked),
+            Err(CheckError::Refused(verdict)) if verdict.is_only_elsewhere() => Err(verdict),
             Err(error) => return Err(error.into()),
         };
         if n == 1 && self.runs > 1 {
             self.check_later(here)?;
         }
-        Ok(first)
+        match (elsewhere, self.approach_pct) {
+            (Ok(checked), _) => Ok(Start { checked, is_approach: false }),
+            (Err(verdict), None) => Err(StartError::Elsewhere(CheckError::Refused(verdict))),
+            (Err(_), Some(speed_pct)) => {
+                let checked = approach(trajectory, self.arm, here, speed_pct, self.options)?;
+                Ok(Start { checked, is_approach: true })
+            }
+        }
     }
 
     /// Checks the runs after the first one, and that each leads to the next one.
@@ -225,5 +226,8 @@ mod tests {
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
+        // The reason that no approach cures comes first.
+        assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
+        assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }
 }

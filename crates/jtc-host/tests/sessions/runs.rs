@@ -21,6 +21,11 @@ struct Diary {
     asked: usize,
     /// In motion it wants a stop at this point, ms.
     stops_at: Option<u32>,
+    /// In motion it wants the full speed at each status.
+    speeds: bool,
+    /// Statuses in motion, and flows that were applied.
+    statuses: usize,
+    applied: usize,
 }
 
 impl Diary {
@@ -67,11 +72,17 @@ impl Observer<SimPort> for Diary {
     }
 
     fn status(&mut self, _: Phase, status: &Status) -> Flow {
-        if self.stops_at.is_some_and(|at| status.point >= at) { Flow::Stop } else { Flow::Continue }
+        self.statuses += 1;
+        match self.stops_at {
+            Some(at) if status.point >= at => Flow::Stop,
+            _ if self.speeds => Flow::Speed(100),
+            _ => Flow::Continue,
+        }
     }
 
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>) {
         assert!(result.is_ok(), "{flow:?}: {result:?}");
+        self.applied += 1;
     }
 
     fn ended(&mut self, _: &mut Session<SimPort>, leg: &Leg) -> Result<(), String> {
@@ -132,6 +143,15 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
         let expected = if begun % 2 == 1 { 0.3 } else { 0.0 };
         assert!((place - expected).abs() < 2e-3, "{at}: {place} rad after {:?}", diary.steps);
     }
+}
+
+/// The last status of a motion shows its end: nothing is applied to it any more, and a front end must tell that to who waits for it.
+#[test]
+fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
+    let mut diary = Diary { speeds: true, ..Diary::default() };
+    runs(&mut diary, &mut ready(None), &motion(0.3, 50.0), 1).expect("it runs");
+    assert!(diary.statuses > 10);
+    assert_eq!(diary.applied, diary.statuses - 1);
 }
 
 #[test]

@@ -149,6 +149,7 @@ impl Machine {
             shared: Arc::clone(&self.shared),
             tape: Rc::clone(&self.tape),
             duration_s: 0.0,
+            upload: None,
             waits: None,
         };
         let ended = runner::run(&mut self.session, &runs, &status, &mut follower);
@@ -184,6 +185,8 @@ struct Follower<'a> {
     tape: Rc<Tape>,
     /// Of the motion, s.
     duration_s: f64,
+    /// Of the motion.
+    upload: Option<UploadReport>,
     /// The thread that waits for what comes of its request.
     waits: Option<Sender<Result<(), Failure>>>,
 }
@@ -216,7 +219,7 @@ impl Observer<AnyPort> for Follower<'_> {
     }
 
     fn uploaded(&mut self, _: Phase, upload: &UploadReport) {
-        self.ran.upload = Some(*upload);
+        self.upload = Some(*upload);
     }
 
     fn begins(
@@ -225,6 +228,7 @@ impl Observer<AnyPort> for Follower<'_> {
         phase: Phase,
         _: &CheckedTrajectory,
     ) -> Result<SampleReceiver, Failure> {
+        self.ran.upload = self.upload;
         if phase == Phase::Motion {
             let sink = self.recording.as_mut().map(|recording| recording.sink(&self.ran.info)).transpose()?;
             self.tape.record(sink.flatten());
@@ -265,6 +269,8 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
+        // A request of the last status is not applied: its thread learns that the motion has ended.
+        self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // Stopped before it began.
             self.shared.set_moves(false);

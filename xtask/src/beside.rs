@@ -1,4 +1,4 @@
-//! Runs programs in parallel: most of ours wait for a line or a bus in real time, and use little of a processor.
+//! Programs that run beside each other: most of ours wait for what takes its time, and use little of a processor.
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
@@ -22,37 +22,18 @@ pub struct Ended {
     pub seconds: f64,
 }
 
-/// Items that wait for a worker, and the number of workers.
-pub struct Lane<T> {
-    /// Number of items that are run at once.
-    pub at_once: usize,
-    /// Items, in the order in which they begin.
-    pub items: Vec<T>,
-}
-
-impl<T> Lane<T> {
-    /// One worker more than there are processors.
-    pub fn new(items: Vec<T>) -> Self {
-        Self { at_once: std::thread::available_parallelism().map_or(1, NonZero::get) + 1, items }
-    }
-}
-
-/// Calls `run` with each item of the lanes, which proceed in parallel; `log` is a file for what the item prints. Passes each result to `ended`
-/// as soon as there is one.
+/// Calls `run` with each of `items`, with one more at once than there are processors; `log` is a file for what that one prints. `ended` has
+/// what came of each, as they end.
 pub fn beside<T: Send, R>(
-    lanes: Vec<Lane<T>>,
+    items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,
     ended: impl FnMut(T, R) + Send,
 ) -> Result<()> {
     let scratch = Scratch::new("beside")?;
-    let lanes: Vec<_> = lanes
-        .into_iter()
-        .map(|Lane { at_once, items }| (at_once, Mutex::new(VecDeque::from(items))))
-        .collect();
-    let ended = Mutex::new(ended);
-    let worker = |lane: usize, number: usize| {
-        let log = scratch.path().join(format!("{lane}-{number}"));
-        let Some((_, waiting)) = lanes.get(lane) else { return };
+    let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
+    let (waiting, ended) = (Mutex::new(VecDeque::from(items)), Mutex::new(ended));
+    let worker = |number: usize| {
+        let log = scratch.path().join(number.to_string());
         loop {
             let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
             let Some(item) = next else { return };
@@ -61,11 +42,7 @@ pub fn beside<T: Send, R>(
         }
     };
     std::thread::scope(|scope| {
-        let numbered =
-            lanes.iter().enumerate().flat_map(|(lane, (at_once, _))| (0..*at_once).map(move |n| (lane, n)));
-        let worker = &worker;
-        let workers: Vec<_> =
-            numbered.map(|(lane, number)| scope.spawn(move || worker(lane, number))).collect();
+        let workers: Vec<_> = (0..at_once).map(|number| scope.spawn(move || worker(number))).collect();
         workers.into_iter().for_each(|worker| {
             worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
         });

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::beside::{self, Ended, Lane};
+use crate::beside::{self, Ended};
 use crate::shell::{self, apt_install, command, root, run, works};
 use crate::suite;
 use crate::tally::{Outcome, Tally};
@@ -129,7 +129,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     // The longest first.
     let beside = [Beside::Browser].into_iter().chain(CHECKS.iter().map(Beside::Reference));
     let ran = beside::beside(
-        vec![Lane::new(beside.filter(|one| tally.wants(&one.title())).collect())],
+        beside.filter(|one| tally.wants(&one.title())).collect(),
         |one, log| match one {
             Beside::Reference(check) => check.run((&python, demo), log),
             Beside::Browser => web::browser(log),

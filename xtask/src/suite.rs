@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::beside::{self, Ended, Lane};
+use crate::beside::{self, Ended};
 use crate::shell::{self, cargo, run_lines};
 use crate::tally::{Counts, Outcome};
 
@@ -78,11 +78,6 @@ fn build() -> Result<Vec<Program>> {
 }
 
 impl Program {
-    /// It tests a chain of boards.
-    fn is_of_boards(&self) -> bool {
-        self.package.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ucom"))
-    }
-
     /// A suite in as many parts as it has files.
     fn by_file(self) -> Result<Vec<Self>> {
         if self.name != "suite" {
@@ -108,8 +103,6 @@ fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     files
 }
 
-/// Programs of boards that run at once, beside the others: they wait for a bus in real time, and for nearly all of their time.
-const BOARD_PROGRAMS: usize = 2;
 /// Tests of one program of boards that run at once, for each processor: they wait for nearly all of their time. Of others one runs, which
 /// is usual: a simulated controller needs a good part of a processor, and is late when it does not get that.
 const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
@@ -152,13 +145,12 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
             command.arg("--exact").args(&program.tests);
         }
         command.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
-        if program.is_of_boards() {
+        if program.package.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ucom")) {
             command.env("RUST_TEST_THREADS", &threads);
         }
         beside::run(&mut command, log)
     };
-    let (boards, others): (Vec<_>, Vec<_>) = programs.into_iter().partition(Program::is_of_boards);
-    beside::beside(vec![Lane::new(others), Lane { at_once: BOARD_PROGRAMS, items: boards }], run, ended)?;
+    beside::beside(programs, run, ended)?;
     Ok(failures)
 }
 

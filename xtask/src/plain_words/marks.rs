@@ -1,94 +1,36 @@
 //! The marks: words and turns that hide who does what, or that mean something else in most other texts.
-use std::fmt;
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// A mark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mark {
-    /// A sentence begins with What, Who, Whose or Whether.
-    What,
-    /// A sentence begins with It, They, Nobody, Somebody, One or Nothing.
-    It,
-    /// A sentence begins with The same, That of, Those of or Of.
-    Same,
-    /// `where`, which is used for if and when.
-    Where,
-    /// `of which` and the like.
-    Which,
-    /// `is no`, where `is not a` is meant, or `invalid`.
-    IsNo,
-    /// `is to`, `has to`, where `must` is meant.
-    IsTo,
-    /// `so many`, where there is a number.
-    SoMany,
-    /// `whoever`, `whatever`.
-    Whoever,
-    /// `behind`, `anew`, `beside`.
-    Behind,
-}
+/// Names of the marks, and the pattern of each.
+pub const MARKS: [(&str, &str); 10] = [
+    ("begins with What, Who, Whose, Whether", r"(?:^|[.!;:] )(?:What|Who|Whose|Whether)\b"),
+    (
+        "begins with It, They, Nobody, Somebody, One, Nothing",
+        r"(?:^|[.!;:] )(?:It|They|Nobody|Somebody|One|Nothing)\b",
+    ),
+    ("begins with The same, That of, Those of, Of", r"(?:^|[.!;:] )(?:The same|That of|Those of|Of)\b"),
+    ("where", r"\bwhere\b"),
+    ("of which, by which, with which, of what", r"\b(?:of|by|with) which\b|\bof what\b"),
+    ("is no, is none", r"\b(?:is|are|was|were) (?:no|none)\b"),
+    ("is to, has to", r"\b(?:is|are|was|were|has|have|had) to (?:be|[a-z]+)\b"),
+    ("so many, so long, so often", r"\bso (?:many|much|long|often|few)\b"),
+    ("whoever, whatever", r"\b(?:[Ww]hoever|[Ww]hatever)\b"),
+    ("behind, anew, beside", r"\b(?:[Bb]ehind|[Aa]new|[Bb]eside)\b"),
+];
 
-impl Mark {
-    /// All of them.
-    pub const ALL: [Self; 10] = [
-        Self::What,
-        Self::It,
-        Self::Same,
-        Self::Where,
-        Self::Which,
-        Self::IsNo,
-        Self::IsTo,
-        Self::SoMany,
-        Self::Whoever,
-        Self::Behind,
-    ];
-
-    /// What it is called, and how it looks.
-    fn described(self) -> (&'static str, &'static str) {
-        match self {
-            Self::What => {
-                ("begins with What, Who, Whose, Whether", r"(?:^|[.!;:] )(?:What|Who|Whose|Whether)\b")
-            }
-            Self::It => (
-                "begins with It, They, Nobody, Somebody, One, Nothing",
-                r"(?:^|[.!;:] )(?:It|They|Nobody|Somebody|One|Nothing)\b",
-            ),
-            Self::Same => (
-                "begins with The same, That of, Those of, Of",
-                r"(?:^|[.!;:] )(?:The same|That of|Those of|Of)\b",
-            ),
-            Self::Where => ("where", r"\bwhere\b"),
-            Self::Which => {
-                ("of which, by which, with which, of what", r"\b(?:of|by|with) which\b|\bof what\b")
-            }
-            Self::IsNo => ("is no, is none", r"\b(?:is|are|was|were) (?:no|none)\b"),
-            Self::IsTo => ("is to, has to", r"\b(?:is|are|was|were|has|have|had) to (?:be|[a-z]+)\b"),
-            Self::SoMany => ("so many, so long, so often", r"\bso (?:many|much|long|often|few)\b"),
-            Self::Whoever => ("whoever, whatever", r"\b(?:[Ww]hoever|[Ww]hatever)\b"),
-            Self::Behind => ("behind, anew, beside", r"\b(?:[Bb]ehind|[Aa]new|[Bb]eside)\b"),
-        }
-    }
-}
-
-impl fmt::Display for Mark {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.described().0)
-    }
-}
-
-static PATTERNS: LazyLock<Vec<(Mark, Regex)>> = LazyLock::new(|| {
-    let compiled = |mark: Mark| Regex::new(mark.described().1).map(|pattern| (mark, pattern));
-    Mark::ALL.into_iter().filter_map(|mark| compiled(mark).ok()).collect()
+static PATTERNS: LazyLock<Vec<(&str, Regex)>> = LazyLock::new(|| {
+    MARKS.iter().filter_map(|(mark, pattern)| Some((*mark, Regex::new(pattern).ok()?))).collect()
 });
 
 /// The marks in a text, and the byte at which each begins.
-pub fn find(words: &str) -> Vec<(Mark, usize)> {
-    let found = |(mark, pattern): &(Mark, Regex)| {
-        let at = pattern.find_iter(words).map(|found| (*mark, found.start())).collect::<Vec<_>>();
-        at.into_iter()
-    };
-    PATTERNS.iter().flat_map(found).collect()
+pub fn find(words: &str) -> Vec<(&'static str, usize)> {
+    let mut found = Vec::new();
+    for (mark, pattern) in PATTERNS.iter() {
+        found.extend(pattern.find_iter(words).map(|at| (*mark, at.start())));
+    }
+    found
 }
 
 /// The sentence around a byte.
@@ -104,23 +46,24 @@ mod tests {
 
     #[test]
     fn each_mark_is_found_and_plain_sentences_have_none() {
-        for (text, mark) in [
-            ("What is held.", Mark::What),
-            ("Stops. It waits.", Mark::It),
-            ("The same without limits.", Mark::Same),
-            ("Fails where the arm moves.", Mark::Where),
-            ("The client of which it is.", Mark::Which),
-            ("120 % is no speed.", Mark::IsNo),
-            ("The host has to wait.", Mark::IsTo),
-            ("Sent so many times.", Mark::SoMany),
-            ("Whoever asks gets it.", Mark::Whoever),
-            ("Frames behind a Stop.", Mark::Behind),
-        ] {
+        let texts = [
+            "What is held.",
+            "Stops. It waits.",
+            "The same without limits.",
+            "Fails where the arm moves.",
+            "The client of which it is.",
+            "120 % is no speed.",
+            "The host has to wait.",
+            "Sent so many times.",
+            "Whoever asks gets it.",
+            "Frames behind a Stop.",
+        ];
+        for (text, (mark, _)) in texts.into_iter().zip(MARKS) {
             assert!(find(text).iter().any(|(found, _)| *found == mark), "{text}: {:?}", find(text));
         }
         let plain = "Stops the arm on its path. Returns when the controller reports that the arm is at rest.";
         assert_eq!(find(plain), []);
-        assert_eq!(PATTERNS.len(), Mark::ALL.len(), "all of them are patterns");
+        assert_eq!(PATTERNS.len(), MARKS.len(), "all of them are patterns");
     }
 
     #[test]

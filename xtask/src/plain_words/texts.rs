@@ -28,12 +28,13 @@ impl Text {
 
 /// The prose of a file with this extension.
 pub fn of(source: &str, extension: &str) -> Vec<Text> {
-    match extension {
-        "rs" => rust(source),
-        "md" => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, Some(line)))),
-        "py" | "pyi" | "toml" => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, hash(line)))),
-        _ => paragraphs(source.lines().enumerate().map(|(i, line)| (i + 1, slashes(line)))),
-    }
+    let prose: fn(&str) -> Option<&str> = match extension {
+        "rs" => return rust(source),
+        "md" => |line| Some(line),
+        "py" | "pyi" | "toml" => |line| comment_or_prose(line, "# "),
+        _ => |line| comment_or_prose(line, "// "),
+    };
+    paragraphs((1..).zip(source.lines().map(prose)))
 }
 
 /// Lines that follow each other are one text, outside fenced code. A list item begins a new one.
@@ -56,25 +57,16 @@ fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<
     texts
 }
 
-/// A comment of Python or TOML, and what may be a line of a docstring.
-fn hash(line: &str) -> Option<&str> {
+/// A comment after `mark`, and what may be a line of a longer comment or of a docstring.
+fn comment_or_prose<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     let line = line.trim();
-    match line.split_once("# ") {
+    match line.split_once(mark) {
         Some((_, comment)) => Some(comment),
         None => Some(line.trim_matches('"')).filter(|line| is_prose(line)),
     }
 }
 
-/// A comment of TypeScript or of a page, and what may be a line of a longer one.
-fn slashes(line: &str) -> Option<&str> {
-    let line = line.trim();
-    match line.split_once("// ") {
-        Some((_, comment)) => Some(comment),
-        None => is_prose(line).then_some(line),
-    }
-}
-
-/// Most of it are words.
+/// Returns true if at least three quarters of the line are words.
 fn is_prose(line: &str) -> bool {
     let words =
         line.split_whitespace().filter(|word| word.chars().all(|c| c.is_alphabetic() || ",.'’".contains(c)));

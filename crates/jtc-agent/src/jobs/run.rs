@@ -121,7 +121,7 @@ fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Re
     Ok(Site { arm, options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() } })
 }
 
-/// What is run.
+/// Returns the trajectory of an order, and writes the notes of the planner into the journal.
 fn trajectory(
     task: &Task<'_>,
     order: &Order,
@@ -134,10 +134,7 @@ fn trajectory(
     let planned = order.course.planned(&site.arm, device, &here, order.speed_percent, speed);
     let planned = planned.map_err(|error| {
         let object = ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error));
-        match order.course {
-            Course::Along(_) => object,
-            Course::To { .. } => object.message(error.of_move()),
-        }
+        object.message(order.course.message(&error))
     })?;
     planned.notes.into_iter().for_each(|text| task.note(text));
     Ok(planned.trajectory)
@@ -157,7 +154,7 @@ struct RunJob<'a> {
     began: Duration,
     digest: Rc<RefCell<Digest>>,
     reported: Instant,
-    /// Who waits for what comes of the last wish.
+    /// Client that waits for the result of its last request.
     wish: Option<oneshot::Sender<Result<(), ErrorObject>>>,
 }
 
@@ -272,8 +269,6 @@ impl Observer<ClientPort> for RunJob<'_> {
         }
         Ok(())
     }
-
-    fn goes_on(&mut self, _: u32) {}
 }
 
 /// Why a motion was not begun, or failed: an error, or a client that stopped it.

@@ -239,7 +239,7 @@ impl SharedLine {
         if let Class::Halt(command) = frame.class {
             let (name, before) = (self.name(id), self.halted.0);
             self.halt(id, &name, command, now);
-            // The client knows of its own Stop.
+            // A client's own Stop does not invalidate its next request.
             if let Some(client) = self.clients.get_mut(&id)
                 && client.asked_after == before
             {

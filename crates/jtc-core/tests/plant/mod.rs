@@ -220,7 +220,7 @@ impl Plant {
         }
     }
 
-    /// The same with elastic gears of so many N·m/rad, twisted as the load wants it. The drives measure the position of the link and the
+    /// Returns this arm with elastic gears of `stiffness` N·m/rad, twisted by its load. The drives measure the position of the link and the
     /// speed of the motor; rotors and friction are on the motors' side.
     pub fn elastic(mut self, stiffness: f64) -> Self {
         let load = self.dynamics.gravity_torque(&self.q);

@@ -124,7 +124,7 @@ impl Facts {
         }
     }
 
-    /// Those of a motion that does not begin.
+    /// Facts of a motion that does not begin.
     pub fn of_start(error: &StartError) -> Self {
         match error {
             StartError::Check(CheckError::Refused(verdict))

@@ -34,12 +34,20 @@ pub struct Planned {
 }
 
 impl Course {
+    /// Returns the message of an error of [`Course::planned`].
+    pub fn message(&self, error: &PlanError) -> String {
+        match self {
+            Self::Along(_) => error.to_string(),
+            Self::To { .. } => error.of_move(),
+        }
+    }
+
     /// Returns the trajectory, for an arm that stands at `here` (rad) on a controller with the settings `device`. `speed_pct`: % of the
     /// speed of a trajectory that is given; `move_speed`: speed of a move, which the option `option` sets.
     ///
     /// # Errors
     ///
-    /// [`PlanError`]; for a move [`PlanError::of_move`] has the better message.
+    /// [`PlanError`]; [`Course::message`] has its message.
     pub fn planned(
         &self,
         arm: &Arm,

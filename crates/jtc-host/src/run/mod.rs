@@ -143,7 +143,7 @@ pub trait Observer<P: Port> {
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
     /// Run `n` (from 1) has finished, and another one follows.
-    fn goes_on(&mut self, n: u32);
+    fn goes_on(&mut self, _n: u32) {}
 }
 
 /// Runs all motions of `order` on an arm that was held at `status`, until one does not finish. **The arm moves.**

@@ -291,8 +291,6 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         Ok(())
     }
-
-    fn goes_on(&mut self, _: u32) {}
 }
 
 impl Follower<'_> {
@@ -328,7 +326,7 @@ fn not_begun(error: &StartError) -> Failure {
     }
 }
 
-/// What is run, and what was changed for it.
+/// Returns the trajectory of an order, and the notes of the planner.
 fn trajectory(
     order: &Order,
     arm: &Arm,
@@ -338,10 +336,8 @@ fn trajectory(
 ) -> Result<(Arc<Trajectory>, Vec<String>), Failure> {
     let speed = (move_speed, "`speed=`");
     let planned = order.course.planned(arm, &options.device, &status.positions(), order.speed, speed);
-    let planned = planned.map_err(|error| match order.course {
-        Course::Along(_) => Failure::from(error),
-        Course::To { .. } => Failure { message: error.of_move(), ..Failure::from(error) },
-    })?;
+    let planned =
+        planned.map_err(|error| Failure { message: order.course.message(&error), ..Failure::from(error) })?;
     Ok((planned.trajectory, planned.notes))
 }
 

@@ -32,8 +32,8 @@ pub struct Reel {
     pub tape: Option<Tape>,
     /// Begin of its first motion, on the clock of the session.
     start: Duration,
-    /// Time right after its last sample, s. The samples of the next motion come after it even if the controller's time runs ahead of ours, as
-    /// that of a simulator does that is faster than time.
+    /// Earliest time of the next sample, s: right after the last one. The controller's time may run ahead of ours, in a simulator that is
+    /// faster than real time.
     until_s: f64,
 }
 
@@ -43,7 +43,7 @@ impl Reel {
     }
 }
 
-/// What was seen of a run.
+/// Recording and figures of a run.
 pub struct Taken {
     /// Motions before the last one.
     pub done: Finished,
@@ -102,7 +102,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
         }
     }
 
-    /// What was seen of the run.
+    /// Returns the recording and the figures of the run.
     pub fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
         // Each motion begins it before it moves.

@@ -398,6 +398,7 @@ on('no width scrolls sideways, and axe finds nothing, light and dark', { boards:
     await page.getByRole('button', { name: 'Plot position' }).click();
     await page.locator('.uplot canvas').waitFor();
     await flaws(page, `plot ${width} ${colorScheme}`);
+    await page.context().close();
   }
 });
 

@@ -136,12 +136,18 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   await state(page).getByText('Holding').waitFor();
   // A picture that is drawn for the first time keeps a computer without graphics busy.
   await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0));
+  await jtc(['example', 'motion', '-o', agent.dir]);
+  await page.click('#tab-run');
+  const file = await page.getByLabel('Trajectory file').elementHandle();
   agent.suspend();
   await passes(page, 2000);
   await page.getByText('No connection', { exact: true }).first().waitFor();
+  // The window in which somebody looks for a file stays open longer than that.
+  await file.setInputFiles(join(agent.dir, 'motion.csv'));
   agent.wake();
   await page.clock.resume();
   await state(page).getByText('Holding').waitFor();
+  await page.getByText('Passed the check').waitFor();
   await until('positions are shown', async () => /\d/.test(await page.locator('.bars .joint .value').first().innerText()));
 });
 

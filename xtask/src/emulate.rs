@@ -100,7 +100,7 @@ fn tests() -> Result<Outcome> {
         result?;
         ensure!(counts.passed > 0, "cargo ran no test at all");
     }
-    Ok(Outcome::Counted(counts))
+    Ok(Outcome::Counted(counts, String::new()))
 }
 
 /// From a robot description to a motion, on the program that is flashed.

@@ -157,7 +157,7 @@ pub fn tests() -> Result<Outcome> {
     if counts.failed == 0 {
         result?;
     }
-    Ok(Outcome::Counted(counts))
+    Ok(Outcome::Counted(counts, String::new()))
 }
 
 /// `arguments`: names of boards; none means all.

@@ -7,7 +7,7 @@ use crate::beside;
 use crate::python;
 use crate::shell::{self, Scratch, root, run};
 use crate::suite;
-use crate::tally::{Counts, Outcome, Tally};
+use crate::tally::{self, Counts, Outcome, Tally};
 
 /// What builds it and what its tests need.
 const REQUIREMENTS: &str = "requirements-package.txt";
@@ -103,7 +103,7 @@ fn tested(wheel: &Path) -> Result<Outcome> {
     let counts = counted(&ended.output);
     ensure!(ended.passed || counts.failed > 0, "the tests broke off");
     ensure!(counts.passed > 0, "no test was run at all");
-    Ok(Outcome::Counted(counts))
+    Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
 }
 
 /// The numbers in the last line of pytest.

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::beside::{self, Ended};
 use crate::shell::{self, cargo, run_lines};
-use crate::tally::{Counts, Outcome};
+use crate::tally::{self, Counts, Outcome};
 
 /// The tests of one file of a crate, or all of a program that is no `suite`.
 struct Program {
@@ -32,7 +32,8 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
     programs()?;
     built();
     let mut counts = Counts::default();
-    let failures = run_all(tests, &mut counts)?;
+    let mut printed = String::new();
+    let failures = run_all(tests, &mut counts, &mut printed)?;
     let mut documentation = cargo(&["test", "--release", "--workspace", "--no-fail-fast", "--doc"]);
     let documented = run_lines(&mut documentation, |line| count_results(line, &mut counts));
     for failure in &failures {
@@ -44,7 +45,7 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
         documented?;
         ensure!(counts.passed > 0, "no test was run at all");
     }
-    Ok(Outcome::Counted(counts))
+    Ok(Outcome::Counted(counts, printed))
 }
 
 /// Builds the commands and the examples with the dependencies that the tests have. Returns their folder.
@@ -109,8 +110,9 @@ const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
 /// What `env` of the GNU tools is given to begin a program that heeds these signals.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
-/// Runs all of them, and prints of each what it printed once it has ended. Names those that failed.
-fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
+/// Runs all of them, and prints of each what it printed once it has ended. Names those that failed, and adds what these printed of their
+/// failures to `printed`.
+fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) -> Result<Vec<String>> {
     let mut failures = Vec::new();
     let ended = |program: Program, ended: Result<Ended>| {
         let package = program.package.file_name().unwrap_or_default().to_string_lossy();
@@ -120,6 +122,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts) -> Result<Vec<String>> {
                 println!("\n$ {name} ({seconds:.1} s)\n{}", output.trim());
                 output.lines().for_each(|line| count_results(line, counts));
                 if !passed {
+                    printed.push_str(tally::failures(&output, "failures:"));
                     failures.push(name);
                 }
             }

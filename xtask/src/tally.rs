@@ -8,8 +8,8 @@ use anyhow::Result;
 pub enum Outcome {
     /// One check, passed.
     Passed,
-    /// Several tests of which each counts.
-    Counted(Counts),
+    /// Several tests of which each counts, and what the failed ones printed.
+    Counted(Counts, String),
     /// Not run, and why.
     Skipped(String),
 }
@@ -59,12 +59,14 @@ impl Tally {
                 self.counts.passed += 1;
                 println!("-- {title}: ok ({seconds:.1} s)");
             }
-            Ok(Outcome::Counted(counts)) => {
+            Ok(Outcome::Counted(counts, printed)) => {
                 self.counts.passed += counts.passed;
                 self.counts.failed += counts.failed;
                 self.counts.skipped += counts.skipped;
                 if counts.failed > 0 {
-                    self.failures.push(format!("{title}: {} failed", counts.failed));
+                    // Again at the end: whoever reads the last part of a long log sees why.
+                    let failure = format!("{title}: {} failed\n{}", counts.failed, printed.trim());
+                    self.failures.push(failure.trim_end().to_owned());
                 }
                 println!(
                     "-- {title}: {} passed, {} failed, {} skipped ({seconds:.1} s)",
@@ -96,5 +98,25 @@ impl Tally {
         let Counts { passed, failed, skipped } = self.counts;
         println!("{passed} passed, {failed} failed, {skipped} skipped");
         if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    }
+}
+
+/// What tests printed of their failures: all from the first line that begins with `heading`.
+pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
+    let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
+    let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();
+    &output[before..]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_are_the_text_from_their_heading_on() {
+        let output = "test a ... FAILED\n\nfailures:\n\n---- a ----\nleft: 1\n\nfailures:\n    a\n";
+        assert_eq!(failures(output, "failures:"), "failures:\n\n---- a ----\nleft: 1\n\nfailures:\n    a\n");
+        assert_eq!(failures("..F\n=== FAILURES ===\n__ a __\n", "FAILURES"), "=== FAILURES ===\n__ a __\n");
+        assert_eq!(failures("all is well\n", "failures:"), "");
     }
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use crate::beside::{self, Ended};
 use crate::python;
 use crate::shell::{self, Scratch, run};
-use crate::tally::{Counts, Outcome, Tally};
+use crate::tally::{self, Counts, Outcome, Tally};
 
 /// Where Debian puts the browser.
 pub const BROWSER: &str = "/usr/bin/chromium";
@@ -119,5 +119,5 @@ pub fn counted(Ended { output, passed, seconds }: &Ended) -> Result<Outcome> {
     let counts = Counts { passed: number("pass "), failed: number("fail "), skipped: number("skipped ") };
     ensure!(*passed || counts.failed > 0, "the tests broke off");
     ensure!(counts.passed > 0, "no test was run at all");
-    Ok(Outcome::Counted(counts))
+    Ok(Outcome::Counted(counts, tally::failures(output, "✖ failing tests:").to_owned()))
 }

@@ -1,1 +1,0 @@
-import{K as e,N as t,Y as n,j as r,ot as i}from"./session.svelte-DYvXSJfq.js";import a from"./EventsCard-D-7f6t89.js";import{t as o}from"./ReportLinks-BDNQ7sgA.js";var s=t(`<div class="stack"><!> <!></div>`);function c(t){var c=s(),l=e(c);o(l,{});var u=n(l,2);a(u,{}),i(c),r(t,c)}export{c as default};

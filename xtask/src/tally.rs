@@ -8,7 +8,7 @@ use anyhow::Result;
 pub enum Outcome {
     /// One check, passed.
     Passed,
-    /// Several tests of which each counts, and what the failed ones printed.
+    /// Numbers of several tests, and the output of those that failed.
     Counted(Counts, String),
     /// Not run, and why.
     Skipped(String),
@@ -64,7 +64,7 @@ impl Tally {
                 self.counts.failed += counts.failed;
                 self.counts.skipped += counts.skipped;
                 if counts.failed > 0 {
-                    // Again at the end: whoever reads the last part of a long log sees why.
+                    // Repeated at the end: the last part of a long log shows the reason.
                     let failure = format!("{title}: {} failed\n{}", counts.failed, printed.trim());
                     self.failures.push(failure.trim_end().to_owned());
                 }
@@ -101,7 +101,7 @@ impl Tally {
     }
 }
 
-/// What tests printed of their failures: all from the first line that begins with `heading`.
+/// Returns the output from the first line on that begins with `heading`: there test runners describe the failures.
 pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

@@ -5,7 +5,7 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use utoipa::IntoResponses;
 
-pub use crate::problem::{Bounds, Facts, Problem, ProblemWith};
+pub use crate::problem::Problem;
 
 /// What every request may be refused with.
 #[derive(IntoResponses)]

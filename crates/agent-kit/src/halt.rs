@@ -4,7 +4,7 @@ use axum::http::request::Parts;
 use utoipa::IntoParams;
 
 use crate::api::{Asked, Problem};
-use crate::problem::Bounds;
+use host_kit::Facts;
 
 /// What counts the halts that were asked for.
 pub trait Halts {
@@ -40,9 +40,8 @@ impl KnownHalt {
                 let message = format!(
                     "asked_after {known}: this agent has counted {last} halts; it may have been started again"
                 );
-                let bounds = Bounds { value: Some(known as f64), limit: Some(last as f64) };
                 Err(Problem::new("request", message, "GET /api/status has last_halt")
-                    .with(bounds)
+                    .with(Facts::beyond(known as f64, last as f64))
                     .unreadable())
             }
             known => Ok(AskedAfter(known.unwrap_or(last))),

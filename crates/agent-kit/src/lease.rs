@@ -6,7 +6,7 @@ use axum::http::HeaderMap;
 use host_kit::ErrorKind;
 use utoipa::{IntoParams, ToSchema};
 
-use crate::api::{Problem, ProblemWith};
+use crate::api::Problem;
 
 /// The header with the key of a lease.
 pub const KEY: &str = "lease-key";
@@ -119,7 +119,7 @@ pub enum Denied {
     Full,
 }
 
-impl<F: Default> From<Denied> for ProblemWith<F> {
+impl From<Denied> for Problem {
     fn from(denied: Denied) -> Self {
         let text = denied.to_string();
         match denied {

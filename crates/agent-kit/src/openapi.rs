@@ -1,18 +1,65 @@
 //! Parts of the descriptions of APIs, OpenAPI 3.1.
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::routing::{MethodRouter, get};
 use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
-use utoipa::openapi::{OpenApi, RefOr, Response};
+use utoipa::openapi::{OpenApi, Ref, RefOr, Response};
 use utoipa::{IntoResponses, Modify};
 
 use crate::api::Problem;
 
-/// The description as JSON.
+/// Returns the description as JSON. Each response that several operations have stands in it once.
 pub fn text(description: &OpenApi) -> String {
-    // It is made of strings.
+    let mut description = description.clone();
+    share_responses(&mut description);
+    // Its keys are strings: this cannot fail.
     description.to_pretty_json().unwrap_or_default()
+}
+
+/// Moves responses that several operations have to the components, under the name of their status: `NotFound`, `NotFound2`.
+fn share_responses(description: &mut OpenApi) {
+    let mut counts: Vec<(String, RefOr<Response>, u32)> = Vec::new();
+    for_each_response(description, |status, response| {
+        match counts.iter_mut().find(|(of, same, _)| of == status && same == response) {
+            Some((.., count)) => *count += 1,
+            None => counts.push((status.to_owned(), response.clone(), 1)),
+        }
+    });
+    counts.retain(|(.., count)| *count > 1);
+    // The most frequent one of a status has the name without a number.
+    counts.sort_by_key(|(status, _, count)| (status.clone(), Reverse(*count)));
+    let mut names: Vec<String> = Vec::new();
+    for (i, (status, ..)) in counts.iter().enumerate() {
+        let number = counts[..i].iter().filter(|(other, ..)| other == status).count() + 1;
+        let name = status_name(status);
+        names.push(if number == 1 { name } else { format!("{name}{number}") });
+    }
+    for_each_response(description, |status, response| {
+        if let Some(i) = counts.iter().position(|(of, same, _)| of == status && same == response) {
+            *response = RefOr::Ref(Ref::from_response_name(&names[i]));
+        }
+    });
+    let shared = names.into_iter().zip(counts.into_iter().map(|(_, response, _)| response));
+    description.components.get_or_insert_default().responses.extend(shared);
+}
+
+/// Calls `act` with the status and the response of every operation.
+fn for_each_response(description: &mut OpenApi, mut act: impl FnMut(&str, &mut RefOr<Response>)) {
+    for item in description.paths.paths.values_mut() {
+        let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.patch, &mut item.delete];
+        for operation in operations.into_iter().flatten() {
+            operation.responses.responses.iter_mut().for_each(|(status, response)| act(status, response));
+        }
+    }
+}
+
+/// Returns the name of a status without spaces: `NotFound` of 404.
+fn status_name(status: &str) -> String {
+    let code = status.parse().ok().and_then(|code: u16| StatusCode::from_u16(code).ok());
+    let reason = code.and_then(|code| code.canonical_reason()).unwrap_or("Response");
+    reason.replace(' ', "")
 }
 
 /// Serves the description.
@@ -64,4 +111,45 @@ pub fn denials(denied: &str, lost: &str) -> BTreeMap<String, RefOr<Response>> {
         }
     }
     responses
+}
+
+#[cfg(test)]
+mod tests {
+    use utoipa::openapi::path::{HttpMethod, Operation};
+    use utoipa::openapi::{PathItem, ResponseBuilder};
+
+    use super::*;
+
+    fn operation(responses: &[(&str, &str)]) -> Operation {
+        let mut operation = Operation::default();
+        for (status, words) in responses {
+            let response = ResponseBuilder::new().description(*words).build();
+            operation.responses.responses.insert((*status).to_owned(), response.into());
+        }
+        operation
+    }
+
+    #[test]
+    fn a_response_that_several_operations_have_stands_in_the_description_once() {
+        let mut description = OpenApi::default();
+        let own = [("200", "one"), ("200", "two"), ("404", "no pose")];
+        for (i, own) in own.into_iter().enumerate() {
+            let operation = operation(&[own, ("409", "refused")]);
+            description.paths.paths.insert(format!("/{i}"), PathItem::new(HttpMethod::Get, operation));
+        }
+        let item = PathItem::new(HttpMethod::Put, operation(&[("404", "no pose"), ("409", "other")]));
+        description.paths.paths.insert("/put".into(), item);
+        share_responses(&mut description);
+        let shared = &description.components.as_ref().expect("there are shared ones").responses;
+        assert_eq!(shared.keys().collect::<Vec<_>>(), ["Conflict", "NotFound"]);
+        let mut left = Vec::new();
+        for_each_response(&mut description, |status, response| match response {
+            RefOr::Ref(to) => left.push(format!("{status} {}", to.ref_location)),
+            RefOr::T(response) => left.push(format!("{status} {}", response.description)),
+        });
+        left.sort();
+        let conflict = "409 #/components/responses/Conflict";
+        let found = "404 #/components/responses/NotFound";
+        assert_eq!(left, ["200 one", "200 two", found, found, conflict, conflict, conflict, "409 other"]);
+    }
 }

@@ -1,69 +1,35 @@
 //! Why something was not done: one object, whatever it was.
 use std::borrow::Cow;
+use std::ops::Deref;
 
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
-use serde::Serialize;
-
-use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Object, RefOr};
+use host_kit::{Diagnose, ErrorKind, Facts, Failure};
+use serde::{Serialize, Serializer};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::Schema;
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::cut::cut_middle;
 
-/// Why something was not done, with the facts that an agent adds.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ProblemWith<F> {
-    /// Short name, for programs.
-    pub code: &'static str,
-    /// What was wrong, for people.
-    pub message: Box<str>,
-    /// What an agent knows of it beside that.
-    #[serde(flatten)]
-    pub facts: F,
-    /// What helps.
-    pub next: Box<str>,
-    #[serde(skip)]
+/// Why something was not done, as an agent answers it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    failure: Failure,
     status: StatusCode,
 }
 
-/// Why something was not done.
-pub type Problem = ProblemWith<Bounds>;
-
-/// What every agent can say of an error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
-pub struct Bounds {
-    /// What was found, in the unit of the message.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-    /// What is allowed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limit: Option<f64>,
-}
-
-/// What an agent knows of an error beside what every agent does.
-pub trait Facts: Default + From<Bounds> {
-    /// The error of its library.
-    type Error: Diagnose;
-
-    /// What is known of it.
-    fn of(error: &Self::Error) -> Self;
-}
-
-impl<F: Default> ProblemWith<F> {
+impl Problem {
     /// Something that was refused, with what helps.
     pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<String>) -> Self {
-        let (message, next) = (message.into().into(), next.into().into());
-        Self { code, message, facts: F::default(), next, status: StatusCode::CONFLICT }
+        let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next.into());
+        Self { failure, status: StatusCode::CONFLICT }
     }
 
-    /// An error that knows what helps.
-    pub fn diagnosed(error: &impl Diagnose) -> Self {
-        let Diagnosis { kind, code, next } = error.diagnosis();
-        // Marks of code in the texts for terminals.
-        Self::new(code, error.to_string(), next.replace('`', "")).kind(kind)
+    /// An error of a library, with all that it knows.
+    pub fn of(error: &impl Diagnose) -> Self {
+        Failure::of(error).into()
     }
 
     /// What was sent cannot be read; the message may have parts of it.
@@ -81,22 +47,22 @@ impl<F: Default> ProblemWith<F> {
 
     /// Of this kind.
     pub fn kind(self, kind: ErrorKind) -> Self {
-        Self { status: status(kind), ..self }
+        Failure { kind, ..self.failure }.into()
     }
 
     /// In these words.
     pub fn message(self, message: impl Into<String>) -> Self {
-        Self { message: message.into().into(), ..self }
+        Self { failure: Failure { message: message.into(), ..self.failure }, ..self }
     }
 
     /// With this that helps.
     pub fn next(self, next: impl Into<String>) -> Self {
-        Self { next: next.into().into(), ..self }
+        Self { failure: self.failure.next(next.into()), ..self }
     }
 
     /// With these facts.
-    pub fn with(self, facts: impl Into<F>) -> Self {
-        Self { facts: facts.into(), ..self }
+    pub fn with(self, facts: Facts) -> Self {
+        Self { failure: self.failure.with(facts), ..self }
     }
 
     /// Who asks may not ask for that, whatever goes on.
@@ -110,58 +76,101 @@ impl<F: Default> ProblemWith<F> {
     }
 }
 
-impl<F: Facts> ProblemWith<F> {
-    /// An error of the agent's library, with all that it knows.
-    pub fn of(error: &F::Error) -> Self {
-        Self::diagnosed(error).with(F::of(error))
+impl Deref for Problem {
+    type Target = Failure;
+
+    fn deref(&self) -> &Failure {
+        &self.failure
     }
 }
 
-impl<F: Facts> From<Problem> for ProblemWith<F> {
-    fn from(problem: Problem) -> Self {
-        let Problem { code, message, facts, next, status } = problem;
-        Self { code, message, facts: F::from(facts), next, status }
+impl From<Failure> for Problem {
+    fn from(failure: Failure) -> Self {
+        Self { status: status(failure.kind), failure }
     }
 }
 
-impl<F: Serialize> IntoResponse for ProblemWith<F> {
+impl Serialize for Problem {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        ErrorObject::from(&self.failure).serialize(serializer)
+    }
+}
+
+/// Why something was not done.
+#[derive(Serialize, ToSchema)]
+struct ErrorObject<'a> {
+    /// Short name, for programs.
+    code: &'a str,
+    /// What was wrong, for people.
+    message: &'a str,
+    /// Board of a chain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board: Option<u8>,
+    /// Joint of an arm, 1 to 6 from the base.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joint: Option<u8>,
+    /// Point of the trajectory, from 0; in motion the 1 ms point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    point: Option<u32>,
+    /// What was found, in the unit of the message.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    value: Option<f64>,
+    /// What is allowed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limit: Option<f64>,
+    /// What usually causes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>)]
+    cause: Option<&'static str>,
+    /// What helps.
+    next: String,
+}
+
+impl<'a> From<&'a Failure> for ErrorObject<'a> {
+    fn from(failure: &'a Failure) -> Self {
+        // JSON has no word for what is no number.
+        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+        let Facts { board, joint, point, value, limit, cause, .. } = *failure.facts;
+        Self {
+            code: failure.code,
+            message: &failure.message,
+            board,
+            joint,
+            point,
+            value: finite(value),
+            limit: finite(limit),
+            cause,
+            // Marks of code in the texts for terminals.
+            next: failure.next.replace('`', ""),
+        }
+    }
+}
+
+impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let denial = Denial { code: self.code, why: self.message.clone() };
+        let denial = Denial { code: self.code, why: self.message.as_str().into() };
         let mut response = (self.status, Json(self)).into_response();
         response.extensions_mut().insert(denial);
         response
     }
 }
 
-/// A response is a [`ProblemWith`]: for whoever writes down what was not done.
+/// A response is a [`Problem`]: for whoever writes down what was not done.
 #[derive(Clone, Debug)]
 pub(crate) struct Denial {
     pub code: &'static str,
     pub why: Box<str>,
 }
 
-impl<F: PartialSchema> PartialSchema for ProblemWith<F> {
+impl PartialSchema for Problem {
     fn schema() -> RefOr<Schema> {
-        let text = |what: &str| ObjectBuilder::new().schema_type(Type::String).description(Some(what));
-        let mut object: Object = ObjectBuilder::new()
-            .description(Some("Why something was not done."))
-            .property("code", text("Short name, for programs."))
-            .property("message", text("What was wrong, for people."))
-            .property("next", text("What helps."))
-            .required("code")
-            .required("message")
-            .required("next")
-            .build();
-        if let RefOr::T(Schema::Object(facts)) = F::schema() {
-            object.properties.extend(facts.properties);
-        }
-        object.into()
+        ErrorObject::schema()
     }
 }
 
-impl<F: PartialSchema> ToSchema for ProblemWith<F> {
+impl ToSchema for Problem {
     fn name() -> Cow<'static, str> {
-        "ErrorObject".into()
+        ErrorObject::name()
     }
 }
 

@@ -24,8 +24,8 @@ pub mod view;
 mod within;
 
 pub use bar::{Stderr, draws_bars};
-pub use failure::Failure;
-pub use host_kit::{Diagnose, ErrorKind};
+pub use failure::error_object;
+pub use host_kit::{Diagnose, ErrorKind, Failure};
 pub use indicatif::ProgressBar;
 pub use keys::{Key, Keys};
 pub use lines::Lines;

@@ -12,9 +12,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::bar::{self, suspended};
-use crate::failure::Failure;
 use crate::lines::Lines;
 use crate::stdout;
+use crate::{Failure, error_object};
 
 /// Events of this process that wait for their reader; none where it streams nothing.
 static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
@@ -148,9 +148,9 @@ impl Output {
     /// Prints why a command failed.
     pub fn failure(&self, failure: &Failure) {
         if self.json {
-            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": failure.to_json() }));
+            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error_object(failure) }));
         }
-        self.warn(&failure.message, &failure.hint);
+        self.warn(&failure.message, &failure.next);
     }
 
     /// What is wrong and what to do next, as it is printed at the end of a command; on a terminal broken between words.

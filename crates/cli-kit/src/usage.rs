@@ -9,7 +9,7 @@ use clap::Parser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::variables::{Variables, on_off};
-use crate::{Failure, Output, exit, print_within};
+use crate::{Failure, Output, error_object, exit, print_within};
 
 /// A command waits no longer than this for the reader of what is printed before it begins.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
@@ -40,7 +40,7 @@ pub fn parse_with<Cli: Parser>(
             let report = variables.report(program, &command, &matches, value);
             if let Some(refused) = report.refused {
                 out.failure(&refused);
-                return Err(ExitCode::from(refused.exit()));
+                return Err(ExitCode::from(exit::of(refused.kind)));
             }
             let lines: Vec<String> = report.ignored.into_iter().chain(report.in_effect).collect();
             if !lines.is_empty() {
@@ -65,7 +65,7 @@ pub fn parse_with<Cli: Parser>(
         let (message, hint) = words(&e, program);
         let hint =
             [hint].into_iter().chain(lines).filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
-        let error = Failure::usage(message).hint(hint).to_json();
+        let error = error_object(&Failure::usage(message).next(hint));
         Output::bytes(format!("{}\n", serde_json::json!({ "error": error })).as_bytes());
     }
     Err(ExitCode::from(exit::USAGE))

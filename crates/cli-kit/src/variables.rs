@@ -236,7 +236,7 @@ impl Unread {
             "{variable}={value} is set, and {} does not read it any more; nothing was sent",
             chosen.typed()
         ))
-        .hint(format!("type {}, or unset {variable}", self.options.join(" or ")))
+        .next(format!("type {}, or unset {variable}", self.options.join(" or ")))
     }
 }
 

@@ -1,18 +1,18 @@
-//! What there is to know of an error beside its words: its kind, a short name, and what helps.
+//! Errors with a kind, a short name, a next step and facts.
 
 use std::error::Error;
 use std::io;
 
-use crate::ErrorKind;
+use crate::{ErrorKind, Facts};
 
-/// What a caller can act on without knowing each error.
+/// Parts of an error that a caller can use without a `match` of its variants.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnosis {
-    /// What kind of failure it is.
+    /// Kind of failure.
     pub kind: ErrorKind,
     /// A short name for programs.
     pub code: &'static str,
-    /// The next command or act that helps; empty when there is none.
+    /// Next step; empty if no step helps.
     pub next: String,
 }
 
@@ -28,7 +28,12 @@ pub trait Diagnose: Error {
     /// Kind, name and what helps.
     fn diagnosis(&self) -> Diagnosis;
 
-    /// What kind of failure it is.
+    /// Returns place and size of the error.
+    fn facts(&self) -> Facts {
+        Facts::default()
+    }
+
+    /// Returns the kind of failure.
     fn kind(&self) -> ErrorKind {
         self.diagnosis().kind
     }
@@ -38,13 +43,13 @@ pub trait Diagnose: Error {
         self.diagnosis().code
     }
 
-    /// The next command or act that helps; empty when there is none.
+    /// Returns the next step; empty if no step helps.
     fn hint(&self) -> String {
         self.diagnosis().next
     }
 }
 
-/// What the system did not give: a file or a thread that a caller asked for.
+/// An error of the operating system about a file or a thread.
 impl Diagnose for io::Error {
     fn diagnosis(&self) -> Diagnosis {
         Diagnosis::new(ErrorKind::Usage, "io", "")

@@ -3,6 +3,8 @@
 
 mod clock;
 mod diagnosis;
+mod facts;
+mod failure;
 mod finding;
 mod kind;
 mod likeness;
@@ -13,6 +15,8 @@ mod whole;
 
 pub use clock::unix_time;
 pub use diagnosis::{Diagnose, Diagnosis};
+pub use facts::{Facts, HeldStopFacts};
+pub use failure::Failure;
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;
 pub use likeness::{likeness, nearest};

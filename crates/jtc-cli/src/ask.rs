@@ -8,7 +8,7 @@ use std::io::{BufRead, IsTerminal, Write};
 pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)
-            .hint(format!("nothing was sent; {option} answers yes"))
+            .next(format!("nothing was sent; {option} answers yes"))
     };
     if !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
         return Err(refused(format!("{question}: nobody can be asked without a terminal")));

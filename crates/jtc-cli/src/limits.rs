@@ -1,6 +1,6 @@
 //! What of an arm file a controller does not use: listed, and refused where it matters.
 
-use cli_kit::{ErrorKind, Failure, Output};
+use cli_kit::{ErrorKind, Failure, Output, error_object};
 use jtc_core::Config;
 use jtc_host::arm::{Arm, Difference, NOT_CARRIED};
 use serde_json::json;
@@ -60,7 +60,7 @@ fn listed(
     }
     let message = message(differences.len());
     if out.is_json() {
-        let error = Failure::new(ErrorKind::Refused, code, &message).hint(hint).to_json();
+        let error = error_object(&Failure::new(ErrorKind::Refused, code, &message).next(hint));
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);
     }
     out.note(format!("jtc: {message}"));
@@ -68,5 +68,5 @@ fn listed(
         out.note(format!("     {difference}"));
     }
     out.note(format!("     {hint}"));
-    Err(Failure::printed(ErrorKind::Refused))
+    Err(Failure::shown(ErrorKind::Refused))
 }

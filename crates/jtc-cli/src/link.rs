@@ -57,7 +57,7 @@ impl LinkArgs {
                     "--when-gone {policy} needs an agent: over {name} a motion goes on without this program"
                 );
                 return Err(Failure::nothing_sent(Failure::usage(what))
-                    .hint(format!("`jtc serve --port {name}` is one")));
+                    .next(format!("`jtc serve --port {name}` is one")));
             }
             return Ok(SerialPort::open(&name, self.baud).map(|port| Box::new(port) as LinkPort));
         };
@@ -65,7 +65,7 @@ impl LinkArgs {
         if !is_same_port(&port.hello().port, &name) {
             let what = format!("{}: the agent there has {}, not {name}", agent.url, port.hello().port);
             return Err(
-                Failure::nothing_sent(Failure::usage(what)).hint("name the agent with --port http://…")
+                Failure::nothing_sent(Failure::usage(what)).next("name the agent with --port http://…")
             );
         }
         Ok(Ok(Box::new(port)))
@@ -95,11 +95,11 @@ impl LinkArgs {
         let name = self.name()?;
         if is_agent(&name) {
             let what = format!("{name} is the address of an agent, and no port that another could own");
-            return Err(Failure::usage(what).hint("name a serial port; `jtc ports` lists them"));
+            return Err(Failure::usage(what).next("name a serial port; `jtc ports` lists them"));
         }
         if let Some(agent) = owner_of(&name) {
             return Err(Failure::from(PortError::Busy { path: name })
-                .hint(format!("an agent owns it: `--port {}` uses it", agent.url)));
+                .next(format!("an agent owns it: `--port {}` uses it", agent.url)));
         }
         // Other programs stop the arm through the agent.
         Ok(SerialPort::open_without_door(&name, self.baud)?)

@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     let moves = cli.command.moves();
     let done = commands::run(cli.command, &out);
     if let Err(failure) = &done
-        && !failure.printed
+        && !failure.is_shown()
     {
         out.failure(failure);
     }
@@ -44,10 +44,10 @@ fn main() -> ExitCode {
             }
         },
         Err(failure) => {
-            if let Some(why) = Output::lost().filter(|_| failure.printed) {
+            if let Some(why) = Output::lost().filter(|_| failure.is_shown()) {
                 out.note(format_args!("jtc: the result could not be printed: {why}"));
             }
-            ExitCode::from(failure.exit())
+            ExitCode::from(exit::of(failure.kind))
         }
     }
 }

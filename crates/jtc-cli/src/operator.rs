@@ -21,7 +21,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     output_file::abandon();
     let (done, written) = mpsc::channel();
     std::thread::spawn(move || {
-        out.failure(&Failure::new(ErrorKind::Fault, "ended-at-once", message).hint(hint));
+        out.failure(&Failure::new(ErrorKind::Fault, "ended-at-once", message).next(hint));
         Output::finish();
         let _ = done.send(());
     });

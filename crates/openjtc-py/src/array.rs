@@ -56,9 +56,12 @@ fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
         if let Some(joint) = row.iter().position(|value| !value.is_finite()) {
             let place = if rows.len() > 1 { format!("row {number}, ") } else { String::new() };
             let failure = Failure::usage(format!("{what}: {place}joint {} is {}", joint + 1, row[joint]));
-            let facts =
-                Facts { joint: Joint::from_index(joint), value: Some(row[joint]), ..Facts::default() };
-            return Err(Failure { facts: Box::new(facts), ..failure });
+            let facts = Facts {
+                joint: Joint::from_index(joint).map(Joint::number),
+                value: Some(row[joint]),
+                ..Facts::default()
+            };
+            return Err(failure.with(facts));
         }
     }
     Ok(())

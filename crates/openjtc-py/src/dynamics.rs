@@ -159,7 +159,7 @@ impl Dynamics {
             Err((_, error)) if one => Err(pose_failure(error)),
             Err((row, error)) => {
                 let failure = pose_failure(error);
-                Err(Failure { message: format!("row {row}: {}", failure.message), ..failure })
+                Err(failure.clone().message(format!("row {row}: {}", failure.message)))
             }
         }
     }

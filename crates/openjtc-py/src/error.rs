@@ -1,76 +1,76 @@
 //! Errors of the libraries as exceptions of Python, with all that they know.
 
-use host_kit::{Diagnose, ErrorKind};
-use jtc_host::error::Facts;
-use jtc_host::held_stop::HeldStop;
+use std::ops::{Deref, DerefMut};
+
+use host_kit::{Diagnose, ErrorKind, Facts};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// An error on its way to Python: what `openjtc.Error` has.
+/// A failure on its way to Python, where it becomes an exception.
 #[derive(Clone, Debug)]
-pub struct Failure {
-    /// What kind of failure it is, which selects the class.
-    pub kind: ErrorKind,
-    /// A short name for programs.
-    pub code: String,
-    /// What was asked for, where, value and limit.
-    pub message: String,
-    /// The next act that helps; empty when there is none.
-    pub next: String,
-    /// Where it is, and by how much.
-    pub facts: Box<Facts>,
-}
+pub struct Failure(host_kit::Failure);
 
 impl Failure {
-    /// Of an error of the libraries, without facts beside its words.
+    /// Of an error of the libraries.
     pub fn of(error: &impl Diagnose) -> Self {
-        Self::with(error, Facts::default())
+        Self(host_kit::Failure::of(error))
     }
 
-    /// Of an error of the libraries.
-    pub fn with(error: &impl Diagnose, facts: Facts) -> Self {
-        let diagnosis = error.diagnosis();
-        Self {
-            kind: diagnosis.kind,
-            code: diagnosis.code.to_owned(),
-            message: error.to_string(),
-            next: diagnosis.next,
-            facts: Box::new(facts),
-        }
+    /// A failure of a kind.
+    pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
+        Self(host_kit::Failure::new(kind, code, message))
     }
 
     /// An argument that is none.
-    pub fn usage(message: impl Into<String>) -> Self {
-        Self {
-            kind: ErrorKind::Usage,
-            code: "usage".into(),
-            message: message.into(),
-            next: String::new(),
-            facts: Box::default(),
-        }
+    pub fn usage(message: impl ToString) -> Self {
+        Self(host_kit::Failure::usage(message))
     }
 
     /// What a check refuses; nothing was done.
-    pub fn refused(code: &str, message: impl Into<String>, next: impl Into<String>) -> Self {
-        let message = message.into();
-        Self {
-            kind: ErrorKind::Refused,
-            code: code.into(),
-            message,
-            next: next.into(),
-            facts: Box::default(),
-        }
+    pub fn refused(code: &'static str, message: impl ToString, next: impl ToString) -> Self {
+        Self::new(ErrorKind::Refused, code, message).next(next)
     }
 
     /// What went wrong on the way.
-    pub fn fault(code: &str, message: impl Into<String>, next: impl Into<String>) -> Self {
-        Self { kind: ErrorKind::Fault, ..Self::refused(code, message, next) }
+    pub fn fault(code: &'static str, message: impl ToString, next: impl ToString) -> Self {
+        Self::new(ErrorKind::Fault, code, message).next(next)
     }
 
     /// The same with the act that helps.
-    pub fn next(self, next: impl Into<String>) -> Self {
-        Self { next: next.into(), ..self }
+    pub fn next(self, next: impl ToString) -> Self {
+        Self(self.0.next(next))
+    }
+
+    /// The same with these facts.
+    pub fn with(self, facts: Facts) -> Self {
+        Self(self.0.with(facts))
+    }
+
+    /// The same in other words.
+    pub fn message(mut self, message: impl ToString) -> Self {
+        self.message = message.to_string();
+        self
+    }
+}
+
+impl Deref for Failure {
+    type Target = host_kit::Failure;
+
+    fn deref(&self) -> &host_kit::Failure {
+        &self.0
+    }
+}
+
+impl DerefMut for Failure {
+    fn deref_mut(&mut self) -> &mut host_kit::Failure {
+        &mut self.0
+    }
+}
+
+impl<E: Diagnose> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::of(&error)
     }
 }
 
@@ -114,40 +114,6 @@ pub fn in_python(next: &str) -> String {
     })
 }
 
-impl From<jtc_host::Error> for Failure {
-    fn from(error: jtc_host::Error) -> Self {
-        Self::with(&error, error.facts())
-    }
-}
-
-/// Errors that [`jtc_host::Error`] has a variant for.
-macro_rules! through_error {
-    ($($from:ty),+) => {
-        $(impl From<$from> for Failure {
-            fn from(error: $from) -> Self {
-                jtc_host::Error::from(error).into()
-            }
-        })+
-    };
-}
-
-through_error!(
-    jtc_host::LinkError,
-    jtc_host::StateError,
-    jtc_host::UploadError,
-    jtc_host::MotionError,
-    jtc_host::ParametersError,
-    jtc_host::CheckError,
-    jtc_host::PortError,
-    jtc_host::file::FileError
-);
-
-impl From<jtc_host::plan::PlanError> for Failure {
-    fn from(error: jtc_host::plan::PlanError) -> Self {
-        Self::with(&error, Facts::of_plan(&error))
-    }
-}
-
 impl From<Failure> for PyErr {
     fn from(failure: Failure) -> Self {
         Python::attach(|py| to_python(py, &failure).unwrap_or_else(|error| error))
@@ -156,10 +122,10 @@ impl From<Failure> for PyErr {
 
 /// The exception of `openjtc.errors` for this failure.
 fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
-    let Failure { kind, code, message, next, facts } = failure;
+    let host_kit::Failure { kind, code, message, next, facts } = &failure.0;
     let kind = match kind {
-        ErrorKind::Fault if code == "stopped" => "StoppedError",
-        ErrorKind::Fault if code == "held-stop" => "HeldStopError",
+        ErrorKind::Fault if *code == "stopped" => "StoppedError",
+        ErrorKind::Fault if *code == "held-stop" => "HeldStopError",
         ErrorKind::Usage => "UsageError",
         ErrorKind::NoLink => "NoLinkError",
         ErrorKind::Refused => "RefusedError",
@@ -167,16 +133,15 @@ fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
         ErrorKind::Fault => "FaultError",
     };
     let class = py.import("openjtc.errors")?.getattr(kind)?;
-    let joint = facts.joint.map(|joint| joint.number());
+    let Facts { board, joint, point, value, limit, cause, held_stop } = &**facts;
     let next = in_python(next);
-    let arguments = (message, code, joint, facts.point, facts.value, facts.limit, facts.cause, next);
-    let instance = match &facts.stop {
-        Some(cause) if kind == "HeldStopError" => {
-            let stop = HeldStop::new(cause, 0);
+    let arguments = (message, code, joint, point, value, limit, cause, next, board);
+    let instance = match held_stop {
+        Some(stop) if kind == "HeldStopError" => {
             let more = PyDict::new(py);
-            more.set_item("kind", stop.kind)?;
+            more.set_item("kind", &stop.kind)?;
             more.set_item("unit", stop.unit)?;
-            more.set_item("text", stop.text)?;
+            more.set_item("text", &stop.text)?;
             class.call(arguments, Some(&more))?
         }
         _ => class.call1(arguments)?,

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use jtc_host::error::Facts;
+use host_kit::Facts;
 
 use crate::error::Failure;
 
@@ -17,8 +17,7 @@ pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) ->
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     let failure =
         Failure::usage(format!("{what}: {value}{unit} is outside {low}..{high}{unit}; nothing was sent"));
-    let facts = Facts { value: Some(value), limit: Some(limit), ..Facts::default() };
-    Err(Failure { facts: Box::new(facts), ..failure })
+    Err(failure.with(Facts::beyond(value, limit)))
 }
 
 /// s, up to this many.

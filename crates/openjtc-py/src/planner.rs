@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use jtc_host::check::{Checker, Verdict};
-use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
 use jtc_host::plan::{
     COLD, MARGIN_PCT, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint, margin_in_range,
@@ -126,7 +125,7 @@ impl Planner {
             let options = WayOptions { line: self.line, blend, blend_m: self.blend_m };
             let way = Way::of(&file, &self.arm, options).map_err(|error| of_waypoints(&error))?;
             way.planned(&HostPlanner { blend, ..planner.clone() })
-                .map_err(|error| Failure { message: file.located(&error), ..error.into() })
+                .map_err(|error| Failure::of(&error).message(file.located(&error)))
         })
     }
 }
@@ -147,7 +146,7 @@ pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
 }
 
 fn of_waypoints(error: &WaypointError) -> Failure {
-    Failure::with(error, Facts::of_waypoints(error))
+    Failure::of(error)
 }
 
 #[pymethods]

@@ -120,7 +120,7 @@ pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
     let load = |file: &str| {
         let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;
         let points = trajectory.points.iter().map(|point| point.position).collect();
-        hand(points, f64::from(trajectory.step_ms) * 1e-3).map_err(|failure| failure.message)
+        hand(points, f64::from(trajectory.step_ms) * 1e-3).map_err(|failure| failure.message.clone())
     };
     FaultPlan::from_toml_with(text, load)
         .map_err(|error| Failure::usage(error.to_string()).next("`jtc help faults` lists kinds and keys"))

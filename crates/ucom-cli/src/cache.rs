@@ -21,7 +21,7 @@ impl LinkArgs {
             None if here.exists() => here,
             None => return Ok(SignalTable::default()),
         };
-        SignalTable::read(path).map_err(|e| Failure::usage(e).hint("ucom help edges shows the form"))
+        SignalTable::read(path).map_err(|e| Failure::usage(e).next("ucom help edges shows the form"))
     }
 }
 

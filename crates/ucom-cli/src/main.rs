@@ -36,8 +36,8 @@ fn main() -> ExitCode {
             }
         },
         Err(failure) => {
-            let exit = failure.exit();
-            if !failure.printed {
+            let exit = exit::of(failure.kind);
+            if !failure.is_shown() {
                 // Nobody reads what stands in stdout already.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));

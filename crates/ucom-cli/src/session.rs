@@ -32,7 +32,7 @@ impl LinkArgs {
         let text =
             std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
         Profile::from_toml(&text).map_err(|e| {
-            Failure::usage(format!("{}: {e}", path.display())).hint("ucom help profile lists every key")
+            Failure::usage(format!("{}: {e}", path.display())).next("ucom help profile lists every key")
         })
     }
 
@@ -40,7 +40,7 @@ impl LinkArgs {
     pub fn url(&self) -> Result<&str, Failure> {
         self.bus.as_deref().ok_or_else(|| {
             Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
-                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
+                .next("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
         })
     }
 

@@ -1,5 +1,5 @@
 //! Joints that are not there, for work on a bench.
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -11,8 +11,8 @@ use jtc_host::{ErrorKind, Session};
 use jtc_wire::Joint;
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::error::Denials;
-use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
 
 /// The joints that are not there.
@@ -47,7 +47,7 @@ impl From<[Option<f64>; JOINTS]> for AbsentObject {
 
 impl AbsentObject {
     /// Where each joint is that is not there.
-    fn positions(&self) -> Result<[Option<f64>; JOINTS], ErrorObject> {
+    fn positions(&self) -> Result<[Option<f64>; JOINTS], Problem> {
         let (low, high) =
             settings::setting(settings::ABSENT_POSITION).map_or((0.0, 0.0), |row| (row.low, row.high));
         let mut absent = [None; JOINTS];
@@ -55,14 +55,14 @@ impl AbsentObject {
             let (number, value) = (usize::from(*number), *position_rad);
             let refused = |what: String, next: &str, limit: Option<f64>| {
                 let facts = Facts {
-                    joint: Joint::from_number(number),
+                    joint: Joint::from_number(number).map(Joint::number),
                     value: Some(value),
                     limit,
                     ..Facts::default()
                 };
                 let object =
-                    ErrorObject::new("absent", format!("joint {number}: {what}; nothing was changed"), next);
-                Err(object.kind(ErrorKind::Usage).with(&facts))
+                    Problem::new("absent", format!("joint {number}: {what}; nothing was changed"), next);
+                Err(object.kind(ErrorKind::Usage).with(facts))
             };
             let Some(place) = Joint::from_number(number).and_then(|joint| absent.get_mut(joint.index()))
             else {
@@ -92,7 +92,7 @@ impl AbsentObject {
     operation_id = "get_absent",
     responses((status = 200, description = "Those that are not there", body = AbsentObject), Refusals, Denials)
 )]
-pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObject>, ErrorObject> {
+pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObject>, Problem> {
     Ok(Json(agent.ask(Session::absent).await?.into()))
 }
 
@@ -109,7 +109,7 @@ pub(super) async fn set_absent(
     State(agent): State<Agent>,
     asker: Asker,
     Body(request): Body<AbsentObject>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let positions = request.positions()?;
     let words: Vec<String> =
         request.absent.iter().map(|one| format!("joint {} at {} rad", one.joint, one.position_rad)).collect();

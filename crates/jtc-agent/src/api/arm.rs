@@ -1,5 +1,5 @@
 //! The arm of the controller as one thing: read as an arm file, and given whole.
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
@@ -13,10 +13,10 @@ use jtc_host::{Arm, ErrorKind, Session};
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::body::read;
 use super::error::Denials;
 use super::runs::JobObject;
-use super::{Agent, ErrorObject};
 use crate::jobs::{Given, Task, give};
 use crate::owner::ClientPort;
 
@@ -96,7 +96,7 @@ pub(super) fn in_words(hash: u64) -> String {
     operation_id = "get_arm",
     responses((status = 200, description = "As it was read from the controller", body = ArmObject), Refusals, Denials)
 )]
-pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, ErrorObject> {
+pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, Problem> {
     let arm = agent.ask(Session::device_arm).await?;
     let hash = arm.hash().ok().flatten().unwrap_or_default();
     Ok(Json(ArmObject { name: arm.name.clone(), hash: in_words(hash), text: arm.to_toml() }))
@@ -119,7 +119,7 @@ pub(super) async fn put_arm(
     asker: Asker,
     after: AskedAfter,
     request: Request,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // Nobody else's text is read.
     agent.commander(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
@@ -133,10 +133,10 @@ pub(super) async fn put_arm(
 }
 
 /// An arm that a controller takes.
-pub(super) fn taken(text: &str) -> Result<Arm, ErrorObject> {
+pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     let arm = Arm::parse(text).map_err(|error| {
         let error = error.in_file("text".as_ref());
-        ErrorObject::diagnosed(&error)
+        Problem::of(&error)
     })?;
     let checked = arm.check();
     let worst = checked.findings.iter().find(|found| found.finding.severity == Severity::Problem);
@@ -144,9 +144,14 @@ pub(super) fn taken(text: &str) -> Result<Arm, ErrorObject> {
         let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
         let next = if finding.next.is_empty() { "jtc arm check lists all of it" } else { &finding.next };
         let message = format!("{}{why}; nothing was sent", finding.what);
-        let facts = Facts { joint: *joint, value: *value, limit: *limit, ..Facts::default() };
-        let object = ErrorObject::new("arm", message, next.replace('`', ""));
-        return Err(object.kind(ErrorKind::Usage).with(&facts));
+        let facts = Facts {
+            joint: joint.map(|joint| joint.number()),
+            value: *value,
+            limit: *limit,
+            ..Facts::default()
+        };
+        let object = Problem::new("arm", message, next.replace('`', ""));
+        return Err(object.kind(ErrorKind::Usage).with(facts));
     }
     Ok(arm)
 }

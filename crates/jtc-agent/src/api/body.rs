@@ -7,7 +7,7 @@ use axum::http::StatusCode;
 use jtc_host::ErrorKind;
 use serde::de::DeserializeOwned;
 
-use super::{Agent, ErrorObject};
+use super::Agent;
 
 /// A body of JSON that may be missing.
 pub(super) struct Perhaps<T>(pub Option<T>);
@@ -26,15 +26,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     agent: &Agent,
     request: Request,
-    understand: impl FnOnce(B) -> Result<T, ErrorObject> + Send + 'static,
-) -> Result<T, ErrorObject> {
+    understand: impl FnOnce(B) -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
     let room = agent.bodies.clone().acquire_owned().await;
-    let body = Bytes::from_request(request, &())
-        .await
-        .map_err(|e| ErrorObject::rejected(e.status(), e.body_text()))?;
+    let body =
+        Bytes::from_request(request, &()).await.map_err(|e| Problem::rejected(e.status(), e.body_text()))?;
     blocking(move || {
         let read = serde_json::from_slice(&body)
-            .map_err(|e| ErrorObject::rejected(StatusCode::BAD_REQUEST, e.to_string()));
+            .map_err(|e| Problem::rejected(StatusCode::BAD_REQUEST, e.to_string()));
         drop(body);
         let understood = read.and_then(understand);
         drop(room);
@@ -46,8 +45,8 @@ pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
 /// What takes a while, where it keeps nobody else from being served.
 pub(super) async fn blocking<T: Send + 'static>(
     act: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, ErrorObject> {
+) -> Result<T, Problem> {
     tokio::task::spawn_blocking(act).await.map_err(|_| {
-        ErrorObject::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
+        Problem::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
     })
 }

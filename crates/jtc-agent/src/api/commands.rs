@@ -2,7 +2,7 @@
 use std::borrow::Cow;
 use std::time::Duration;
 
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
@@ -14,9 +14,9 @@ use jtc_wire::{Status, TrajectoryState};
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::error::Denials;
 use super::objects::PayloadObject;
-use super::{Agent, ErrorObject};
 use crate::jobs::{Commander, Turn, stopped};
 use crate::owner::ClientPort;
 
@@ -49,7 +49,7 @@ impl Agent {
         asker: &Asker,
         what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
-    ) -> Result<T, ErrorObject>
+    ) -> Result<T, Problem>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
@@ -66,7 +66,7 @@ impl Agent {
         after: AskedAfter,
         what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
-    ) -> Result<T, ErrorObject>
+    ) -> Result<T, Problem>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
@@ -82,7 +82,7 @@ impl Agent {
         turn: Turn,
         what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
-    ) -> Result<T, ErrorObject>
+    ) -> Result<T, Problem>
     where
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
@@ -91,7 +91,7 @@ impl Agent {
         let logged = move |session: &mut Session<ClientPort>| {
             let done = act(session).map_err(|error| match error.into() {
                 Error::Cancelled => stopped(&agent.line, client),
-                error => ErrorObject::of(&error),
+                error => Problem::of(&error),
             });
             let why = done.as_ref().err().map(|error| error.message.clone());
             agent.note("command", json!({ "client": client.0, "command": what, "why_not": why }));
@@ -120,7 +120,7 @@ pub(super) async fn resume(
     State(agent): State<Agent>,
     asker: Asker,
     after: AskedAfter,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let commander = agent.commander(&asker)?;
     if commander.is_moving() {
         // A motion that somebody stopped before it began is not what is gone on with.
@@ -139,9 +139,9 @@ pub(super) async fn resume(
     Ok(StatusCode::NO_CONTENT)
 }
 
-fn not_paused(status: &Status) -> ErrorObject {
+fn not_paused(status: &Status) -> Problem {
     let (state, trajectory) = (status.state, status.trajectory);
-    ErrorObject::of(&MotionError::NotPaused { state, trajectory }.into())
+    Problem::of(&MotionError::NotPaused { state, trajectory })
 }
 
 /// Another speed on the path, now.
@@ -157,11 +157,11 @@ pub(super) async fn speed(
     State(agent): State<Agent>,
     asker: Asker,
     Body(SpeedObject { percent }): Body<SpeedObject>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     if !(SPEED_MIN..=100).contains(&percent) {
         let message = format!("{percent} % is no speed: {SPEED_MIN} to 100 are possible");
         return Err(
-            ErrorObject::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
+            Problem::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
         );
     }
     let commander = agent.commander(&asker)?;
@@ -186,7 +186,7 @@ pub(super) async fn teach(
     asker: Asker,
     after: AskedAfter,
     Body(Switch { on }): Body<Switch>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     if on {
         let commander = agent.commander(&asker)?;
         let (line, client) = (agent.line.clone(), commander.client);
@@ -210,7 +210,7 @@ pub(super) async fn gripper(
     State(agent): State<Agent>,
     asker: Asker,
     Body(Switch { on }): Body<Switch>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     agent.command(&asker, "gripper", move |session| session.gripper(on)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -222,7 +222,7 @@ pub(super) async fn gripper(
     params(LeaseKey),
     responses((status = 204, description = "The drives are being disabled"), Refusals, Denials)
 )]
-pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     agent.command(&asker, "disable", Session::disable).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -239,17 +239,17 @@ pub(super) async fn set_payload(
     State(agent): State<Agent>,
     asker: Asker,
     Body(payload): Body<PayloadObject>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let payload = body(payload)?;
     agent.command(&asker, "payload", move |session| session.set_payload(&payload)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
 /// A payload that is one of a body.
-pub(super) fn body(payload: PayloadObject) -> Result<Payload, ErrorObject> {
+pub(super) fn body(payload: PayloadObject) -> Result<Payload, Problem> {
     let payload = Payload::from(payload);
     payload.check().map_err(|e| {
-        ErrorObject::new("payload", e.to_string(), "no body has such numbers").kind(ErrorKind::Usage)
+        Problem::new("payload", e.to_string(), "no body has such numbers").kind(ErrorKind::Usage)
     })?;
     Ok(payload)
 }

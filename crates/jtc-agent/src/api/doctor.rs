@@ -1,7 +1,7 @@
 //! What is wrong with link, bus and set-up, as `jtc doctor` finds it.
 use std::time::Duration;
 
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
 use jtc_host::doctor::{Finding, Observation, Severity, findings};
@@ -9,8 +9,8 @@ use jtc_host::{Session, words};
 use jtc_wire::{JOINTS, Joint, STATUS_LEN, Status, error};
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::error::Denials;
-use super::{Agent, ErrorObject};
 
 /// How long is listened: 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
@@ -62,7 +62,7 @@ impl From<Finding> for FindingObject {
     operation_id = "examine",
     responses((status = 200, description = "What was found", body = DoctorObject), Refusals, Denials)
 )]
-pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObject>, ErrorObject> {
+pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObject>, Problem> {
     let look = || agent.line.with(|line, now| (now, line.received()));
     let (began, before) = look();
     tokio::time::sleep(LISTEN).await;
@@ -98,7 +98,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
 }
 
 /// The joints that are set absent. A drive that answers although its joint is has no bit of its own (J-53): the controller is asked.
-async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, ErrorObject> {
+async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(words::absent(status));
     }

@@ -1,70 +1,16 @@
 //! What the API sends where something is not done: one object, whatever it was.
 use std::collections::BTreeMap;
 
-use agent_kit::api::{self, Bounds, ProblemWith};
+use agent_kit::api::Problem;
 use agent_kit::openapi::denials;
-use jtc_host::error::Facts;
-use jtc_host::{Error, ErrorKind};
+use jtc_host::ErrorKind;
+use utoipa::IntoResponses;
 use utoipa::openapi::{RefOr, Response};
-use utoipa::{IntoResponses, ToSchema};
 
 use crate::jobs::Unable;
 use crate::line::Denied;
 
-/// Why something was not done.
-pub type ErrorObject = ProblemWith<FactsObject>;
-
-/// What is known of an error of the arm or its line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, ToSchema)]
-pub struct FactsObject {
-    /// Which joint, 1 to 6 from the base.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub joint: Option<u8>,
-    /// Which point of the trajectory, from 0; in motion the 1 ms point.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub point: Option<u32>,
-    /// What was found, in the unit of the message.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-    /// What is allowed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limit: Option<f64>,
-    /// What usually causes it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>)]
-    pub cause: Option<&'static str>,
-}
-
-impl From<&Facts> for FactsObject {
-    fn from(facts: &Facts) -> Self {
-        // JSON has no word for what is no number.
-        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-        Self {
-            joint: facts.joint.map(|joint| joint.number()),
-            point: facts.point,
-            value: finite(facts.value),
-            limit: finite(facts.limit),
-            cause: facts.cause,
-        }
-    }
-}
-
-impl From<Bounds> for FactsObject {
-    fn from(bounds: Bounds) -> Self {
-        let Bounds { value, limit } = bounds;
-        Self { value, limit, ..Self::default() }
-    }
-}
-
-impl api::Facts for FactsObject {
-    type Error = Error;
-
-    fn of(error: &Error) -> Self {
-        Self::from(&error.facts())
-    }
-}
-
-impl From<Denied> for ErrorObject {
+impl From<Denied> for Problem {
     fn from(denied: Denied) -> Self {
         let next = match &denied {
             Denied::Held { .. } => {
@@ -84,7 +30,7 @@ impl From<Denied> for ErrorObject {
     }
 }
 
-impl From<Unable> for ErrorObject {
+impl From<Unable> for Problem {
     fn from(unable: Unable) -> Self {
         match unable {
             Unable::Busy(job) => {

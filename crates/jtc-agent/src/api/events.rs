@@ -1,7 +1,7 @@
 //! What happens, as it happens: events by number, and a stream of them with what the controller reports.
 use std::time::Duration;
 
-use agent_kit::api::{Asked, Refusals};
+use agent_kit::api::{Asked, Problem, Refusals};
 use agent_kit::events::{self, EventsRequest, StreamRequest};
 use agent_kit::journal::Entry;
 use agent_kit::socket::{MESSAGE_MAX, PROTOCOL};
@@ -12,7 +12,7 @@ use axum::extract::ws::WebSocketUpgrade;
 use axum::response::Response;
 use tokio::time::Instant;
 
-use super::{Agent, Caller, ErrorObject, StatusObject};
+use super::{Agent, Caller, StatusObject};
 use crate::jobs::Happening;
 
 /// How often the controller is reported on a stream, at least.
@@ -33,8 +33,8 @@ type EventsObject = events::EventsObject<EventObject>;
 pub(super) async fn events(
     State(agent): State<Agent>,
     Asked(request): Asked<EventsRequest>,
-) -> Result<Json<EventsObject>, ErrorObject> {
-    Ok(agent.events.ask(&agent.jobs.journal, request).await?)
+) -> Result<Json<EventsObject>, Problem> {
+    agent.events.ask(&agent.jobs.journal, request).await
 }
 
 /// The message of the stream that is no event.

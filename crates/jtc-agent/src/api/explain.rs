@@ -1,10 +1,8 @@
 //! What a code means: the pages of `jtc explain`.
-use agent_kit::api::{Number, Refusals};
+use agent_kit::api::{Number, Problem, Refusals};
 use axum::Json;
 use jtc_host::explain::{Page, find, named, pages};
 use utoipa::ToSchema;
-
-use super::ErrorObject;
 
 /// A page about a code.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
@@ -48,16 +46,16 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     )),
     responses(
         (status = 200, description = "The page that fits best", body = PageObject),
-        (status = 404, description = "Nothing is known about that", body = ErrorObject),
+        (status = 404, description = "Nothing is known about that", body = Problem),
         Refusals
     )
 )]
-pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, ErrorObject> {
+pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, Problem> {
     // What has the name is meant, whatever else has the same words.
     let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
     let (first, others) = fitting.split_first().ok_or_else(|| {
         let message = format!("nothing is known about \"{}\"", agent_kit::gate::plain(&code));
-        ErrorObject::nothing("code", "of that name", "/api/explain").message(message)
+        Problem::nothing("code", "of that name", "/api/explain").message(message)
     })?;
     let also = others.iter().map(|page| page.name.to_owned()).collect();
     Ok(Json(PageObject { also, ..PageObject::from(*first) }))

@@ -1,7 +1,7 @@
 //! Jogging, for who has the lease: as long as somebody holds a key down, and sees what comes of it.
 use std::time::Duration;
 
-use agent_kit::api::{Asked, Body, Refusals};
+use agent_kit::api::{Asked, Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, Halts as _, KnownHalt};
 use agent_kit::lease::LeaseKey;
@@ -11,8 +11,8 @@ use axum::http::request::Parts;
 use jtc_host::error::Facts;
 use utoipa::{IntoParams, ToSchema};
 
+use super::Agent;
 use super::error::Denials;
-use super::{Agent, ErrorObject};
 
 /// So old may be what a person saw when a jog arrives that was asked for by it.
 const SEEN_WITHIN: Duration = Duration::from_millis(500);
@@ -50,9 +50,9 @@ pub(super) struct JogAsked {
 }
 
 impl FromRequestParts<Agent> for JogAsked {
-    type Rejection = ErrorObject;
+    type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, agent: &Agent) -> Result<Self, ErrorObject> {
+    async fn from_request_parts(parts: &mut Parts, agent: &Agent) -> Result<Self, Problem> {
         let last = agent.last_halt();
         let Asked(KnownToJog { asked_after, as_of_ms }) = Asked::from_request_parts(parts, agent).await?;
         let after = KnownHalt { asked_after }.among(last)?;
@@ -66,26 +66,23 @@ const fn ms(duration: Duration) -> u64 {
 }
 
 /// Why what was asked for by a status of `as_of_ms` moves nothing that arrived at `arrived_ms`.
-fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<ErrorObject> {
+fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
     if ahead > ms(AHEAD) {
         let message = format!(
             "as_of_ms {as_of_ms}: this agent began {arrived_ms} ms ago; it may have been started again"
         );
-        let facts =
-            Facts { value: Some(as_of_ms as f64), limit: Some(arrived_ms as f64), ..Facts::default() };
-        return Some(
-            ErrorObject::new("request", message, "GET /api/status has at_ms").with(&facts).unreadable(),
-        );
+        let facts = Facts::beyond(as_of_ms as f64, arrived_ms as f64);
+        return Some(Problem::new("request", message, "GET /api/status has at_ms").with(facts).unreadable());
     }
     (late > ms(SEEN_WITHIN)).then(|| {
         let limit = ms(SEEN_WITHIN);
         let message = format!(
             "this jog comes {late} ms behind what the person saw, {limit} ms are allowed: nothing moves by it"
         );
-        let facts = Facts { value: Some(late as f64), limit: Some(limit as f64), ..Facts::default() };
+        let facts = Facts::beyond(late as f64, limit as f64);
         let next = "the connection is too slow for jogging: come nearer, or use a move";
-        ErrorObject::new("late", message, next).with(&facts)
+        Problem::new("late", message, next).with(facts)
     })
 }
 
@@ -102,7 +99,7 @@ pub(super) async fn jog(
     asker: Asker,
     JogAsked { after, as_of_ms }: JogAsked,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let commander = agent.commander(&asker)?;
     let turn = commander.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);

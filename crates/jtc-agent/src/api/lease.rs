@@ -3,7 +3,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use agent_kit::access::random;
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, Halts};
 use agent_kit::lease::{self, LeaseKey, LeaseState, default_lasts_s, lasts};
@@ -14,7 +14,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::error::Denials;
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 use crate::jobs::{Commander, Turn, Unable};
 use crate::line::{Denied, Introduction, Policy};
 
@@ -57,10 +57,10 @@ impl Halts for Agent {
 
 impl Agent {
     /// The client that asks with a key, with its lease renewed: it commands, or it is an error.
-    pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, ErrorObject> {
+    pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, Problem> {
         let (commander, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
-        held.map_err(ErrorObject::from)?;
+        held.map_err(Problem::from)?;
         Ok(commander)
     }
 
@@ -70,7 +70,7 @@ impl Agent {
         &self,
         asker: &Asker,
         AskedAfter(after): AskedAfter,
-    ) -> Result<(Arc<Commander>, Turn), ErrorObject> {
+    ) -> Result<(Arc<Commander>, Turn), Problem> {
         let commander = self.commander(asker)?;
         let turn = commander.turn()?;
         self.line.with(|line, now| line.ask_to_move(commander.client, after, now))?;
@@ -78,7 +78,7 @@ impl Agent {
     }
 
     /// The client that asks with a key, and how often it does at least.
-    pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), ErrorObject> {
+    pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;
         Ok(self.jobs.commander(key).ok_or(lease::Denied::Unknown)?)
@@ -100,12 +100,12 @@ pub(super) async fn take(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     Body(request): Body<LeaseRequest>,
-) -> Result<Json<LeaseGrant>, ErrorObject> {
+) -> Result<Json<LeaseGrant>, Problem> {
     caller.operator()?;
     let LeaseRequest { name, lasts_s, policy, ask } = request;
     let lasts = lasts(lasts_s)?;
     let name = caller.named(&name);
-    let key = random().map_err(|e| ErrorObject::diagnosed(&e))?;
+    let key = random().map_err(|e| Problem::of(&e))?;
     let introduction = Introduction { name: name.clone(), role: caller.role, policy };
     let commander = agent.jobs.admit(&key, introduction, lasts).ok_or(lease::Denied::Full)?;
     let client = commander.client;
@@ -116,7 +116,7 @@ pub(super) async fn take(
     agent.line.wake();
     let held = taken.map_err(|denied| {
         agent.jobs.dismiss(&key);
-        ErrorObject::from(denied)
+        Problem::from(denied)
     })?;
     agent.note(
         "joined",
@@ -136,7 +136,7 @@ pub(super) async fn take(
         Refusals, Denials
     )
 )]
-pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Json<LeaseState>, ErrorObject> {
+pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Json<LeaseState>, Problem> {
     let (commander, lasts) = agent.client(&asker)?;
     let state = agent.line.with(|line, now| {
         let held = line.take_lease(commander.client, Some(lasts), now).is_ok();
@@ -157,7 +157,7 @@ pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Js
     params(LeaseKey),
     responses((status = 204, description = "It is let go"), Refusals, Denials)
 )]
-pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     let (commander, _) = agent.client(&asker)?;
     let turn = match commander.turn() {
         Ok(turn) => Some(turn),

@@ -2,7 +2,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use agent_kit::api::{Asked, Refusals};
+use agent_kit::api::{Asked, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::extract::State;
@@ -17,7 +17,7 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::body::blocking;
 use super::error::Denials;
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 use crate::jobs::Commander;
 use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
@@ -120,7 +120,7 @@ fn window_default_s() -> f64 {
     operation_id = "get_log_status",
     responses((status = 200, description = "Whether it records", body = LogStatusObject), Refusals, Denials)
 )]
-pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusObject>, ErrorObject> {
+pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusObject>, Problem> {
     let status = agent.ask(|session| Ok(session.log_status()?)).await?;
     Ok(Json(LogStatusObject { state: status.state.name().to_owned(), blocks: status.end }))
 }
@@ -141,7 +141,7 @@ pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusO
 pub(super) async fn fetch(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
-) -> Result<([(HeaderName, String); 2], Vec<u8>), ErrorObject> {
+) -> Result<([(HeaderName, String); 2], Vec<u8>), Problem> {
     let file = from_log(&agent, &caller, written).await?;
     let attached = format!("attachment; filename=\"{FILE}\"");
     let headers = [
@@ -163,14 +163,12 @@ pub(super) async fn values(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     Asked(LogWindow { last_s }): Asked<LogWindow>,
-) -> Result<Json<LogValues>, ErrorObject> {
+) -> Result<Json<LogValues>, Problem> {
     if !(0.01..=60.0).contains(&last_s) {
         let object =
-            ErrorObject::new("request", format!("last_s {last_s}: from 0.01 to 60"), "leave it out for 2 s");
+            Problem::new("request", format!("last_s {last_s}: from 0.01 to 60"), "leave it out for 2 s");
         let limit = if last_s > 60.0 { 60.0 } else { 0.01 };
-        return Err(object
-            .with(&Facts { value: Some(last_s), limit: Some(limit), ..Facts::default() })
-            .unreadable());
+        return Err(object.with(Facts::beyond(last_s, limit)).unreadable());
     }
     let last = move |account: &Account| Ok(LogValues::of(&account.replayed.samples(), last_s));
     from_log(&agent, &caller, last).await.map(Json)
@@ -180,14 +178,14 @@ pub(super) async fn values(
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
-    make: impl FnOnce(&Account) -> Result<T, ErrorObject> + Send + 'static,
-) -> Result<T, ErrorObject> {
+    make: impl FnOnce(&Account) -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
     // Reading it holds up what it records.
     caller.operator()?;
     agent.note("log", json!({ "from": caller.peer.to_string() }));
     let room = agent.logs.clone().try_acquire_owned().map_err(|_| {
         let next = "ask again in some seconds: a log is read by one at a time";
-        ErrorObject::new("busy", "somebody reads the log of the flight recorder", next)
+        Problem::new("busy", "somebody reads the log of the flight recorder", next)
     })?;
     // A client of its own: whoever asks something else meanwhile does not wait for it.
     let name = format!("{}: log", caller.peer);
@@ -195,7 +193,7 @@ async fn from_log<T: Send + 'static>(
     let reader = Commander::new(&agent.line, introduction);
     let fetched = reader.call_in_turn(move |session| {
         let log = session.fetch_log(|_, _| {});
-        log.map(|log| (log, room)).map_err(|error| ErrorObject::of(&error))
+        log.map(|log| (log, room)).map_err(|error| Problem::of(&error))
     });
     let (log, room) = fetched.await??;
     drop(reader);
@@ -210,15 +208,15 @@ async fn from_log<T: Send + 'static>(
 }
 
 /// The recording as bytes.
-fn written(account: &Account) -> Result<Vec<u8>, ErrorObject> {
+fn written(account: &Account) -> Result<Vec<u8>, Problem> {
     let mut file = Cursor::new(Vec::new());
-    account.write(&mut file, Path::new(FILE)).map_err(|error| ErrorObject::diagnosed(&error))?;
+    account.write(&mut file, Path::new(FILE)).map_err(|error| Problem::of(&error))?;
     Ok(file.into_inner())
 }
 
-fn empty() -> ErrorObject {
+fn empty() -> Problem {
     let message = "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
-    ErrorObject::new("empty-log", message, "ask again after a second").kind(ErrorKind::Device)
+    Problem::new("empty-log", message, "ask again after a second").kind(ErrorKind::Device)
 }
 
 /// Forgets the log: the flight recorder begins anew, also one that has stopped at an error.
@@ -229,7 +227,7 @@ fn empty() -> ErrorObject {
     params(LeaseKey),
     responses((status = 204, description = "It records anew"), Refusals, Denials)
 )]
-pub(super) async fn clear(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, ErrorObject> {
+pub(super) async fn clear(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     let clear = |session: &mut Session<ClientPort>| -> Result<(), LinkError> { session.clear_log() };
     agent.command(&asker, "clear log", clear).await?;
     Ok(StatusCode::NO_CONTENT)

@@ -1,5 +1,5 @@
 //! What brings a controller back: single nodes cleared and reset, the arm that is built into it.
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
@@ -11,10 +11,10 @@ use jtc_host::{Error, ErrorKind, LinkError, Session, words};
 use jtc_wire::{ALL_NODES, Joint};
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::body::Perhaps;
 use super::commands::SpeedObject;
 use super::error::Denials;
-use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
 
 /// Nodes whose errors are cleared.
@@ -50,14 +50,14 @@ pub struct ResetRequest {
 }
 
 /// Bits 0 to 5 of joints 1 to 6 and bit 6 of the gripper.
-fn nodes(joints: &[u8], gripper: bool) -> Result<u8, ErrorObject> {
+fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     let mut mask = if gripper { 1 << words::GRIPPER } else { 0 };
     for number in joints {
         let Some(joint) = Joint::from_number((*number).into()) else {
-            let facts = Facts { value: Some((*number).into()), limit: Some(6.0), ..Facts::default() };
+            let facts = Facts::beyond((*number).into(), 6.0);
             let message = format!("there is no joint {number}; nothing was sent");
-            let error = ErrorObject::new("joint", message, "joints are 1 to 6 from the base");
-            return Err(error.kind(ErrorKind::Usage).with(&facts));
+            let error = Problem::new("joint", message, "joints are 1 to 6 from the base");
+            return Err(error.kind(ErrorKind::Usage).with(facts));
         };
         mask |= 1 << joint.index();
     }
@@ -79,7 +79,7 @@ pub(super) async fn clear(
     State(agent): State<Agent>,
     asker: Asker,
     Perhaps(request): Perhaps<ClearRequest>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let ClearRequest { joints, gripper } = request.unwrap_or_default();
     let named = nodes(&joints, gripper)?;
     if named == 0 {
@@ -106,12 +106,12 @@ pub(super) async fn reset(
     State(agent): State<Agent>,
     asker: Asker,
     Body(request): Body<ResetRequest>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let ResetRequest { joints, gripper, all, arm_may_fall } = request;
     let named = nodes(&joints, gripper)? | if all { ALL_NODES } else { 0 };
     if named == 0 {
         let next = "name joints, the gripper, or all";
-        return Err(ErrorObject::new("request", "which nodes? Nothing was sent", next).kind(ErrorKind::Usage));
+        return Err(Problem::new("request", "which nodes? Nothing was sent", next).kind(ErrorKind::Usage));
     }
     let what = format!("reset {}", words::node_names(named).join(", "));
     let reset = move |session: &mut Session<ClientPort>| -> Result<(), Error> {
@@ -133,7 +133,7 @@ pub(super) async fn defaults(
     State(agent): State<Agent>,
     asker: Asker,
     after: AskedAfter,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     agent.motion(&asker, after, "default arm", Session::use_defaults).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -145,7 +145,7 @@ pub(super) async fn defaults(
     operation_id = "get_speed",
     responses((status = 200, description = "100: that of the trajectory; also where the controller knows no other", body = SpeedObject), Refusals, Denials)
 )]
-pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, ErrorObject> {
+pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, Problem> {
     let speed = agent.ask(|session| Ok(session.speed()?)).await?;
     // As it was set: in whole percent.
     Ok(Json(SpeedObject { percent: (speed * 100.0).round().clamp(0.0, 100.0) as u8 }))

@@ -7,8 +7,8 @@ use jtc_host::{Arm, words};
 use jtc_wire::{ControllerState, Info, Joint, Status, TrajectoryState};
 use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 
-use super::{Agent, ErrorObject};
-use agent_kit::api::Refusals;
+use super::Agent;
+use agent_kit::api::{Problem, Refusals};
 
 /// What the format is called; readers of other formats read this one, too.
 const FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
@@ -238,7 +238,7 @@ impl Page {
     operation_id = "get_metrics",
     responses((status = 200, description = "Metrics", body = String, content_type = "text/plain"), Refusals)
 )]
-pub(super) async fn metrics(State(agent): State<Agent>) -> Result<impl IntoResponse, ErrorObject> {
+pub(super) async fn metrics(State(agent): State<Agent>) -> Result<impl IntoResponse, Problem> {
     let identity = agent.identity().await;
     let page = || -> prometheus::Result<String> {
         let page = Page::default();
@@ -257,7 +257,7 @@ pub(super) async fn metrics(State(agent): State<Agent>) -> Result<impl IntoRespo
         TextEncoder::new().encode_to_string(&page.0.gather())
     };
     let page = page().map_err(|error| {
-        ErrorObject::new("metrics", error.to_string(), "GET /api/status shows the same")
+        Problem::new("metrics", error.to_string(), "GET /api/status shows the same")
             .kind(jtc_host::ErrorKind::Fault)
     })?;
     Ok(([(header::CONTENT_TYPE, FORMAT)], page))

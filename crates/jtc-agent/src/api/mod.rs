@@ -31,7 +31,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use agent_kit::access::{Access, TokenError, random};
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use agent_kit::events::Events;
 use agent_kit::gate::{Asker, Caller, Gate, let_in, may_command};
 use agent_kit::log::CommandLog;
@@ -57,7 +57,6 @@ use utoipa_axum::routes;
 use crate::jobs::{Happening, Jobs};
 use crate::owner::Line;
 
-pub use error::ErrorObject;
 pub use held_stop::{HeldStopObject, ReactionsObject};
 pub use objects::{ControllerObject, JointObject, LeaseObject, PayloadObject, SentObject, StatusObject};
 pub use socket::{CLOSE_PUT_OUT, Hello, Notice};
@@ -172,7 +171,7 @@ impl Agent {
 
     /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
     /// way from there may have been sent before.
-    fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, ErrorObject> {
+    fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
         // Who it is does not matter, but for going on later.
         let client = self.client(asker).ok().map(|(client, _)| client);
@@ -188,7 +187,7 @@ impl Agent {
         }
         if let Some(lost) = lost {
             let message = format!("{lost}: nothing was sent; the arm may be moving");
-            let object = ErrorObject::new("no-link", message, "the emergency stop, if it is");
+            let object = Problem::new("no-link", message, "the emergency stop, if it is");
             return Err(object.kind(ErrorKind::NoLink));
         }
         let client = client.map(|client| client.client);
@@ -252,7 +251,7 @@ pub fn description() -> String {
                        operator's from elsewhere. A Stop or a Pause is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(ErrorObject, EventObject, Happening)),
+    components(schemas(Problem, EventObject, Happening)),
     modifiers(&Bearer),
     security((), ("token" = []))
 )]
@@ -330,11 +329,11 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
     params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
     responses(
         (status = 200, description = "The Stop is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 503, description = "The port is gone: nothing was sent", body = ErrorObject),
+        (status = 503, description = "The port is gone: nothing was sent", body = Problem),
         Refusals
     )
 )]
-async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, ErrorObject> {
+async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
     agent.halt(&asker, ExecCommand::Stop)
 }
 
@@ -345,11 +344,11 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
     responses(
         (status = 200, description = "The Pause is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 503, description = "The port is gone: nothing was sent", body = ErrorObject),
+        (status = 503, description = "The port is gone: nothing was sent", body = Problem),
         Refusals
     )
 )]
-async fn pause(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, ErrorObject> {
+async fn pause(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
     agent.halt(&asker, ExecCommand::Pause)
 }
 

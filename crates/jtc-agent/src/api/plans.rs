@@ -2,7 +2,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use axum::extract::{Request, State};
 use axum::{Extension, Json};
 use jtc_core::Config;
@@ -19,7 +19,7 @@ use super::body::{blocking, read};
 use super::error::Denials;
 use super::objects::PayloadObject;
 use super::trajectories::{TrajectoryObject, keep};
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 use crate::jobs::{NUMBER_MAX, StoreError};
 use crate::owner::ClientPort;
 
@@ -216,17 +216,17 @@ pub(super) async fn plan(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     request: Request,
-) -> Result<Json<PlanObject>, ErrorObject> {
+) -> Result<Json<PlanObject>, Problem> {
     // It takes the computer's time, and may change what others run.
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
         // A plan takes its time.
-        agent.jobs.store.is_free(number).map_err(|e| ErrorObject::diagnosed(&e))?;
+        agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
         let next = "ask again when it is ready: one plan is made at a time";
-        ErrorObject::new("busy", "another plan is being made", next)
+        Problem::new("busy", "another plan is being made", next)
     })?;
     let (own, poses) = (agent.jobs.arm().clone(), agent.poses());
     let asked = move |session: &mut Session<ClientPort>| {
@@ -263,16 +263,16 @@ pub(super) async fn plan(
 }
 
 /// Nobody waits for it any more: whoever asked may have put something else under its number since.
-fn abandoned() -> ErrorObject {
-    ErrorObject::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
+fn abandoned() -> Problem {
+    Problem::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
 }
 
 /// The waypoints of a request that can be planned.
-fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), ErrorObject> {
+fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Problem> {
     let refused = |what: &str, message: String, value: f64, limit: f64| {
-        let facts = Facts { value: Some(value), limit: Some(limit), ..Facts::default() };
-        let object = ErrorObject::new("plan", message, format!("choose another {what}"));
-        Err(object.kind(ErrorKind::Usage).with(&facts))
+        let facts = Facts::beyond(value, limit);
+        let object = Problem::new("plan", message, format!("choose another {what}"));
+        Err(object.kind(ErrorKind::Usage).with(facts))
     };
     let (low, high, value) = (*TEMPERATURES.start(), *TEMPERATURES.end(), request.temperature_c);
     if !TEMPERATURES.contains(&value) {
@@ -283,13 +283,12 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Error
     if let Some(KeepRequest { number, .. }) = request.keep
         && !(1..=NUMBER_MAX).contains(&number)
     {
-        return Err(ErrorObject::diagnosed(&StoreError::Number(number)));
+        return Err(Problem::of(&StoreError::Number(number)));
     }
     if let Some(payload) = request.payload {
         super::commands::body(payload)?;
     }
-    let unread =
-        |error: jtc_host::file::FileError| ErrorObject::diagnosed(&error.in_file(Path::new("waypoints")));
+    let unread = |error: jtc_host::file::FileError| Problem::of(&error.in_file(Path::new("waypoints")));
     let file = WaypointFile::parse(&request.waypoints).map_err(unread)?.in_file(Path::new("waypoints"));
     let file = if request.degrees { file.in_degrees().map_err(unread)? } else { file };
     let count = file.waypoints.len();
@@ -307,10 +306,10 @@ fn planned(
     file: &WaypointFile,
     arm: &Arm,
     device: &Config,
-) -> Result<Planned, ErrorObject> {
+) -> Result<Planned, Problem> {
     let options = WayOptions { line: request.line, blend: request.blend_rad, blend_m: request.blend_m };
     let way = Way::of(file, arm, options).map_err(|error| {
-        let object = ErrorObject::diagnosed(&error).with(&Facts::of_waypoints(&error));
+        let object = Problem::of(&error);
         match &error {
             WaypointError::Route(e) => object.message(file.located(e)),
             _ => object,
@@ -331,9 +330,8 @@ fn planned(
         margin_pct: request.margin_percent,
         ..Planner::new(&config)
     };
-    let mut planned = way.planned(&planner).map_err(|error| {
-        ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error)).message(file.located(&error))
-    })?;
+    let mut planned =
+        way.planned(&planner).map_err(|error| Problem::of(&error).message(file.located(&error)))?;
     if let Some(aside) = way.off_the_line(&planned, arm) {
         let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
         planned.notes.push(format!(
@@ -356,7 +354,7 @@ fn kept(
     request: &PlanRequest,
     file: &WaypointFile,
     planned: &Planned,
-) -> Result<PlanObject, ErrorObject> {
+) -> Result<PlanObject, Problem> {
     let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
     let text = trajectory.to_exact_csv();
     let keep =

@@ -1,5 +1,5 @@
 //! Named poses: those of the agent's arm file, and those that were saved through it.
-use agent_kit::api::{Number, Refusals};
+use agent_kit::api::{Number, Problem, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::body::{Perhaps, blocking};
 use super::error::Denials;
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 
 /// Where a pose is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, ToSchema)]
@@ -67,7 +67,7 @@ impl Agent {
     }
 
     /// Nobody changes the arm file from here.
-    fn of_agent(&self, name: &str) -> Result<(), ErrorObject> {
+    fn of_agent(&self, name: &str) -> Result<(), Problem> {
         if !is_pose_name(name) {
             return Err(pose_error(&PoseError::Name { name: plain(name) }));
         }
@@ -75,22 +75,22 @@ impl Agent {
             let message =
                 format!("pose \"{name}\" stands in the arm file of the agent, and is not changed from here");
             let next = "choose another name, or change the file and begin the agent anew";
-            return Err(ErrorObject::new("read-only", message, next));
+            return Err(Problem::new("read-only", message, next));
         }
         Ok(())
     }
 }
 
 /// Why a pose is none, or leads nowhere.
-pub(super) fn pose_error(error: &PoseError) -> ErrorObject {
-    let object = ErrorObject::diagnosed(error);
+pub(super) fn pose_error(error: &PoseError) -> Problem {
+    let object = Problem::of(error);
     match error {
         PoseError::Unknown { .. } => {
             object.next("GET /api/poses lists them; PUT /api/poses/{name} saves where the arm stands")
         }
         PoseError::Outside { joint, value, min, max, .. } => {
             let limit = Some(if value < min { *min } else { *max });
-            object.with(&Facts { joint: Some(*joint), value: Some(*value), limit, ..Facts::default() })
+            object.with(Facts { joint: Some(joint.number()), value: Some(*value), limit, ..Facts::default() })
         }
         _ => object,
     }
@@ -122,7 +122,7 @@ pub(super) async fn put(
     Extension(caller): Extension<Caller>,
     Number(name): Number<String>,
     Perhaps(request): Perhaps<PoseRequest>,
-) -> Result<Json<PoseObject>, ErrorObject> {
+) -> Result<Json<PoseObject>, Problem> {
     // Only operators change where others may move.
     caller.operator()?;
     let saved = save(&agent, &name, request.unwrap_or_default()).await;
@@ -133,7 +133,7 @@ pub(super) async fn put(
     Ok(Json(agent.shown(&arm, name, position)))
 }
 
-async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6], ErrorObject> {
+async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6], Problem> {
     agent.of_agent(name)?;
     let position = match request.positions_rad {
         Some(position) => position,
@@ -144,15 +144,13 @@ async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6
         .find(|joint| !(-FARTHEST..=FARTHEST).contains(&position[joint.index()]))
     {
         let value = position[joint.index()];
-        let facts =
-            Facts { joint: Some(joint), value: Some(value), limit: Some(FARTHEST), ..Facts::default() };
-        let error =
-            ErrorObject::new("pose", format!("{joint}: {value} rad is nowhere"), "positions are in rad");
-        return Err(error.kind(ErrorKind::Usage).with(&facts));
+        let facts = Facts::beyond(value, FARTHEST).at_joint(joint.number());
+        let error = Problem::new("pose", format!("{joint}: {value} rad is nowhere"), "positions are in rad");
+        return Err(error.kind(ErrorKind::Usage).with(facts));
     }
     let (jobs, name) = (agent.jobs.clone(), name.to_owned());
     let kept = blocking(move || jobs.store.poses.put(&name, &position)).await?;
-    kept.map_err(|error| ErrorObject::diagnosed(&error))
+    kept.map_err(|error| Problem::of(&error))
 }
 
 /// No joint turns further, rad.
@@ -166,7 +164,7 @@ const FARTHEST: f64 = 100.0;
     params(("name" = String, Path, description = "Its name")),
     responses(
         (status = 204, description = "It is gone"),
-        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
         Refusals, Denials
     )
 )]
@@ -174,13 +172,13 @@ pub(super) async fn delete(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     Number(name): Number<String>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     caller.operator()?;
     agent.of_agent(&name)?;
     let (jobs, own) = (agent.jobs.clone(), name.clone());
     let gone = blocking(move || jobs.store.poses.delete(&own)).await?;
-    if !gone.map_err(|error| ErrorObject::diagnosed(&error))? {
-        return Err(ErrorObject::nothing("pose", plain(&name), "/api/poses"));
+    if !gone.map_err(|error| Problem::of(&error))? {
+        return Err(Problem::nothing("pose", plain(&name), "/api/poses"));
     }
     agent.note("pose", json!({ "name": plain(&name), "deleted": true, "from": caller.peer.to_string() }));
     Ok(StatusCode::NO_CONTENT)

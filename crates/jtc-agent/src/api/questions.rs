@@ -1,15 +1,15 @@
 //! What is asked of the controller itself, for all who may look.
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
 use jtc_host::held_stop::Reacting;
 use jtc_host::{Error, Session, words};
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::error::Denials;
 use super::held_stop::ReactionsObject;
 use super::objects::PayloadObject;
-use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
 
 /// Who the controller is.
@@ -49,8 +49,8 @@ impl Agent {
     pub(super) async fn ask<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, Error> + Send + 'static,
-    ) -> Result<T, ErrorObject> {
-        self.jobs.asker().call_in_turn(act).await?.map_err(|error| ErrorObject::of(&error))
+    ) -> Result<T, Problem> {
+        self.jobs.asker().call_in_turn(act).await?.map_err(|error| Problem::of(&error))
     }
 }
 
@@ -61,7 +61,7 @@ impl Agent {
     operation_id = "get_info",
     responses((status = 200, description = "What it says of itself", body = InfoObject), Refusals, Denials)
 )]
-pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>, ErrorObject> {
+pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>, Problem> {
     let info = agent.ask(|session| Ok(session.info()?)).await?.unwrap_or_default();
     Ok(Json(InfoObject {
         extension: info.version,
@@ -87,6 +87,6 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
     operation_id = "get_payload",
     responses((status = 200, description = "Mass 0: nothing", body = PayloadObject), Refusals, Denials)
 )]
-pub(super) async fn payload(State(agent): State<Agent>) -> Result<Json<PayloadObject>, ErrorObject> {
+pub(super) async fn payload(State(agent): State<Agent>) -> Result<Json<PayloadObject>, Problem> {
     Ok(Json(agent.ask(Session::payload).await?.into()))
 }

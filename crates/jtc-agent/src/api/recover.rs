@@ -1,5 +1,5 @@
 //! The way back to a held arm.
-use agent_kit::api::Refusals;
+use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
@@ -10,11 +10,11 @@ use jtc_host::{Arm, ErrorKind, Session};
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::arm::{in_words, taken};
 use super::body::read;
 use super::error::Denials;
 use super::runs::JobObject;
-use super::{Agent, ErrorObject};
 use crate::jobs::{Numbers, Task, recover};
 use crate::owner::ClientPort;
 
@@ -35,12 +35,12 @@ pub struct RecoverRequest {
 
 impl RecoverRequest {
     /// Whose numbers a controller is given that misses some.
-    fn numbers(self) -> Result<Numbers, ErrorObject> {
+    fn numbers(self) -> Result<Numbers, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {
             Some(_) if defaults => {
                 let message = "arm and defaults name two sets of numbers; nothing was sent";
-                Err(ErrorObject::new("request", message, "name one").kind(ErrorKind::Usage))
+                Err(Problem::new("request", message, "name one").kind(ErrorKind::Usage))
             }
             Some(text) => Ok(Numbers::Arm(Box::new(whole(&text)?), accept_device_limits)),
             None if defaults => Ok(Numbers::Defaults),
@@ -50,11 +50,11 @@ impl RecoverRequest {
 }
 
 /// An arm that has all that a controller is given.
-fn whole(text: &str) -> Result<Arm, ErrorObject> {
+fn whole(text: &str) -> Result<Arm, Problem> {
     let arm = taken(text)?;
     let set = arm.parameter_set();
     let source = jtc_host::session::ParameterSource::Arm { name: &arm.name, set: &set };
-    source.check().map_err(|error| ErrorObject::diagnosed(&error))?;
+    source.check().map_err(|error| Problem::of(&error))?;
     Ok(arm)
 }
 
@@ -72,7 +72,7 @@ pub(super) async fn begin(
     asker: Asker,
     after: AskedAfter,
     request: Request,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // Nobody else's text is read.
     agent.commander(&asker)?;
     let numbers = read(&agent, request, RecoverRequest::numbers).await?;

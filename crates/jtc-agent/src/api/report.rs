@@ -1,12 +1,12 @@
 //! Reports of motions, as pages.
-use agent_kit::api::{Number, Refusals};
+use agent_kit::api::{Number, Problem, Refusals};
 use axum::extract::State;
 use axum::http::{HeaderName, header};
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::body::blocking;
 use super::runs::found;
-use super::{Agent, ErrorObject};
 use crate::jobs::Stage;
 
 /// What a report may do: its own script and style, and nothing with this agent or anybody else.
@@ -28,26 +28,26 @@ pub struct ReportPage(String);
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
         (status = 200, description = "A page", body = ReportPage, content_type = "text/html"),
-        (status = 404, description = "There is none", body = ErrorObject),
-        (status = 409, description = "The job goes on", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
+        (status = 409, description = "The job goes on", body = Problem),
         Refusals
     )
 )]
 pub(super) async fn report(
     State(agent): State<Agent>,
     Number(number): Number<u64>,
-) -> Result<([(HeaderName, &'static str); 4], String), ErrorObject> {
+) -> Result<([(HeaderName, &'static str); 4], String), Problem> {
     let job = found(&agent, number)?;
     if job.stage == Stage::Running {
         let message = format!("job {number} goes on: its report is made when it is over");
-        return Err(ErrorObject::new("busy", message, "ask again behind its event `ended`"));
+        return Err(Problem::new("busy", message, "ask again behind its event `ended`"));
     }
     let report = job.done.report.ok_or_else(|| {
         let message =
             format!("job {number} has no report: it has moved nothing, or later ones have taken its place");
         let next =
             "`report` of GET /api/jobs shows those that there are; jtc serve --record keeps all motions";
-        ErrorObject::nothing("report", number, "/api/jobs").message(message).next(next)
+        Problem::nothing("report", number, "/api/jobs").message(message).next(next)
     })?;
     let room = agent.reports.clone().acquire_owned().await;
     let page = blocking(move || {

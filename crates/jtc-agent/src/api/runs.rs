@@ -1,25 +1,24 @@
 //! Runs and moves: jobs, and what becomes of them.
 use std::sync::Arc;
 
-use agent_kit::api::{Body, Number, Refusals};
+use agent_kit::api::{Body, Number, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
 use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use jtc_host::error::Facts;
 use jtc_host::plan::kinematics::{Orientation, Target};
 use jtc_host::plan::margin_in_range;
 use jtc_host::{Arm, ErrorKind};
 use serde_json::json;
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::arm::GivenObject;
 use super::error::Denials;
 use super::plans::margin;
 use super::poses::pose_error;
-use super::{Agent, ErrorObject};
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, Stored, run};
 use crate::line::Policy;
 
@@ -126,7 +125,7 @@ pub struct JobObject {
     pub given: Option<GivenObject>,
     /// Why it failed, or was not begun.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub error: Option<ErrorObject>,
+    pub error: Option<Problem>,
 }
 
 /// Figures of a motion.
@@ -199,7 +198,7 @@ pub(super) async fn begin_run(
     asker: Asker,
     after: AskedAfter,
     Body(request): Body<RunRequest>,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
     let RunRequest {
         trajectory: number,
         digest,
@@ -214,7 +213,7 @@ pub(super) async fn begin_run(
     let stored = agent.jobs.store.get(number).ok_or_else(|| {
         let next =
             "keep one with PUT /api/trajectories/{number}; GET /api/trajectories lists those that there are";
-        ErrorObject::new(
+        Problem::new(
             "no-trajectory",
             format!("no trajectory has the number {number} (1 to {NUMBER_MAX})"),
             next,
@@ -236,14 +235,14 @@ pub(super) async fn begin_run(
 }
 
 /// Somebody has put something else under the number since.
-fn replaced(stored: &Stored) -> ErrorObject {
+fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
         "trajectory {number} was replaced since it was looked at: it is {name} now, with the digest {digest}; nothing was sent"
     );
     let next =
         format!("look at it again: GET /api/trajectories/{number}/points has its points and its digest");
-    ErrorObject::new("replaced", message, next)
+    Problem::new("replaced", message, next)
 }
 
 /// Moves the arm from where it stands to joint positions, a named pose or a pose of the flange: a job.
@@ -260,7 +259,7 @@ pub(super) async fn begin_move(
     asker: Asker,
     after: AskedAfter,
     Body(request): Body<MoveRequest>,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
     let MoveRequest {
         to_rad,
         to_pose,
@@ -272,8 +271,7 @@ pub(super) async fn begin_move(
         accept_device_limits,
     } = request;
     within("speed_percent", speed_percent.unwrap_or(100.0), 100.0)?;
-    margin_in_range(margin_pct)
-        .map_err(|error| ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error)))?;
+    margin_in_range(margin_pct).map_err(|error| Problem::of(&error))?;
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
@@ -285,7 +283,7 @@ pub(super) async fn begin_move(
         }
         (None, None, Some(FlangeObject { xyz_m, rpy_rad })) => {
             let pose = Orientation::Rpy(rpy_rad).at(xyz_m).map_err(|error| {
-                let error = ErrorObject::new("pose", error.to_string(), "lengths are in m, angles in rad");
+                let error = Problem::new("pose", error.to_string(), "lengths are in m, angles in rad");
                 error.kind(ErrorKind::Usage)
             })?;
             (format!("flange {}", listed(&[xyz_m, rpy_rad].concat())), Target::Flange(pose))
@@ -293,7 +291,7 @@ pub(super) async fn begin_move(
         _ => {
             let message = "a move leads to one place: to_rad, to_pose or to_flange; nothing was sent";
             let next = "GET /openapi.json describes each request";
-            return Err(ErrorObject::new("request", message, next).kind(ErrorKind::Usage));
+            return Err(Problem::new("request", message, next).kind(ErrorKind::Usage));
         }
     };
     let what = format!("move to {place}{}", if line { ", straight" } else { "" });
@@ -307,13 +305,12 @@ fn listed(numbers: &[f64]) -> String {
 }
 
 /// From 1 on, and no more than that.
-fn within(name: &str, value: f64, most: f64) -> Result<(), ErrorObject> {
+fn within(name: &str, value: f64, most: f64) -> Result<(), Problem> {
     if (1.0..=most).contains(&value) {
         return Ok(());
     }
     let message = format!("{name} is {value}: 1 to {most} are possible");
-    Err(ErrorObject::new("request", message, "GET /openapi.json describes each request")
-        .kind(ErrorKind::Usage))
+    Err(Problem::new("request", message, "GET /openapi.json describes each request").kind(ErrorKind::Usage))
 }
 
 fn begin(
@@ -322,7 +319,7 @@ fn begin(
     what: String,
     policy: Option<Policy>,
     order: Order,
-) -> Result<(StatusCode, Json<JobObject>), ErrorObject> {
+) -> Result<(StatusCode, Json<JobObject>), Problem> {
     let (commander, turn) = agent.mover(asker, after)?;
     let (client, own) = (commander.client, commander.policy);
     agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
@@ -362,17 +359,17 @@ pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
         (status = 200, description = "How it is", body = JobObject),
-        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
         Refusals
     )
 )]
 pub(super) async fn job(
     State(agent): State<Agent>,
     Number(number): Number<u64>,
-) -> Result<Json<JobObject>, ErrorObject> {
+) -> Result<Json<JobObject>, Problem> {
     Ok(Json(found(&agent, number)?.into()))
 }
 
-pub(super) fn found(agent: &Agent, number: u64) -> Result<Job, ErrorObject> {
-    agent.jobs.job(number).ok_or_else(|| ErrorObject::nothing("job", number, "/api/jobs"))
+pub(super) fn found(agent: &Agent, number: u64) -> Result<Job, Problem> {
+    agent.jobs.job(number).ok_or_else(|| Problem::nothing("job", number, "/api/jobs"))
 }

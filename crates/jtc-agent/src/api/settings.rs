@@ -1,5 +1,5 @@
 //! Settings of the controller: read, and changed all together or not at all.
-use agent_kit::api::{Body, Refusals};
+use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
 use axum::Json;
@@ -11,8 +11,8 @@ use jtc_host::{ErrorKind, Session};
 use jtc_wire::{Joint, SET_VALUES_MAX, SettingValue};
 use utoipa::ToSchema;
 
+use super::Agent;
 use super::error::Denials;
-use super::{Agent, ErrorObject};
 use crate::owner::ClientPort;
 
 /// The code of a setting that is none, or not taken.
@@ -108,7 +108,7 @@ pub struct SettingsRequest {
 
 impl SettingsRequest {
     /// As the wire has them.
-    fn values(&self) -> Result<Vec<SettingValue>, ErrorObject> {
+    fn values(&self) -> Result<Vec<SettingValue>, Problem> {
         let count = self.settings.len();
         if !(1..=SET_VALUES_MAX).contains(&count) {
             let message = format!("{count} settings: 1 to {SET_VALUES_MAX} are changed at once");
@@ -119,7 +119,7 @@ impl SettingsRequest {
             let value = change.value()?;
             if values.iter().any(|other| (other.setting, other.joint) == (value.setting, value.joint)) {
                 let message = format!("{} is given twice; nothing was changed", change.words());
-                return Err(none(message, "send each setting once").with(&change.facts()));
+                return Err(none(message, "send each setting once").with(change.facts()));
             }
             values.push(value);
         }
@@ -136,7 +136,7 @@ impl SettingsRequest {
 
 impl SettingChange {
     /// As the wire has it: of a setting that there is, and within its range.
-    fn value(&self) -> Result<SettingValue, ErrorObject> {
+    fn value(&self) -> Result<SettingValue, Problem> {
         let row = settings::named(&self.name).ok_or_else(|| {
             let message = format!("there is no setting {:?}; nothing was changed", short(&self.name));
             none(message, "GET /api/settings lists all of them")
@@ -147,7 +147,7 @@ impl SettingChange {
         }
         let refused = |what: &str, next: &str| {
             let message = format!("{}: {what}; nothing was changed", self.words());
-            Err(none(message, next).with(&self.facts()))
+            Err(none(message, next).with(self.facts()))
         };
         let joint = match (self.joint, row.of_joint()) {
             (None, false) => 0,
@@ -166,7 +166,7 @@ impl SettingChange {
                 row.unit
             );
             let limit = if value < low { low } else { high };
-            return Err(none(message, "GET /api/settings has the range of each").with(&facts(limit)));
+            return Err(none(message, "GET /api/settings has the range of each").with(facts(limit)));
         }
         if row.whole && value.fract() != 0.0 {
             return refused("it has whole numbers only", "GET /api/settings has the range of each");
@@ -180,7 +180,7 @@ impl SettingChange {
     }
 
     fn facts(&self) -> Facts {
-        let joint = self.joint.and_then(|joint| Joint::from_number(joint.into()));
+        let joint = self.joint.and_then(|joint| Joint::from_number(joint.into())).map(Joint::number);
         Facts { joint, value: Some(self.value), ..Facts::default() }
     }
 }
@@ -191,8 +191,8 @@ fn short(name: &str) -> String {
 }
 
 /// Nothing of this is changed.
-fn none(message: String, next: &str) -> ErrorObject {
-    ErrorObject::new(CODE, message, next).kind(ErrorKind::Usage)
+fn none(message: String, next: &str) -> Problem {
+    Problem::new(CODE, message, next).kind(ErrorKind::Usage)
 }
 
 /// All settings, as the controller has them.
@@ -202,7 +202,7 @@ fn none(message: String, next: &str) -> ErrorObject {
     operation_id = "get_settings",
     responses((status = 200, description = "Those that this agent knows, in the order of their numbers", body = Vec<SettingObject>), Refusals, Denials)
 )]
-pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingObject>>, ErrorObject> {
+pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingObject>>, Problem> {
     let values = agent.ask(|session| Ok(session.settings()?)).await?;
     let known = values
         .into_iter()
@@ -223,7 +223,7 @@ pub(super) async fn change(
     State(agent): State<Agent>,
     asker: Asker,
     Body(request): Body<SettingsRequest>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     let values = request.values()?;
     let change = move |session: &mut Session<ClientPort>| session.change_settings(&values);
     agent.command(&asker, request.words(), change).await?;

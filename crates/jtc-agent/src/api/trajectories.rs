@@ -1,7 +1,7 @@
 //! Trajectories by number: kept, checked, listed.
 use std::sync::Arc;
 
-use agent_kit::api::{Asked, Number, Refusals};
+use agent_kit::api::{Asked, Number, Problem, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
@@ -16,7 +16,7 @@ use utoipa::{IntoParams, ToSchema};
 use super::body::{blocking, read};
 use super::error::Denials;
 use super::plans::MarginObject;
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 use crate::jobs::Stored;
 use crate::owner::ClientPort;
 
@@ -223,7 +223,7 @@ pub(super) async fn put(
     Number(number): Number<u16>,
     Asked(place): Asked<PlaceRequest>,
     request: Request,
-) -> Result<Json<TrajectoryObject>, ErrorObject> {
+) -> Result<Json<TrajectoryObject>, Problem> {
     // Only operators change what others may run.
     caller.operator()?;
     let own = agent.clone();
@@ -243,13 +243,13 @@ pub(super) fn keep(
     (number, new): (u16, bool),
     name: &str,
     (text, degrees): (&str, bool),
-) -> Result<TrajectoryObject, ErrorObject> {
+) -> Result<TrajectoryObject, Problem> {
     let (store, name) = (&agent.jobs.store, plain(name));
     let stored = match new {
         true => store.put_new(number, &name, text, degrees),
         false => store.put(number, &name, text, degrees),
     };
-    stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| ErrorObject::diagnosed(&e))
+    stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| Problem::of(&e))
 }
 
 /// Keeps it no more.
@@ -260,7 +260,7 @@ pub(super) fn keep(
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
     responses(
         (status = 204, description = "It is gone"),
-        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
         Refusals, Denials
     )
 )]
@@ -268,13 +268,13 @@ pub(super) async fn delete(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
     Number(number): Number<u16>,
-) -> Result<StatusCode, ErrorObject> {
+) -> Result<StatusCode, Problem> {
     // Only operators change what others may run.
     caller.operator()?;
     let jobs = agent.jobs.clone();
     let gone = blocking(move || jobs.store.delete(number)).await?;
-    if !gone.map_err(|e| ErrorObject::diagnosed(&e))? {
-        return Err(ErrorObject::nothing("trajectory", number, "/api/trajectories"));
+    if !gone.map_err(|e| Problem::of(&e))? {
+        return Err(Problem::nothing("trajectory", number, "/api/trajectories"));
     }
     agent.note("trajectory", json!({ "number": number, "deleted": true, "from": caller.peer.to_string() }));
     Ok(StatusCode::NO_CONTENT)
@@ -288,7 +288,7 @@ pub(super) async fn delete(
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99), PointsRequest),
     responses(
         (status = 200, description = "Times and joint positions", body = PointsObject),
-        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
         Refusals, Denials
     )
 )]
@@ -296,24 +296,20 @@ pub(super) async fn points(
     State(agent): State<Agent>,
     Number(number): Number<u16>,
     Asked(PointsRequest { most }): Asked<PointsRequest>,
-) -> Result<Json<PointsObject>, ErrorObject> {
+) -> Result<Json<PointsObject>, Problem> {
     if !(2..=POINTS_MAX).contains(&most) {
         let limit = if most < 2 { 2 } else { POINTS_MAX };
-        let facts = Facts { value: Some(most as f64), limit: Some(limit as f64), ..Facts::default() };
+        let facts = Facts::beyond(most as f64, limit as f64);
         let message = format!("{most} points: 2 to {POINTS_MAX} are shown");
-        let error = ErrorObject::new("points", message, "ask for fewer, and draw lines between them");
-        return Err(error.kind(ErrorKind::Usage).with(&facts));
+        let error = Problem::new("points", message, "ask for fewer, and draw lines between them");
+        return Err(error.kind(ErrorKind::Usage).with(facts));
     }
     Ok(Json(PointsObject::new(&*kept(&agent, number)?, most)))
 }
 
 /// The trajectory that is kept under a number.
-fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, ErrorObject> {
-    agent
-        .jobs
-        .store
-        .get(number)
-        .ok_or_else(|| ErrorObject::nothing("trajectory", number, "/api/trajectories"))
+fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, Problem> {
+    agent.jobs.store.get(number).ok_or_else(|| Problem::nothing("trajectory", number, "/api/trajectories"))
 }
 
 /// Checks a trajectory with the limits, the model and the payload of the controller, from its own first point.
@@ -324,14 +320,14 @@ fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, ErrorObject> {
     params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
     responses(
         (status = 200, description = "What the check found", body = CheckObject),
-        (status = 404, description = "There is none", body = ErrorObject),
+        (status = 404, description = "There is none", body = Problem),
         Refusals, Denials
     )
 )]
 pub(super) async fn check(
     State(agent): State<Agent>,
     Number(number): Number<u16>,
-) -> Result<Json<CheckObject>, ErrorObject> {
+) -> Result<Json<CheckObject>, Problem> {
     let stored = kept(&agent, number)?;
     let (own, room) = (agent.jobs.arm().clone(), agent.checks.clone().acquire_owned().await);
     let asked = move |session: &mut Session<ClientPort>| -> Result<(Arm, CheckOptions), Error> {
@@ -340,7 +336,7 @@ pub(super) async fn check(
         Ok((arm, CheckOptions { accept_device_limits: true, device, ..CheckOptions::default() }))
     };
     let asked = agent.jobs.asker().call_in_turn(asked).await?;
-    let (arm, options) = asked.map_err(|error| ErrorObject::of(&error))?;
+    let (arm, options) = asked.map_err(|error| Problem::of(&error))?;
     let digest = stored.digest.clone();
     let start = stored.trajectory.points.first().map_or([0.0; 6], |point| point.position);
     let checked = blocking(move || {
@@ -352,6 +348,6 @@ pub(super) async fn check(
     match checked {
         Ok(checked) => Ok(Json(CheckObject::new(checked.verdict(), digest))),
         Err(CheckError::Refused(verdict)) => Ok(Json(CheckObject::new(&verdict, digest))),
-        Err(error) => Err(ErrorObject::of(&error.into())),
+        Err(error) => Err(Problem::of(&error)),
     }
 }

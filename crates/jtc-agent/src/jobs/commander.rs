@@ -1,11 +1,11 @@
 //! A client that has no connection of its own: it asks by HTTP, and shows by each request that it is there.
+use agent_kit::api::Problem;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::api::ErrorObject;
 use jtc_host::Session;
 use jtc_host::session::Flow;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
@@ -45,7 +45,7 @@ pub struct Wish {
     /// What.
     pub flow: Flow,
     /// Receives what came of it.
-    pub done: oneshot::Sender<Result<(), ErrorObject>>,
+    pub done: oneshot::Sender<Result<(), Problem>>,
 }
 
 /// The turn to do something with a client's end of the line; it is over when this is dropped.
@@ -193,15 +193,15 @@ impl Commander {
     }
 
     /// Wishes something of the motion that is going on, and waits for what comes of it. `None`: no motion is going on.
-    pub async fn wish(&self, flow: Flow) -> Option<Result<(), ErrorObject>> {
+    pub async fn wish(&self, flow: Flow) -> Option<Result<(), Problem>> {
         let done = self.wished(flow)?;
         Some(done.await.unwrap_or_else(|_| {
             let next = "GET /api/jobs shows how";
-            Err(ErrorObject::new(MOTION_ENDED, "the motion had ended before this was done", next))
+            Err(Problem::new(MOTION_ENDED, "the motion had ended before this was done", next))
         }))
     }
 
-    fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), ErrorObject>>> {
+    fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         // Under the lock that the end of a motion takes: it is not done in the next one.

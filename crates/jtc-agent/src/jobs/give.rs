@@ -1,10 +1,10 @@
 //! The whole arm for a controller, as a job.
+use agent_kit::api::Problem;
 use jtc_host::session::{ArmPart, PushReport};
 use jtc_host::{Arm, Error, LinkError, Session};
 
 use super::task::STOPPED;
 use super::{Done, Happening, Task};
-use crate::api::ErrorObject;
 use crate::owner::ClientPort;
 
 /// What a controller was given of an arm.
@@ -46,7 +46,7 @@ pub fn give(
     session: &mut Session<ClientPort>,
     arm: &Arm,
     store: bool,
-) -> (Done, Option<ErrorObject>) {
+) -> (Done, Option<Problem>) {
     for warning in &arm.warnings {
         task.note(warning.to_string());
     }
@@ -78,7 +78,7 @@ pub fn give(
 }
 
 /// Why the controller does not have the whole of it, and what of it is in use.
-fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> ErrorObject {
+fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> Problem {
     let halted = match error {
         Error::Cancelled => true,
         Error::Link(LinkError::Denied { .. }) => task.is_halted(),
@@ -87,9 +87,9 @@ fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> ErrorObject {
     let object = if halted {
         let by = task.halted_by();
         let message = format!("{by} stopped or paused the arm before the controller had all of it");
-        ErrorObject::new(STOPPED, message, "give it again when the arm may have torque")
+        Problem::new(STOPPED, message, "give it again when the arm may have torque")
     } else {
-        ErrorObject::of(error)
+        Problem::of(error)
     };
     match given.in_use() {
         Some(parts) => {

@@ -1,7 +1,6 @@
 //! What can happen to an arm and its jobs.
+use agent_kit::api::Problem;
 use utoipa::ToSchema;
-
-use crate::api::ErrorObject;
 
 /// What has happened.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
@@ -131,7 +130,7 @@ pub enum Happening {
         outcome: String,
         /// Why it failed.
         #[serde(skip_serializing_if = "Option::is_none")]
-        error: Option<ErrorObject>,
+        error: Option<Problem>,
     },
 }
 

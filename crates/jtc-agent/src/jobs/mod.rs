@@ -11,6 +11,7 @@ mod stops;
 mod store;
 mod task;
 
+use agent_kit::api::Problem;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -28,7 +29,6 @@ pub use run::{Course, Done, Order, run};
 pub use stops::Stops;
 pub use store::{NUMBER_MAX, Store, StoreError, Stored};
 
-use crate::api::ErrorObject;
 use crate::line::{Introduction, Policy, Role};
 use crate::owner::{ClientPort, Line};
 pub use task::{STOPPED, Task, stopped};
@@ -71,7 +71,7 @@ pub struct Job {
     /// How far it came.
     pub done: Done,
     /// Why it failed.
-    pub error: Option<ErrorObject>,
+    pub error: Option<Problem>,
 }
 
 #[derive(Default)]
@@ -178,7 +178,7 @@ impl Jobs {
         commander: &Arc<Commander>,
         turn: Turn,
         what: String,
-        act: impl FnOnce(&Task<'_>, &mut Session<ClientPort>) -> (Done, Option<ErrorObject>) + Send + 'static,
+        act: impl FnOnce(&Task<'_>, &mut Session<ClientPort>) -> (Done, Option<Problem>) + Send + 'static,
     ) -> Result<Job, Unable> {
         let client = commander.name.clone();
         let job = {
@@ -231,7 +231,7 @@ impl Jobs {
         kept.jobs.push_back(job);
     }
 
-    fn end(&self, number: u64, done: Done, error: Option<ErrorObject>) {
+    fn end(&self, number: u64, done: Done, error: Option<Problem>) {
         let stage = match &error {
             None if done.finished => Stage::Finished,
             None => Stage::Stopped,
@@ -267,7 +267,7 @@ struct Unfinished {
 }
 
 impl Unfinished {
-    fn end(&self, done: Done, error: Option<ErrorObject>) {
+    fn end(&self, done: Done, error: Option<Problem>) {
         self.jobs.end(self.number, done, error);
     }
 }
@@ -276,7 +276,7 @@ impl Drop for Unfinished {
     fn drop(&mut self) {
         if self.jobs.job(self.number).is_some_and(|job| job.stage == Stage::Running) {
             let next = "GET /api/status shows where the arm is; look at what the agent printed";
-            self.end(Done::default(), Some(ErrorObject::new("fault", "the agent has a fault", next)));
+            self.end(Done::default(), Some(Problem::new("fault", "the agent has a fault", next)));
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The way back to a held arm, as a job.
+use agent_kit::api::Problem;
 use jtc_host::session::ParameterSource;
 use jtc_host::{Arm, Error, Session};
 
 use super::{Done, Task};
-use crate::api::ErrorObject;
 use crate::owner::ClientPort;
 
 /// Whose friction, gains and model a controller is given that misses some.
@@ -21,12 +21,12 @@ pub fn recover(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,
     numbers: &Numbers,
-) -> (Done, Option<ErrorObject>) {
+) -> (Done, Option<Problem>) {
     let error = go(task, session, numbers).err();
     (Done { finished: error.is_none(), ..Done::default() }, error)
 }
 
-fn go(task: &Task<'_>, session: &mut Session<ClientPort>, numbers: &Numbers) -> Result<(), ErrorObject> {
+fn go(task: &Task<'_>, session: &mut Session<ClientPort>, numbers: &Numbers) -> Result<(), Problem> {
     let set = match numbers {
         Numbers::Arm(arm, accepted) => {
             accept(task, session, arm, *accepted)?;
@@ -43,7 +43,7 @@ fn go(task: &Task<'_>, session: &mut Session<ClientPort>, numbers: &Numbers) -> 
     match recovered {
         Ok(_) => Ok(()),
         Err(Error::Cancelled) => Err(task.stopped()),
-        Err(error) => Err(ErrorObject::of(&error)),
+        Err(error) => Err(Problem::of(&error)),
     }
 }
 
@@ -53,8 +53,8 @@ fn accept(
     session: &mut Session<ClientPort>,
     arm: &Arm,
     accepted: bool,
-) -> Result<(), ErrorObject> {
-    let device = session.device_config().map_err(|error| ErrorObject::of(&error))?;
+) -> Result<(), Problem> {
+    let device = session.device_config().map_err(|error| Problem::of(&error))?;
     let differences = arm.device_differences(&device);
     let Some(first) = differences.first() else { return Ok(()) };
     if accepted {
@@ -67,5 +67,5 @@ fn accept(
         differences.len()
     );
     let next = "PUT /api/arm gives the whole arm; where the controller's values are safe for it, ask with accept_device_limits: true";
-    Err(ErrorObject::new("device-limits", message, next))
+    Err(Problem::new("device-limits", message, next))
 }

@@ -1,10 +1,10 @@
 //! A run of a job: its steps go into the journal, and a Stop of another client ends it.
+use agent_kit::api::Problem;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use jtc_host::error::Facts;
 use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
@@ -18,7 +18,6 @@ pub use jtc_host::run::Course;
 
 use super::report::{self, Made, MotionReport};
 use super::{Given, Happening, Task, Wish};
-use crate::api::ErrorObject;
 use crate::owner::ClientPort;
 
 /// How often is reported how far a motion is.
@@ -56,7 +55,7 @@ pub struct Done {
 }
 
 /// Runs what was ordered: how far it came, and what forbids it, or ended it in a fault.
-pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<ErrorObject>) {
+pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<Problem>) {
     let mut done = Done::default();
     let error = go(task, session, order, &mut done).err();
     (done, error)
@@ -73,13 +72,13 @@ fn go(
     session: &mut Session<ClientPort>,
     order: &Order,
     done: &mut Done,
-) -> Result<(), ErrorObject> {
+) -> Result<(), Problem> {
     let waits = |what| task.note(format!("waiting until {what}"));
     let ready = session.ready_to_move(waits, || task.is_halted());
     let status = ready.map_err(|error| before_motion(task, &error))?;
-    let site = site(task, session, order).map_err(|error| ErrorObject::of(&error))?;
+    let site = site(task, session, order).map_err(|error| Problem::of(&error))?;
     let move_speed = session.move_speed(order.speed_percent);
-    let move_speed = move_speed.map_err(|error| ErrorObject::of(&error.into()))?;
+    let move_speed = move_speed.map_err(|error| Problem::of(&error))?;
     let trajectory = trajectory(task, order, &site, &status, move_speed)?;
     let runs = runner::Order {
         arm: &site.arm,
@@ -128,12 +127,12 @@ fn trajectory(
     site: &Site,
     status: &Status,
     move_speed: MoveSpeed,
-) -> Result<Arc<Trajectory>, ErrorObject> {
+) -> Result<Arc<Trajectory>, Problem> {
     let (device, here) = (&site.options.device, status.positions());
     let speed = (move_speed, "speed_percent");
     let planned = order.course.planned(&site.arm, device, &here, order.speed_percent, speed);
     let planned = planned.map_err(|error| {
-        let object = ErrorObject::diagnosed(&error).with(&Facts::of_plan(&error));
+        let object = Problem::of(&error);
         object.message(order.course.message(&error))
     })?;
     planned.notes.into_iter().for_each(|text| task.note(text));
@@ -155,17 +154,17 @@ struct RunJob<'a> {
     digest: Rc<RefCell<Digest>>,
     reported: Instant,
     /// Client that waits for the result of its last request.
-    wish: Option<oneshot::Sender<Result<(), ErrorObject>>>,
+    wish: Option<oneshot::Sender<Result<(), Problem>>>,
 }
 
 impl Observer<ClientPort> for RunJob<'_> {
-    type Failure = ErrorObject;
+    type Failure = Problem;
 
-    fn refused(&mut self, error: StartError) -> ErrorObject {
+    fn refused(&mut self, error: StartError) -> Problem {
         not_begun(&error)
     }
 
-    fn failed(&mut self, error: Error) -> ErrorObject {
+    fn failed(&mut self, error: Error) -> Problem {
         before_motion(self.task, &error)
     }
 
@@ -213,7 +212,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         _: &mut Session<ClientPort>,
         phase: Phase,
         checked: &CheckedTrajectory,
-    ) -> Result<SampleReceiver, ErrorObject> {
+    ) -> Result<SampleReceiver, Problem> {
         let Task { job, journal, commander, .. } = *self.task;
         let (phase, duration_s) = (phase.name().to_owned(), checked.trajectory().duration_s());
         journal.write(Happening::Executing { job, phase, duration_s });
@@ -239,11 +238,11 @@ impl Observer<ClientPort> for RunJob<'_> {
     fn applied(&mut self, _: Flow, result: &Result<(), Error>) {
         if let Some(done) = self.wish.take() {
             // The client may have disconnected.
-            let _ = done.send(result.as_ref().copied().map_err(ErrorObject::of));
+            let _ = done.send(result.as_ref().copied().map_err(Problem::of));
         }
     }
 
-    fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), ErrorObject> {
+    fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
         // A wish of the last status is not applied: its client learns that the motion has ended.
         self.wish = None;
@@ -272,17 +271,17 @@ impl Observer<ClientPort> for RunJob<'_> {
 }
 
 /// Why a motion was not begun, or failed: an error, or a client that stopped it.
-fn before_motion(task: &Task<'_>, error: &Error) -> ErrorObject {
+fn before_motion(task: &Task<'_>, error: &Error) -> Problem {
     match error {
         Error::Cancelled => task.stopped(),
         Error::Link(LinkError::Denied { .. }) if task.is_halted() => task.stopped(),
-        error => ErrorObject::of(error),
+        error => Problem::of(error),
     }
 }
 
 /// Why nothing of the run was begun.
-fn not_begun(error: &StartError) -> ErrorObject {
-    let object = ErrorObject::diagnosed(error).with(&Facts::of_start(error));
+fn not_begun(error: &StartError) -> Problem {
+    let object = Problem::of(error);
     match error {
         StartError::Check(_) => object,
         StartError::Elsewhere(_) => object.next("ask for the run with approach: true"),

@@ -1,10 +1,10 @@
 //! What a job has beside its client's end of the line.
+use agent_kit::api::Problem;
 use std::sync::mpsc::Receiver;
 
 use jtc_host::Arm;
 
 use super::{Commander, Happening, Journal, Wish};
-use crate::api::ErrorObject;
 use crate::line::ClientId;
 use crate::owner::Line;
 
@@ -46,15 +46,15 @@ impl Task<'_> {
     }
 
     /// Somebody stopped the arm before this moved it.
-    pub fn stopped(&self) -> ErrorObject {
+    pub fn stopped(&self) -> Problem {
         stopped(self.line, self.commander.client)
     }
 }
 
 /// Somebody stopped the arm before what was asked for moved it.
-pub fn stopped(line: &Line, client: ClientId) -> ErrorObject {
+pub fn stopped(line: &Line, client: ClientId) -> Problem {
     let by = line.with(|line, _| line.halted_by(client).to_owned());
-    ErrorObject::new(
+    Problem::new(
         STOPPED,
         format!("{by} stopped or paused the arm before this moved it: nothing is begun behind that"),
         "ask for it again when the arm may move",

@@ -1,4 +1,5 @@
 //! Commands of a PLC, done with the one client of the line that all of its connections share.
+use agent_kit::api::Problem;
 use std::sync::Arc;
 
 use jtc_host::session::Flow;
@@ -9,7 +10,6 @@ use super::codes::{Command, Outcome, error_number};
 use super::handshake::Order;
 use super::map::View;
 use super::plc::Plc;
-use crate::api::ErrorObject;
 use crate::jobs::{
     Commander, Course, Job, Numbers, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
 };
@@ -31,8 +31,8 @@ impl Refusal {
     }
 }
 
-impl From<ErrorObject> for Refusal {
-    fn from(error: ErrorObject) -> Self {
+impl From<Problem> for Refusal {
+    fn from(error: Problem) -> Self {
         let outcome = match error.code {
             "busy" => Outcome::Busy,
             STOPPED => Outcome::Stopped,
@@ -40,13 +40,13 @@ impl From<ErrorObject> for Refusal {
             "no-link" | "not-confirmed" | "link-lost" | "gone" => Outcome::NoController,
             _ => Outcome::Failed,
         };
-        Self { outcome, error: error_number(error.code), why: error.message.into() }
+        Self { outcome, error: error_number(error.code), why: error.message.clone() }
     }
 }
 
 impl From<Unable> for Refusal {
     fn from(unable: Unable) -> Self {
-        ErrorObject::from(unable).into()
+        Problem::from(unable).into()
     }
 }
 
@@ -246,7 +246,7 @@ impl Plc {
     ) -> Result<(), Refusal> {
         commander.act(turn, act).await?.map_err(|error| match error.into() {
             Error::Cancelled => stopped(&self.line, commander.client).into(),
-            error => ErrorObject::of(&error).into(),
+            error => Problem::of(&error).into(),
         })
     }
 }

@@ -52,7 +52,7 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
                 "a controller takes this arm"
             }
     });
-    if refused { Err(Failure::printed(ErrorKind::Refused)) } else { Ok(()) }
+    if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }
 
 /// A line for each finding; what is to be done stands once behind those that it is the same for.

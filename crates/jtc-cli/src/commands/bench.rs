@@ -42,11 +42,11 @@ fn set(absent: &[Option<f64>; JOINTS], link: &LinkArgs, out: &Output) -> Result<
 fn refused(error: Error) -> Failure {
     let failure = Failure::of(&error);
     match error {
-        Error::Link(LinkError::Refused { code: DataStatus::NotAllowed, .. }) => failure.hint(
+        Error::Link(LinkError::Refused { code: DataStatus::NotAllowed, .. }) => failure.next(
             "joints are set absent without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
         ),
         Error::Link(LinkError::Refused { code: DataStatus::IncorrectValue, .. }) => {
-            failure.hint("angles are in rad, -6.2832 to 6.2832 (`--deg` for degrees); nothing was changed")
+            failure.next("angles are in rad, -6.2832 to 6.2832 (`--deg` for degrees); nothing was changed")
         }
         _ => failure,
     }

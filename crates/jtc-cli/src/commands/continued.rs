@@ -112,7 +112,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     let held = recording.info.as_ref().and_then(|info| info.commanded.as_deref());
     held.cloned().ok_or_else(|| {
         let message = format!("{} does not hold the whole trajectory; nothing was sent", args.run.display());
-        Failure::usage(message).hint(format!(
+        Failure::usage(message).next(format!(
             "`jtc traj continue {} --trajectory FILE` names the trajectory that was run; recordings in MCAP hold it themselves",
             typed(&args.run)
         ))

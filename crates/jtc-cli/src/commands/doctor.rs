@@ -59,8 +59,8 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     });
     match (bad, no_link(&seen)) {
         (false, _) => Ok(()),
-        (true, true) => Err(Failure::printed(ErrorKind::NoLink)),
-        (true, false) => Err(Failure::printed(ErrorKind::Device)),
+        (true, true) => Err(Failure::shown(ErrorKind::NoLink)),
+        (true, false) => Err(Failure::shown(ErrorKind::Device)),
     }
 }
 

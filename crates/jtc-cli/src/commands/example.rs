@@ -21,7 +21,7 @@ pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
             "there is no example \"{name}\"; there are {}",
             names.join(", ")
         ))
-        .hint("`jtc example` shows what they are"));
+        .next("`jtc example` shows what they are"));
     };
     let dir = args.dir.as_deref().unwrap_or(".".as_ref());
     std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;

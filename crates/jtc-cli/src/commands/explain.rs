@@ -21,7 +21,7 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let found = find(code);
     if found.is_empty() {
         return Err(Failure::usage(format!("nothing is known about \"{code}\""))
-            .hint("`jtc explain` lists every code; a number may carry its family, as data:7 or can:0x100"));
+            .next("`jtc explain` lists every code; a number may carry its family, as data:7 or can:0x100"));
     }
     let value = json!({ "pages": found.iter().map(|p| as_json(p)).collect::<Vec<_>>() });
     out.result(&value, || found.iter().map(|p| format!("{p}\n")).collect::<Vec<_>>().join("\n"));

@@ -96,7 +96,7 @@ fn board_of(drive: &Drive, catalogue: &Catalogue) -> Result<String, Failure> {
     let fits = |board: &&String| drive.fit(board) == Fit::Same && !board.ends_with("-ldo");
     catalogue.images.iter().map(|image| &image.board).find(fits).cloned().ok_or_else(|| {
         let what = format!("{}: which image? No installed one is named by this drive", drive.path.display());
-        Failure::usage(what).hint("`--board NAME` or `--image FILE`; `jtc firmware list` shows both")
+        Failure::usage(what).next("`--board NAME` or `--image FILE`; `jtc firmware list` shows both")
     })
 }
 
@@ -123,13 +123,13 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
             let what = format!(
                 "{url} is an address, and the board is asked over its serial port itself; nothing was sent"
             );
-            Err(Failure::usage(what).hint("end the agent that owns the port, and name the port, or none"))
+            Err(Failure::usage(what).next("end the agent that owns the port, and name the port, or none"))
         }
         Some(port) => Ok(Some(port.clone())),
         None if has_own || !needed => Ok(None),
         None => only_port().map(Some).map_err(|failure| {
-            let hint = format!("{}; --no-read-back goes without a port", failure.hint);
-            Failure::nothing_sent(failure).hint(hint)
+            let hint = format!("{}; --no-read-back goes without a port", failure.next);
+            Failure::nothing_sent(failure).next(hint)
         }),
     }
 }

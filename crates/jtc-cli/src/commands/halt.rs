@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use cli_kit::{ErrorKind, Failure, Output};
+use cli_kit::{ErrorKind, Failure, Output, error_object};
 use jtc_client::agents::{Registered, is_same_port, registered};
 use jtc_host::port::halt::{self, Answer, End, Halt};
 use jtc_host::port::{Standstill, is_moving, is_paused, usb_names};
@@ -49,7 +49,7 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let is_only_one = ends.len() == 1 && !failed.is_empty();
     let words: Vec<String> = ends.iter().flatten().map(Stopped::words).collect();
     if !is_only_one {
-        failed.iter().for_each(|failure| out.warn(&failure.message, &failure.hint));
+        failed.iter().for_each(|failure| out.warn(&failure.message, &failure.next));
     }
     if !not_asked.is_empty() {
         out.note(format_args!(
@@ -67,16 +67,16 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     // The most urgent one: an arm moves.
     failed.sort_by_key(|failure| failure.code != STILL_MOVING);
     if let Some(failure) = failed.first() {
-        value["error"] = failure.to_json();
+        value["error"] = error_object(failure);
     }
     if out.is_json() || !words.is_empty() {
         out.result(&value, || words.join("\n"));
     }
-    failed.first().map_or(Ok(()), |failure| Err(Failure::printed(failure.kind)))
+    failed.first().map_or(Ok(()), |failure| Err(Failure::shown(failure.kind)))
 }
 
 fn failed_json(failure: &Failure) -> Value {
-    json!({ "error": failure.to_json() })
+    json!({ "error": error_object(failure) })
 }
 
 /// The ports on USB where no arm is stopped.
@@ -116,7 +116,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 holder(&answer)
             );
             return Err(
-                Failure::new(ErrorKind::Device, "refused", message).hint("`jtc status` shows the state")
+                Failure::new(ErrorKind::Device, "refused", message).next("`jtc status` shows the state")
             );
         }
     };
@@ -292,10 +292,10 @@ impl NotHalted {
                 "the controller has confirmed the {name}, but no status shows that the arm stands: if it moves, press the emergency stop"
             ),
         };
-        let next = &self.failure.hint;
+        let next = &self.failure.next;
         // The words of an error may name the emergency stop alone.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
-        Failure { hint: hint.trim_end_matches([' ', '.']).to_owned(), ..self.failure }
+        Failure { next: hint.trim_end_matches([' ', '.']).to_owned(), ..self.failure }
     }
 }
 
@@ -388,7 +388,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
         }
     }
     let message = "one program after the other opens the port of the arm";
-    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(halt::STILL_MOVING_HELP);
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(halt::STILL_MOVING_HELP);
     Err(NotHalted::after(Sent::Confirmed, failure))
 }
 
@@ -409,7 +409,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if start.elapsed() >= CHANGES_OWN_HANDS {
                     let message = "the program that had the port has ended, and its port is not found";
                     let failure = Failure::new(ErrorKind::NoLink, "port", message);
-                    return Err(failure.hint("`jtc stop --port PATH` stops the arm at its port").into());
+                    return Err(failure.next("`jtc stop --port PATH` stops the arm at its port").into());
                 }
                 std::thread::sleep(Duration::from_millis(20));
             }
@@ -479,7 +479,7 @@ fn directly(
 fn still_moving(end: &End) -> Failure {
     let what = end.moving.as_deref().unwrap_or_default();
     let message = format!("the arm does not come to rest: {what} (state {})", end.state);
-    Failure::new(ErrorKind::Fault, STILL_MOVING, message).hint(end.next_step())
+    Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(end.next_step())
 }
 
 /// An error of a frame that was written, or that an agent refused.

@@ -30,7 +30,7 @@ pub fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {
         let list = known.iter().cloned().chain(pages).collect::<Vec<_>>().join(", ");
         at = at.find_subcommand_mut(word).ok_or_else(|| {
             Failure::usage(format!("there is no help about \"{word}\""))
-                .hint(format!("there is help about {list}"))
+                .next(format!("there is help about {list}"))
         })?;
     }
     let text = at.render_long_help().to_string();

@@ -235,14 +235,14 @@ impl Job {
             out.result(&value, String::new);
         }
         out.note(format!("jtc: {verdict}\n     {hint}"));
-        Failure::printed(ErrorKind::Refused)
+        Failure::shown(ErrorKind::Refused)
     }
 
     /// A failure of this job, with the file's name where its hint leaves it open.
     pub fn named(&self, failure: Failure) -> Failure {
         let again = if self.made { self.words.clone() } else { format!("traj run {}", self.words) };
-        let hint = failure.hint.replace("traj run FILE", &again);
-        Failure { hint, ..failure }
+        let next = failure.next.replace("traj run FILE", &again);
+        Failure { next, ..failure }
     }
 
     /// Parts of the torque that the check leaves out because the arm file does not give them.

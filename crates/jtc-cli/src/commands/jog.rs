@@ -50,7 +50,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     {
         let message = format!("{joint} is set absent, and there is nothing to move");
         return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
-            .hint("`jtc bench show` shows which joints are absent"));
+            .next("`jtc bench show` shows which joints are absent"));
     }
     let end = args.duration.map(|s| session.now() + Duration::from_secs_f64(s.clamp(0.0, 86_400.0)));
     let over = |session: &Session<LinkPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
@@ -152,7 +152,7 @@ fn with_keys(
     over: impl Fn(&Session<LinkPort>) -> bool,
 ) -> Result<(), Failure> {
     let Some(mut keys) = Keys::listen() else {
-        return Err(Failure::usage("without a terminal there are no keys; nothing was sent").hint(
+        return Err(Failure::usage("without a terminal there are no keys; nothing was sent").next(
             "`jtc jog JOINT RATE` moves one joint for as long as the command lives, as `jtc jog 3 0.1`",
         ));
     };
@@ -197,7 +197,7 @@ fn refused(error: Error) -> Failure {
                 _ if *trajectory == TrajectoryState::Pause => "a trajectory is paused: `jtc traj stop` first",
                 _ => "the arm is not held at rest yet: `jtc status`",
             };
-            failure.hint(next)
+            failure.next(next)
         }
         _ => failure,
     }
@@ -213,7 +213,7 @@ fn without_error(status: Option<Status>) -> Result<(), Failure> {
                 "jog-fault",
                 format!("the controller has released the arm: {reason}"),
             )
-            .hint(words::next_step(&status)))
+            .next(words::next_step(&status)))
         }
         _ => Ok(()),
     }
@@ -223,7 +223,7 @@ fn without_error(status: Option<Status>) -> Result<(), Failure> {
 fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
     session.jog_to_rest().map_err(|error| Failure::of(&error))?.ok_or_else(|| {
-        Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves").hint(STILL_MOVING_HELP)
+        Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves").next(STILL_MOVING_HELP)
     })
 }
 

@@ -206,7 +206,7 @@ fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Res
         let message =
             "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
         let failure = Failure::new(ErrorKind::Device, "empty-log", message);
-        return Err(failure.hint("`jtc log fetch` again after a second"));
+        return Err(failure.next("`jtc log fetch` again after a second"));
     }
     let names = read.write(files)?;
     let mut value = read.as_json();
@@ -246,5 +246,5 @@ fn replay(file: &Path, arm: Option<&Path>, out: &Output) -> Result<(), Failure> 
         lines.extend(read.0.story.lines());
         lines.join("\n")
     });
-    if fails { Err(Failure::printed(ErrorKind::Refused)) } else { Ok(()) }
+    if fails { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }

@@ -39,7 +39,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
             format!("still there: {}\nnext: {next}", words::errors_line(&s))
         }
     });
-    if s.errors == 0 { Ok(()) } else { Err(Failure::printed(ErrorKind::Device)) }
+    if s.errors == 0 { Ok(()) } else { Err(Failure::shown(ErrorKind::Device)) }
 }
 
 /// Switches the pump.
@@ -56,7 +56,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     if args.defaults && arm.is_some() {
         return Err(Failure::usage("--arm and --defaults name two sets of numbers")
-            .hint("name one: nothing was sent"));
+            .next("name one: nothing was sent"));
     }
     let given = arm.as_ref().map(|arm| (arm.name.as_str(), arm.parameter_set()));
     let source = match &given {
@@ -94,7 +94,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         Error::Cancelled => {
             let during = steps.last().map_or("its start", String::as_str);
             Failure { message: format!("cancelled, after: {during}"), ..Failure::of(&e) }
-                .hint("the rest of the way was not gone: `jtc status`, then `jtc recover` again")
+                .next("the rest of the way was not gone: `jtc status`, then `jtc recover` again")
         }
         _ => not_itself(e),
     })?;
@@ -108,11 +108,11 @@ fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     // Without numbers for the arm it is the same command with an option that helps.
     if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
-        || !failure.hint.contains("jtc recover")
+        || !failure.next.contains("jtc recover")
     {
         return failure;
     }
-    failure.hint(
+    failure.next(
         "what causes the error is still there: release the emergency stop, look at power, cable and drive of what is named, then \
          `jtc doctor`; `jtc explain CODE` explains each error",
     )

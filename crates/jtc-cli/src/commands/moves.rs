@@ -18,7 +18,7 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     }
     if args.deg && matches!(args.to, Some(Target::Pose(_))) {
         let message = "--deg is for joint positions and poses of the flange, and the unit of a named pose is known; nothing was sent";
-        return Err(Failure::usage(message).hint("leave --deg out"));
+        return Err(Failure::usage(message).next("leave --deg out"));
     }
     let (name, option) = match (&args.to, &args.to_flange) {
         (Some(Target::Pose(name)), _) => (name.clone(), "--to"),
@@ -88,6 +88,6 @@ fn coldest(status: &jtc_wire::Status) -> f64 {
 fn refused(error: &PlanError, name: &str) -> Failure {
     let message = format!("no move to {name}: {}", error.of_move());
     let failure = Failure { message, ..Failure::of(error) };
-    let next = error.next_of_move().map_or(failure.hint.clone(), str::to_owned);
-    Failure::nothing_sent(failure.hint(next))
+    let next = error.next_of_move().map_or(failure.next.clone(), str::to_owned);
+    Failure::nothing_sent(failure.next(next))
 }

@@ -93,11 +93,11 @@ fn readable(out: &Path) -> Result<(), Failure> {
             out.display()
         );
         let name = typed(&out.with_extension("csv"));
-        return Err(Failure::usage(message).hint(format!("name a file with the ending .csv: `-o {name}`")));
+        return Err(Failure::usage(message).next(format!("name a file with the ending .csv: `-o {name}`")));
     }
     if out.as_os_str() == "-" {
         let message = "- is no file: the trajectory is written to a file, and its figures to standard output";
-        return Err(Failure::usage(message).hint("name a file with the ending .csv: `-o motion.csv`"));
+        return Err(Failure::usage(message).next("name a file with the ending .csv: `-o motion.csv`"));
     }
     Ok(())
 }

@@ -41,7 +41,7 @@ fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     let nodes = if args.all { ALL } else { joints | if args.gripper { GRIPPER } else { 0 } };
     if nodes == 0 {
         return Err(Failure::usage("which nodes? Nothing was sent")
-            .hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`"));
+            .next("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`"));
     }
     Ok(nodes)
 }
@@ -54,7 +54,7 @@ fn of_mask(text: &str) -> Failure {
     };
     let failure = Failure::usage(format!("\"{text}\" names no joints: nodes have names, nothing was sent"));
     let Some(mask) = value.filter(|mask| *mask != 0 && mask & !ALL == 0) else {
-        return failure.hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
+        return failure.next("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
     };
     let joints: Vec<String> = Joint::ALL
         .into_iter()
@@ -71,9 +71,9 @@ fn of_mask(text: &str) -> Failure {
     let as_mask = format!("`jtc reset {}` resets what the bit mask {text} meant", options.join(" "));
     match text.parse::<u8>() {
         Ok(joint @ 1..=6) => {
-            failure.hint(format!("`jtc reset --joints {joint}` resets joint {joint}; {as_mask}"))
+            failure.next(format!("`jtc reset --joints {joint}` resets joint {joint}; {as_mask}"))
         }
-        _ => failure.hint(as_mask),
+        _ => failure.next(as_mask),
     }
 }
 
@@ -87,9 +87,9 @@ mod tests {
     fn a_bare_mask_is_refused_with_both_things_that_it_may_mean() {
         let failure = of_mask("3");
         assert_eq!(failure.kind, ErrorKind::Usage);
-        assert!(failure.hint.contains("`jtc reset --joints 3` resets joint 3"), "{}", failure.hint);
-        assert!(failure.hint.contains("`jtc reset --joints 1,2`"), "{}", failure.hint);
-        assert!(of_mask("0x44").hint.contains("--joints 3 --gripper"));
-        assert!(of_mask("0x80").hint.contains("--all") && of_mask("elbow").hint.contains("--all"));
+        assert!(failure.next.contains("`jtc reset --joints 3` resets joint 3"), "{}", failure.next);
+        assert!(failure.next.contains("`jtc reset --joints 1,2`"), "{}", failure.next);
+        assert!(of_mask("0x44").next.contains("--joints 3 --gripper"));
+        assert!(of_mask("0x80").next.contains("--all") && of_mask("elbow").next.contains("--all"));
     }
 }

@@ -57,7 +57,7 @@ fn check_rest(
             job.words, away
         );
         return Err(Failure::new(ErrorKind::Refused, "other-trajectory", message)
-            .hint("name the trajectory that is paused, with the --speed that it was run at; `jtc traj stop` ends it"));
+            .next("name the trajectory that is paused, with the --speed that it was run at; `jtc traj stop` ends it"));
     }
     let friction = job.arm.friction();
     job.planner(friction.as_ref()).rest(&job.trajectory, status.point, None).map(drop).map_err(|why| {

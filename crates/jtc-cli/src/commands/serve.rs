@@ -35,7 +35,7 @@ const STOPPING: Duration = Duration::from_secs(5);
 pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
         Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
-            .hint("name one with --token-file FILE")
+            .next("name one with --token-file FILE")
     })?;
     let stop = Stop::listen()?;
     let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
@@ -52,7 +52,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
-            .hint("another agent may listen there: name another address with --listen")
+            .next("another agent may listen there: name another address with --listen")
     })?;
     let listen = listener.local_addr()?;
     let modbus = listen_modbus(args)?;
@@ -130,7 +130,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     }
     match gone {
         Some(why) => {
-            Err(Failure::new(ErrorKind::NoLink, "port", why).hint("plug it in again, then `jtc ports`"))
+            Err(Failure::new(ErrorKind::NoLink, "port", why).next("plug it in again, then `jtc ports`"))
         }
         None => Ok(()),
     }
@@ -143,11 +143,11 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
         return Err(Failure::usage(format!(
             "--modbus {at}: nobody else than this computer could connect there"
         ))
-        .hint("name who may with --modbus-allow, an address or a network: Modbus knows no tokens"));
+        .next("name who may with --modbus-allow, an address or a network: Modbus knows no tokens"));
     }
     let listener = TcpListener::bind(at).map_err(|error| {
         Failure::usage(format!("--modbus {at}: {error}"))
-            .hint("name another port: 502, that of Modbus, is for administrators on most systems")
+            .next("name another port: 502, that of Modbus, is for administrators on most systems")
     })?;
     Ok(Some(listener))
 }
@@ -181,7 +181,7 @@ fn come_to_rest(line: &Line, out: &Output) -> bool {
 /// The directory for recordings, before anything else is done.
 fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     Prepared::open(dir, limit).map_err(|error| {
-        Failure::usage(format!("{}: {error}", dir.display())).hint("name another directory with --record DIR")
+        Failure::usage(format!("{}: {error}", dir.display())).next("name another directory with --record DIR")
     })
 }
 

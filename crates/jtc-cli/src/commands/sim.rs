@@ -92,7 +92,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
         Failure::usage(format!("{}: {what}", path.display()))
-            .hint("name another file; `jtc arm push --store` writes it")
+            .next("name another file; `jtc arm push --store` writes it")
     };
     match std::fs::read(path) {
         Ok(image) if jtc_wire::ArmImage::parse(&image).is_some() => Ok(Some(image)),
@@ -120,7 +120,7 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
         let what =
             format!("{url}: the joint bus is CAN FD, and the socketcand protocol has classic frames only");
         return Err(Failure::usage(what)
-            .hint("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
+            .next("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
     }
     // The error names the bus.
     let bus = can_link::open_url(&parsed).map_err(Failure::usage)?;
@@ -131,5 +131,5 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
 #[cfg(not(unix))]
 pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
     Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have")
-        .hint("jtc demo runs everywhere"))
+        .next("jtc demo runs everywhere"))
 }

@@ -35,14 +35,14 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
             if *waypoints && !(1e-6..=1.0).contains(&tolerance) {
                 let message =
                     format!("a tolerance of {tolerance} rad is outside 0.000001..1; nothing was sent");
-                return Err(Failure::usage(message).hint("0.01 rad is half a degree"));
+                return Err(Failure::usage(message).next("0.01 rad is half a degree"));
             }
             if *waypoints && file.exists() && !file.is_file() {
                 let message = format!(
                     "{} is no file, and waypoints are known at the end only; nothing was sent",
                     file.display()
                 );
-                return Err(Failure::usage(message).hint("name a file, or leave --waypoints out"));
+                return Err(Failure::usage(message).next("name a file, or leave --waypoints out"));
             }
             let output = OutputFile::open(file, overwrite.overwrite, &[]).map_err(Failure::nothing_sent)?;
             record(output, link, *duration, waypoints.then_some(tolerance), out)
@@ -128,7 +128,7 @@ fn record(
 /// Teaching has ended, and not by this command.
 fn taught_no_more(status: &Status) -> Failure {
     let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
-    Failure::new(ErrorKind::Fault, "not-teaching", message).hint("`jtc teach record FILE` starts a new one")
+    Failure::new(ErrorKind::Fault, "not-teaching", message).next("`jtc teach record FILE` starts a new one")
 }
 
 /// Ctrl-C: the first one is asked for, the second one ends the command with what is so at that moment.
@@ -165,7 +165,7 @@ fn without_error(s: Status) -> Result<Status, Failure> {
         return Ok(s);
     }
     let failure = Failure::new(ErrorKind::Fault, "run-fault", words::errors_line(&s));
-    Err(failure.hint(words::next_step(&s)))
+    Err(failure.next(words::next_step(&s)))
 }
 
 fn finish(taught: TaughtFile, thin: Option<f64>, out: &Output) -> Result<(), Failure> {

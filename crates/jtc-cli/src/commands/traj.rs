@@ -37,7 +37,7 @@ fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
     let recorded = if measured { Loaded::load_measured(&args.file) } else { Loaded::load(&args.file, None) }?;
     if recorded.form != Form::Recording {
         let message = format!("{} is no recording of a run", args.file.display());
-        return Err(Failure::usage(message).hint(format!("`jtc traj run {}` runs it", typed(&args.file))));
+        return Err(Failure::usage(message).next(format!("`jtc traj run {}` runs it", typed(&args.file))));
     }
     let load = |out: &Output| {
         let mut job = Job::of(recorded, &args.file, &args.check, out)?;
@@ -55,7 +55,7 @@ fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Fail
         && !(5.0..=100.0).contains(&percent)
     {
         let message = format!("a speed override of {percent} % is outside 5..100; nothing was sent");
-        return Err(Failure::usage(message).hint("`jtc traj pause` brings the arm to rest on its path"));
+        return Err(Failure::usage(message).next("`jtc traj pause` brings the arm to rest on its path"));
     }
     let mut session = link.session()?;
     if let Some(percent) = percent {
@@ -99,7 +99,7 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
         let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
         format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.replace('`', ""))
     });
-    if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
+    if verdict.is_ok() { Ok(()) } else { Err(Failure::shown(ErrorKind::Refused)) }
 }
 
 fn figures(verdict: &Verdict) -> String {

@@ -1,7 +1,8 @@
 //! Errors of a check for a run.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
+use super::facts;
 use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::file::FileError;
@@ -47,6 +48,13 @@ impl Diagnose for CheckError {
                 ),
             ),
             Self::Arm(e) => e.diagnosis(),
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Refused(verdict) => facts::of_verdict(verdict),
+            Self::DeviceLimits { .. } | Self::Arm(_) => Facts::default(),
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Errors of reading, giving and keeping an arm as one thing.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::settings::SettingError;
 use jtc_wire::{Code, ControllerState, Joint, StoreState, TrajectoryState};
 
+use super::facts;
 use crate::arm::Difference;
 
 /// Why an arm could not be read from a device or kept by it.
@@ -145,6 +146,16 @@ impl Diagnose for ExtensionError {
                 "not-stored",
                 "the arm is in use until the device is switched off; `jtc info` shows its memory, `jtc arm push --store` tries again",
             ),
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::TooHeavy { joint, torque, limit, .. } => {
+                Facts::beyond(*torque, *limit).at_joint(joint.number())
+            }
+            Self::Setting(error) => facts::of_setting(error),
+            _ => Facts::default(),
         }
     }
 }

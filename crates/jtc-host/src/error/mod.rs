@@ -3,7 +3,7 @@
 
 mod check;
 mod extension;
-mod facts;
+pub(crate) mod facts;
 mod link;
 mod motion;
 mod parameters;
@@ -11,11 +11,11 @@ mod state;
 mod upload;
 
 use host_kit::ErrorKind;
-pub use host_kit::{Diagnose, Diagnosis};
+pub use host_kit::{Diagnose, Diagnosis, Facts, Failure};
 
 pub use check::CheckError;
 pub use extension::ExtensionError;
-pub use facts::Facts;
+pub use facts::of_status as facts_of_status;
 pub use link::LinkError;
 pub(crate) use link::accepted;
 pub use motion::MotionError;
@@ -94,6 +94,20 @@ impl Diagnose for Error {
             Self::Cancelled => {
                 Diagnosis::new(ErrorKind::Fault, "cancelled", "`jtc status` shows where the arm is")
             }
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::State(e) => e.facts(),
+            Self::Motion(e) => e.facts(),
+            Self::Check(e) => e.facts(),
+            Self::Extension(e) => e.facts(),
+            Self::Link(e) => e.facts(),
+            Self::Upload(e) => e.facts(),
+            Self::Parameters(e) => e.facts(),
+            Self::File(e) => e.facts(),
+            Self::Frame(_) | Self::Cancelled => Facts::default(),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Errors of an execution: before it begins, and on the way.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectoryState};
 
-use super::LinkError;
+use super::{LinkError, facts};
 use crate::plan::PlanError;
 use crate::{held_stop, words};
 
@@ -156,6 +156,20 @@ impl Diagnose for MotionError {
             ),
         };
         Diagnosis::new(kind, code, next)
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::HeldStop { point, status, cause, .. } => {
+                Facts { point: Some(*point), ..facts::of_held_stop(status, cause.as_ref()) }
+            }
+            Self::RunFault { point, status } => Facts { point: Some(*point), ..facts::of_status(status) },
+            Self::LinkLost { last: Some(last), .. } if last.is_executing() => {
+                Facts { point: Some(last.point), ..Facts::default() }
+            }
+            Self::RestRefused { point, why } => Facts { point: Some(*point), ..why.facts() },
+            Self::LinkLost { .. } | Self::NotUploaded | Self::NotPaused { .. } => Facts::default(),
+        }
     }
 }
 

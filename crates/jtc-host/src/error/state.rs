@@ -1,8 +1,9 @@
 //! Errors of waiting for a state.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
 
+use super::facts;
 use crate::{held_stop, words};
 
 /// Why the controller did not come to the state that was waited for.
@@ -133,6 +134,20 @@ impl Diagnose for StateError {
                 "absent-joints",
                 "`jtc bench show` shows them; `jtc jog` moves the joints that are there; `jtc disable`, then `jtc bench present` ends it",
             ),
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Device { status } | Self::Timeout { status, .. } | Self::NotReady { status } => {
+                facts::of_status(status)
+            }
+            Self::HeldStop { status, cause } => facts::of_held_stop(status, cause.as_ref()),
+            Self::Absent { joints } | Self::EncoderJumped { joints } => {
+                joints.first().map_or_else(Facts::default, |joint| facts::of_joint(*joint))
+            }
+            Self::NotMeasured { joint } => facts::of_joint(*joint),
+            Self::Moving { .. } | Self::WouldFall { .. } | Self::MayFall { .. } => Facts::default(),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Why there is no plan.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::POINTS_MAX;
 use jtc_plan::kinematics;
 
 use super::margin::{MARGIN_PCT, MARGIN_PCT_MAX};
 use crate::check::Verdict;
+use crate::error::facts;
 
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -173,6 +174,10 @@ impl Diagnose for PlanError {
                 Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
             }
         }
+    }
+
+    fn facts(&self) -> Facts {
+        facts::of_plan(self)
     }
 }
 

@@ -1,5 +1,5 @@
 //! The start of a run: nothing moves before every motion of the run has passed its check (J-55).
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
 
@@ -71,6 +71,15 @@ impl Diagnose for StartError {
             Self::Open(error) => error.diagnosis(),
         }
     }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Check(error) | Self::Elsewhere(error) => error.facts(),
+            Self::Approach(ApproachError::Plan(error)) => error.facts(),
+            Self::Approach(ApproachError::Check(error)) => error.facts(),
+            Self::Open(error) => error.facts(),
+        }
+    }
 }
 
 impl Diagnose for OpenPath {
@@ -78,6 +87,10 @@ impl Diagnose for OpenPath {
         let next =
             "`--approach` leads back to its first point before each run; or let the path end where it begins";
         Diagnosis::new(ErrorKind::Refused, "open-path", next)
+    }
+
+    fn facts(&self) -> Facts {
+        Facts::beyond(self.distance, self.tolerance).at_joint(self.joint.number())
     }
 }
 

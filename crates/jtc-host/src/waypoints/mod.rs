@@ -22,7 +22,7 @@ mod thinned;
 
 use std::path::{Path, PathBuf};
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::JOINTS;
 use jtc_plan::kinematics::{self, Kinematics, LegKind, Orientation, Route, RoutePoint};
 
@@ -30,6 +30,7 @@ pub(crate) use csv::is_column;
 pub use thinned::thinned;
 
 use crate::arm::{Arm, PoseError};
+use crate::error::facts;
 use crate::file::{FileError, Place, UNITS_KNOWN, read_text, short};
 use crate::plan::PlanError;
 
@@ -118,6 +119,14 @@ impl Diagnose for WaypointError {
                 };
                 Diagnosis::new(kind, "flange-pose", source.hint())
             }
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Route(error) => error.facts(),
+            Self::Flange { source, .. } => facts::of_pose(source),
+            Self::File(_) | Self::Pose { .. } => Facts::default(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use jtc_core::JOINTS;
-use jtc_host::error::Facts;
+use jtc_host::error::facts_of_status;
 use jtc_host::port::Standstill;
 use jtc_host::port::halt::{End, Halt};
 use jtc_host::{Error, LinkError, Port as _, PortError, StateError, words};
@@ -150,7 +150,7 @@ impl Machine {
             if status.is_faulty() {
                 let failure =
                     Failure::fault("run-fault", words::errors_line(&status), words::next_step(&status));
-                return Err(Failure { facts: Box::new(Facts::of_status(&status)), ..failure });
+                return Err(failure.with(facts_of_status(&status)));
             }
             let now = self.session.now();
             if status.state == ControllerState::Teaching {

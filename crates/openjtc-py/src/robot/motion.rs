@@ -5,7 +5,6 @@ use std::rc::Rc;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 
-use jtc_host::error::Facts;
 use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::{Ending, RecordingInfo};
 use jtc_host::report::RunFailure;
@@ -260,7 +259,7 @@ impl Observer<AnyPort> for Follower<'_> {
             *lock(&self.shared.speed) = Some(f64::from(percent) / 100.0);
         }
         if let Some(waits) = self.waits.take() {
-            let came = result.as_ref().copied().map_err(|error| Failure::with(error, error.facts()));
+            let came = result.as_ref().copied().map_err(Failure::of);
             // The thread may have gone.
             let _ = waits.send(came);
         }
@@ -300,8 +299,8 @@ impl Follower<'_> {
         let samples = self.tape.take();
         let broken = RunFailure::of(error, &self.ran.info, &samples);
         samples.iter().for_each(|sample| self.tape.keep(sample));
-        let mut failure = Failure::with(error, error.facts());
-        failure.facts.joint = failure.facts.joint.or(broken.joint);
+        let mut failure = Failure::of(error);
+        failure.facts.joint = failure.facts.joint.or(broken.joint.map(|joint| joint.number()));
         (self.ran.failure, self.ran.broken) = (Some(failure), Some(broken));
     }
 }
@@ -315,7 +314,7 @@ fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
 
 /// Why nothing of the run was begun.
 fn not_begun(error: &StartError) -> Failure {
-    let failure = Failure::with(error, Facts::of_start(error));
+    let failure = Failure::of(error);
     match error {
         StartError::Check(_) => failure,
         StartError::Elsewhere(_) => failure.next("pass approach=True: the arm is moved to the first point"),
@@ -336,8 +335,7 @@ fn trajectory(
 ) -> Result<(Arc<Trajectory>, Vec<String>), Failure> {
     let speed = (move_speed, "`speed=`");
     let planned = order.course.planned(arm, &options.device, &status.positions(), order.speed, speed);
-    let planned =
-        planned.map_err(|error| Failure { message: order.course.message(&error), ..Failure::from(error) })?;
+    let planned = planned.map_err(|error| Failure::of(&error).message(order.course.message(&error)))?;
     Ok((planned.trajectory, planned.notes))
 }
 

@@ -52,9 +52,8 @@ pub struct Worker {
 
 /// Nothing can be asked any more.
 pub fn closed() -> Failure {
-    let message = "the connection is closed".to_owned();
-    let next = "connect again: `openjtc.connect(…)`".to_owned();
-    Failure { kind: ErrorKind::NoLink, code: "closed".into(), message, next, facts: Default::default() }
+    Failure::new(ErrorKind::NoLink, "closed", "the connection is closed")
+        .next("connect again: `openjtc.connect(…)`")
 }
 
 impl Worker {

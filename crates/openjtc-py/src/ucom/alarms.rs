@@ -7,8 +7,8 @@ use host_kit::ErrorKind;
 use ucom_host::master::{Error, IdentityError};
 use ucom_host::session::{Change, SessionError};
 
-use super::failure::BoardFailure;
 use super::shared::lock;
+use crate::error::Failure;
 
 /// Boards that were lost or have left their loops, and what else was not reported as an error yet.
 #[derive(Default)]
@@ -20,7 +20,7 @@ struct Waiting {
     rebooted: Vec<u8>,
     left: Vec<u8>,
     /// What is reported as it is.
-    others: VecDeque<BoardFailure>,
+    others: VecDeque<Failure>,
 }
 
 impl Alarms {
@@ -38,19 +38,19 @@ impl Alarms {
     /// Another board has the number of one that runs: what is commanded to one moves both.
     pub fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
-        let mut own = BoardFailure::from(SessionError::from(Error::from(error)));
+        let mut own = Failure::from(SessionError::from(Error::from(error)));
         // What was found while it runs is no refusal.
-        own.failure.kind = ErrorKind::Fault;
+        own.kind = ErrorKind::Fault;
         self.add(own);
     }
 
     /// Something that is reported as it is.
-    pub fn add(&self, failure: BoardFailure) {
+    pub fn add(&self, failure: Failure) {
         lock(&self.0).others.push_back(failure);
     }
 
     /// Reports, once, that boards were lost or have left their loops, then what else there is, one after the other.
-    pub fn check(&self) -> Result<(), BoardFailure> {
+    pub fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);
             let Waiting { lost, rebooted, left, .. } = &mut *waiting;
@@ -63,9 +63,9 @@ impl Alarms {
             (false, _) => SessionError::Lost { lost: lost.len(), rebooted: rebooted.len() },
         };
         let list: Vec<String> = all.iter().map(u8::to_string).collect();
-        let mut own = BoardFailure::from(error);
-        own.failure.message += &format!(": board {}", list.join(", "));
-        own.board = all.first().copied().filter(|first| all.iter().all(|other| other == first));
+        let mut own = Failure::from(error);
+        own.message += &format!(": board {}", list.join(", "));
+        own.facts.board = all.first().copied().filter(|first| all.iter().all(|other| other == first));
         Err(own)
     }
 }

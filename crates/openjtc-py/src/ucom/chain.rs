@@ -13,7 +13,6 @@ use ucom_host::master::io::Kind as Buffer;
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::session::{Assignment, Boards, Cache, Link, ParameterFile, SessionError};
 
-use super::failure::BoardFailure;
 use super::hands::Config;
 use super::owner::Owner;
 use super::recording::{ChainRecording, Sink, Tap};
@@ -42,13 +41,13 @@ pub struct Chain {
     sink: Sink,
 }
 
-fn boards(text: &str) -> Result<Boards, BoardFailure> {
-    text.parse().map_err(BoardFailure::usage)
+fn boards(text: &str) -> Result<Boards, Failure> {
+    text.parse().map_err(Failure::usage)
 }
 
-fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, BoardFailure> {
+fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, Failure> {
     let one = |(board, name, value): Given| {
-        let value = value.parse().map_err(|e| BoardFailure::usage(format!("{name}: {e}")))?;
+        let value = value.parse().map_err(|e| Failure::usage(format!("{name}: {e}")))?;
         Ok(Assignment { board, name, value })
     };
     values.into_iter().map(one).collect()
@@ -56,7 +55,7 @@ fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, BoardFailure> {
 
 impl Chain {
     /// Reads a parameter file here, as the thread of the session waits for no disk.
-    fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, BoardFailure> {
+    fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, Failure> {
         let inventory = self.inventory_file.clone().unwrap_or_default();
         Ok(py.detach(|| ParameterFile::read(path, &inventory, |_| true)).map_err(SessionError::from)?)
     }
@@ -82,10 +81,10 @@ impl Chain {
         cache: Option<PathBuf>,
         remember: bool,
         deadline_s: Option<f64>,
-    ) -> Result<Self, BoardFailure> {
+    ) -> Result<Self, Failure> {
         let deadline = deadline_s.map(|s| match Duration::try_from_secs_f64(s) {
             Ok(deadline) if !deadline.is_zero() => Ok(deadline),
-            _ => Err(BoardFailure::usage(format!("deadline_s: {s} s is no time"))),
+            _ => Err(Failure::usage(format!("deadline_s: {s} s is no time"))),
         });
         let profile = procedures::profile(profile.as_deref(), on_lost)?;
         let signals = signals.map(|path| SignalTable::read(&path)).transpose();
@@ -127,7 +126,7 @@ impl Chain {
         plain(py, self.owner.shared.events(after))
     }
 
-    fn check(&self) -> Result<(), BoardFailure> {
+    fn check(&self) -> Result<(), Failure> {
         self.owner.shared.check()
     }
 
@@ -250,7 +249,7 @@ impl Chain {
             Some("parameter") => Some(Buffer::Par),
             Some(other) => {
                 let text = format!("kind: {other:?} is neither input nor parameter");
-                return Err(BoardFailure::usage(text).into());
+                return Err(Failure::usage(text).into());
             }
         };
         let set = move |hands: &mut _| values::set(hands, board, buffer, (&name, &value), force);
@@ -315,7 +314,7 @@ impl Chain {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
         let [raw, fill_gaps, name_target, group, start, dry_run, unverified, force, rewrite, check] = flags;
-        let first = source(image).ok_or_else(|| BoardFailure::usage("there is no image"))?;
+        let first = source(image).ok_or_else(|| Failure::usage("there is no image"))?;
         let (second, profile) = (source(second), &self.profile);
         let any_date = date.0.is_none();
         let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };
@@ -373,7 +372,7 @@ impl Chain {
         plain(py, self.owner.call(py, act)?)
     }
 
-    fn record(&self, py: Python<'_>, path: PathBuf) -> Result<ChainRecording, BoardFailure> {
+    fn record(&self, py: Python<'_>, path: PathBuf) -> Result<ChainRecording, Failure> {
         let channel = self.url.rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
         py.detach(|| ChainRecording::begin(self.sink.clone(), &path, self.profile, &channel))
     }

@@ -7,7 +7,6 @@
 
 mod alarms;
 mod chain;
-mod failure;
 mod hands;
 mod objects;
 mod operator;

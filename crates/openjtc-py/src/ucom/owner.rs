@@ -9,9 +9,9 @@ use pyo3::prelude::*;
 use serde_json::Value;
 use ucom_host::session::Link;
 
-use super::failure::BoardFailure;
 use super::hands::{Config, Hands};
 use super::shared::{Halt, Kind, Process, Shared, Work, failure, fault, lock};
+use crate::error::Failure;
 use crate::json;
 
 /// So often signals (Ctrl-C) are looked at while Python waits.
@@ -20,7 +20,7 @@ pub const LOOK: Duration = Duration::from_millis(50);
 /// What a call receives of what it asked for.
 enum Message<T> {
     Progress(Value),
-    Done(Result<T, BoardFailure>),
+    Done(Result<T, Failure>),
 }
 
 /// The thread that owns a session.
@@ -58,7 +58,7 @@ impl Owner {
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
+        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.call_with(py, Kind::Command, None, |hands, _| act(hands))
     }
@@ -69,7 +69,7 @@ impl Owner {
         py: Python<'_>,
         kind: Kind,
         progress: Option<&Bound<'_, PyAny>>,
-        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
+        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
         let before = self.shared.last_event();
@@ -120,7 +120,7 @@ impl Owner {
         &self,
         py: Python<'_>,
         halt: Halt,
-        act: impl FnOnce(&mut Hands) -> Result<T, BoardFailure> + Send + 'static,
+        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
         let (_, answers) = self.ask(Kind::Stop, |hands, _| act(hands));
@@ -135,7 +135,7 @@ impl Owner {
     }
 
     /// The thread is one of this process, not of the one that it was forked from.
-    fn is_here(&self) -> Result<(), BoardFailure> {
+    fn is_here(&self) -> Result<(), Failure> {
         match self.process.is_this() {
             true => Ok(()),
             false => Err(failure(
@@ -150,11 +150,11 @@ impl Owner {
     fn ask<T: Send + 'static>(
         &self,
         kind: Kind,
-        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, BoardFailure> + Send + 'static,
+        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
     ) -> (u64, Mutex<mpsc::Receiver<Message<T>>>) {
         let (sender, answers) = mpsc::channel();
         let id = self.shared.next_id();
-        let act = move |hands: Result<&mut Hands, BoardFailure>| {
+        let act = move |hands: Result<&mut Hands, Failure>| {
             let report = |value| drop(sender.send(Message::Progress(value)));
             let done = hands.and_then(|hands| {
                 let done = act(hands, &report);
@@ -217,7 +217,7 @@ impl Drop for Owner {
 enum Received<T> {
     Nothing,
     Progress(Value),
-    Done(Result<T, BoardFailure>),
+    Done(Result<T, Failure>),
 }
 
 struct Gone<'a>(&'a Shared);

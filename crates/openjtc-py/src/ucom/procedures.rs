@@ -15,7 +15,6 @@ use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::{InitOptions, Outcome, Reports, Request};
 use ucom_host::session::{Boards, Numbered, SessionError, nothing_shared};
 
-use super::failure::BoardFailure;
 use super::hands::Hands;
 use super::objects;
 use crate::error::Failure;
@@ -24,7 +23,7 @@ use crate::error::Failure;
 const LISTEN: Duration = Duration::from_millis(1500);
 
 /// The profile of a file, or the defaults; what is done about a lost board may be another.
-pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, BoardFailure> {
+pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
         Some(path) => {
@@ -41,7 +40,7 @@ pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Bo
         Some("stop-board") => OnLost::StopBoard,
         Some("stop-all") => OnLost::StopAll,
         Some(other) => {
-            return Err(BoardFailure::usage(format!(
+            return Err(Failure::usage(format!(
                 "on_lost: {other:?} is none of report, stop-board, stop-all"
             )));
         }
@@ -50,13 +49,12 @@ pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Bo
 }
 
 /// A failure that several findings are.
-fn findings(kind: ErrorKind, code: &str, texts: &[String], next: &str) -> BoardFailure {
-    let facts = Default::default();
-    Failure { kind, code: code.into(), message: texts.join("; "), next: next.into(), facts }.into()
+fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &str) -> Failure {
+    Failure::new(kind, code, texts.join("; ")).next(next)
 }
 
 /// Who is there; changes nothing.
-pub fn scan(hands: &mut Hands) -> Result<Value, BoardFailure> {
+pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
     let report = match hands.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
         other => return Err(SessionError::from(other).into()),
@@ -79,7 +77,7 @@ pub fn init(
     hands: &mut Hands,
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
-) -> Result<(Value, Option<Inventory>), BoardFailure> {
+) -> Result<(Value, Option<Inventory>), Failure> {
     // What another program has written there since is compared with, as well.
     hands.inventory = listed.or_else(|| hands.inventory.take().map(Inventory::without_records));
     let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
@@ -112,7 +110,7 @@ pub fn init(
 }
 
 /// What boards report about themselves.
-pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let mut all = Vec::new();
     for board in hands.driver.numbers(boards)? {
         all.push(hands.driver.seen(board)?);
@@ -128,11 +126,11 @@ pub fn numbered(hands: &Hands, all: &[Numbered]) -> Value {
 }
 
 /// Names of status bits as bits.
-fn bits(names: &[String]) -> Result<Status, BoardFailure> {
+fn bits(names: &[String]) -> Result<Status, Failure> {
     let bit = |name: &String| {
         Status::bit(name).ok_or_else(|| {
             let names: Vec<&str> = Status::NAMES.iter().map(|(name, _)| *name).collect();
-            BoardFailure::usage(format!("there is no bit {name:?}; there are {}", names.join(" ")))
+            Failure::usage(format!("there is no bit {name:?}; there are {}", names.join(" ")))
         })
     };
     names.iter().try_fold(Status(0), |all, name| Ok(all | bit(name)?))
@@ -144,17 +142,15 @@ pub fn status(
     boards: &Boards,
     (set, clear): (&[String], &[String]),
     force: bool,
-) -> Result<Value, BoardFailure> {
+) -> Result<Value, Failure> {
     let (set, clear) = (bits(set)?, bits(clear)?);
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
     if both != Status(0) {
-        return Err(BoardFailure::usage(format!("{both}: cannot be set and cleared at once")));
+        return Err(Failure::usage(format!("{both}: cannot be set and cleared at once")));
     }
     if mirrors != Status(0) {
         let text = format!("{mirrors}: mirrors reality and cannot be written");
-        return Err(Failure::usage(text)
-            .next("start(), stop() and init() change what these bits show")
-            .into());
+        return Err(Failure::usage(text).next("start(), stop() and init() change what these bits show"));
     }
     let numbers = hands.driver.numbers(boards)?;
     let all = match set | clear {
@@ -179,7 +175,7 @@ pub fn status(
 }
 
 /// PC_XRESET: exloader with programming enabled.
-pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, BoardFailure> {
+pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let all = hands.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
     numbers.iter().for_each(|board| hands.forget(*board));
@@ -187,7 +183,7 @@ pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, 
 }
 
 /// PC_RESET, to all at once or one by one. Low bytes of the flash numbers of those that reported.
-pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, BoardFailure> {
+pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
         Boards::None => Vec::new(),
@@ -220,7 +216,7 @@ pub fn repair(
     board: u8,
     flash_number: Option<u16>,
     force: bool,
-) -> Result<Value, BoardFailure> {
+) -> Result<Value, Failure> {
     let listed = hands.inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number);
     let flash_number = flash_number.or(listed).ok_or_else(|| {
         Failure::usage(format!("which board stands at number {board}? no inventory has it"))
@@ -236,7 +232,7 @@ pub fn repair(
 }
 
 /// Listens, asks where that cannot do harm, and reports what is wrong.
-pub fn doctor(hands: &mut Hands) -> Result<Value, BoardFailure> {
+pub fn doctor(hands: &mut Hands) -> Result<Value, Failure> {
     let seen = hands.driver.examine(LISTEN)?;
     let profile = hands.driver.master.profile();
     Ok(json!({
@@ -247,13 +243,13 @@ pub fn doctor(hands: &mut Hands) -> Result<Value, BoardFailure> {
 }
 
 /// An image that is on a board, as sent.
-pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, BoardFailure> {
+pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())
 }
 
 /// Measures how boards read the protocol.
-pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, BoardFailure> {
+pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, Failure> {
     let init = options.init;
     let outcome = hands.driver.run(Request::Probe(options));
     if init {
@@ -281,7 +277,7 @@ pub fn conformance(
     boards: &Boards,
     (init, run, force): (bool, bool, bool),
     only: Vec<String>,
-) -> Result<Value, BoardFailure> {
+) -> Result<Value, Failure> {
     let boards = match boards {
         Boards::All => Vec::new(),
         boards => hands.driver.numbers(boards)?,
@@ -290,8 +286,7 @@ pub fn conformance(
     match hands.driver.run(Request::Conformance(options))? {
         Outcome::Conformance(report) => {
             if let Some(error) = report.error {
-                let board = super::failure::of_procedure(&error);
-                return Err(BoardFailure { board, ..SessionError::from(error).into() });
+                return Err(error.into());
             }
             Ok(json!({ "tests": report.tests, "left": report.left }))
         }

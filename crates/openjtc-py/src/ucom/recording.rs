@@ -7,13 +7,11 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanError, CanFrame, ControllerState};
-use host_kit::ErrorKind;
 use pyo3::prelude::*;
 use ucom::Profile;
 use ucom_host::files::recording::{RecordingError, RecordingFormat};
 use ucom_host::session::{Prompt, Recorder};
 
-use super::failure::BoardFailure;
 use super::shared::Process;
 use crate::error::Failure;
 
@@ -99,17 +97,16 @@ pub struct ChainRecording {
 
 impl ChainRecording {
     /// Begins one; its form goes by the ending of the file.
-    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, BoardFailure> {
+    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
         if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
             return Err(Failure::usage(format!("{}: nothing writes .{other} here", path.display()))
-                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP")
-                .into());
+                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP"));
         }
         if sink.is_taken() {
             let busy = Failure::usage("the chain is being recorded already");
-            return Err(busy.next("end that recording first").into());
+            return Err(busy.next("end that recording first"));
         }
         let (ready, opened) = mpsc::channel();
         let (sender, taken) = mpsc::channel();
@@ -129,14 +126,14 @@ impl ChainRecording {
         });
         match opened.recv() {
             Ok(None) => {}
-            Ok(Some(error)) => return Err(BoardFailure::usage(error)),
+            Ok(Some(error)) => return Err(Failure::usage(error)),
             Err(_) => return Err(failed("its writer has a fault")),
         }
         sink.set(Some(sender));
         Ok(Self { sink, writer: Mutex::new(Some(writer)), process: Process::this() })
     }
 
-    fn finish(&self) -> Result<Option<(u64, u64)>, BoardFailure> {
+    fn finish(&self) -> Result<Option<(u64, u64)>, Failure> {
         let writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(writer) = writer.filter(|_| self.process.is_this()) else { return Ok(None) };
         self.sink.set(None);
@@ -152,15 +149,8 @@ impl Drop for ChainRecording {
     }
 }
 
-fn failed(why: &str) -> BoardFailure {
-    Failure {
-        kind: ErrorKind::Fault,
-        code: "recording".into(),
-        message: format!("the recording failed: {why}"),
-        next: "is the disk full?".into(),
-        facts: Default::default(),
-    }
-    .into()
+fn failed(why: &str) -> Failure {
+    Failure::fault("recording", format!("the recording failed: {why}"), "is the disk full?")
 }
 
 fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
@@ -184,7 +174,7 @@ fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
 #[pymethods]
 impl ChainRecording {
     /// Ends it: frames that were written, and those that its form has no place for; None when it has ended before.
-    fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, BoardFailure> {
+    fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, Failure> {
         py.detach(|| self.finish())
     }
 }

@@ -6,12 +6,12 @@ use ucom_host::session::{
     Assignment, Boards, Cache, ParameterFile, Prepared, Session, SessionError, Stopped, only, plans, remember,
 };
 
-use super::failure::BoardFailure;
 use super::hands::Hands;
 use super::procedures::numbered;
+use crate::error::Failure;
 
 /// Starts applications; nothing moves by that.
-pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, BoardFailure> {
+pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let all = hands.starting(&numbers, |hands| {
         hands.driver.change_each(&numbers, |board| Request::Start { board, force })
@@ -33,7 +33,7 @@ pub struct Run {
 }
 
 /// Starts applications and control loops, with their values.
-pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, BoardFailure> {
+pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
@@ -96,7 +96,7 @@ fn begin(
 }
 
 /// Enables outputs of boards that run, or makes them safe. What makes them safe goes to each board, whatever another one does.
-pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), BoardFailure> {
+pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
         Boards::All => hands.held.borrow().running().iter().copied().collect(),
         boards => hands.driver.numbers(boards)?,
@@ -117,17 +117,17 @@ pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), B
 }
 
 /// A failure that names all boards of which something is not certain.
-fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), BoardFailure> {
+fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failure> {
     let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
     let Some((board, error)) = failed.into_iter().next() else { return Ok(()) };
-    let mut own = BoardFailure::from(error);
-    own.board = Some(board).filter(|_| numbers.len() == 1);
-    own.failure.message = format!("{what}: board {}: {}", numbers.join(", "), own.failure.message);
+    let mut own = Failure::from(error);
+    own.facts.board = Some(board).filter(|_| numbers.len() == 1);
+    own.message = format!("{what}: board {}: {}", numbers.join(", "), own.message);
     Err(own)
 }
 
 /// Sees to each board after a stop: those that are meant, or all that answer and all that this session has started.
-pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Value, BoardFailure> {
+pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
     let was_master = hands.driver.master.is_master();
     let wanted = match boards {
         Boards::All => {

@@ -8,7 +8,6 @@ use pyo3::prelude::*;
 use serde_json::json;
 
 use super::chain::Chain;
-use super::failure::BoardFailure;
 use super::objects;
 use super::owner::LOOK;
 use super::shared::Listener;
@@ -69,12 +68,7 @@ impl ChainSamples {
     }
 }
 
-fn silent() -> BoardFailure {
-    BoardFailure::from(Failure {
-        kind: ErrorKind::NoLink,
-        code: "no-outputs".into(),
-        message: format!("no board sent outputs for {} s: no control loop runs", SILENCE.as_secs()),
-        next: "run() starts control loops".into(),
-        facts: Default::default(),
-    })
+fn silent() -> Failure {
+    let message = format!("no board sent outputs for {} s: no control loop runs", SILENCE.as_secs());
+    Failure::new(ErrorKind::NoLink, "no-outputs", message).next("run() starts control loops")
 }

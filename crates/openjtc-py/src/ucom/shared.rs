@@ -11,7 +11,6 @@ use ucom_host::master::io::Snapshot;
 use ucom_host::session::Known;
 
 use super::alarms::Alarms;
-use super::failure::BoardFailure;
 use super::hands::Hands;
 use crate::error::Failure;
 
@@ -43,7 +42,7 @@ pub enum Halt {
 }
 
 /// Does something with the session, or takes the reason why it is not done.
-pub type Act = Box<dyn FnOnce(Result<&mut Hands, BoardFailure>) + Send>;
+pub type Act = Box<dyn FnOnce(Result<&mut Hands, Failure>) + Send>;
 
 /// A thing to do.
 pub struct Work {
@@ -58,7 +57,7 @@ struct Queue {
     /// What goes on, and whether it is to end.
     current: Option<(u64, Kind, bool)>,
     /// Nothing is taken any more, for this reason.
-    closed: Option<BoardFailure>,
+    closed: Option<Failure>,
 }
 
 /// All outputs of a board at one time.
@@ -118,12 +117,11 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// A failure of the session itself.
-pub fn failure(kind: ErrorKind, code: &str, message: &str, next: &str) -> BoardFailure {
-    Failure { kind, code: code.into(), message: message.into(), next: next.into(), facts: Default::default() }
-        .into()
+pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &str) -> Failure {
+    Failure::new(kind, code, message).next(next)
 }
 
-fn stopped() -> BoardFailure {
+fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "a stop came before its turn: it is not done", "")
 }
 
@@ -143,7 +141,7 @@ impl Process {
 }
 
 /// What should never happen has.
-pub fn fault() -> BoardFailure {
+pub fn fault() -> Failure {
     failure(ErrorKind::Fault, "fault", "the thread of the chain has a fault", "connect again")
 }
 
@@ -273,7 +271,7 @@ impl Shared {
     }
 
     /// Reports what has to be an error, once.
-    pub fn check(&self) -> Result<(), BoardFailure> {
+    pub fn check(&self) -> Result<(), Failure> {
         self.asked();
         self.alarms.check()
     }
@@ -317,12 +315,12 @@ impl Shared {
     }
 
     /// Why nothing is done any more; `None`: it goes on.
-    pub fn gone(&self) -> Option<BoardFailure> {
+    pub fn gone(&self) -> Option<Failure> {
         lock(&self.queue).closed.clone()
     }
 
     /// Nothing is taken any more.
-    pub fn close(&self, why: BoardFailure) {
+    pub fn close(&self, why: Failure) {
         let works = {
             let mut queue = lock(&self.queue);
             queue.closed.get_or_insert(why.clone());

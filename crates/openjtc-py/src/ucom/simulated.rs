@@ -11,7 +11,6 @@ use pyo3::prelude::*;
 use ucom::Profile;
 use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
 
-use super::failure::BoardFailure;
 use super::shared::Process;
 use crate::error::Failure;
 
@@ -40,7 +39,7 @@ pub struct Simulated {
 
 impl Simulated {
     /// Starts it at a free port of this computer.
-    pub fn start(simulation: Simulation) -> Result<Self, BoardFailure> {
+    pub fn start(simulation: Simulation) -> Result<Self, Failure> {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
             Some(path) => ChainConfig::read(path, &profile).map_err(|e| {
@@ -125,10 +124,10 @@ impl SimulatedChain {
         faults: Option<PathBuf>,
         seed: u64,
         profile: Option<PathBuf>,
-    ) -> Result<Self, BoardFailure> {
+    ) -> Result<Self, Failure> {
         let profile = super::procedures::profile(profile.as_deref(), None)?;
         if boards.is_some_and(|boards| boards > 31) {
-            return Err(BoardFailure::usage("boards: a chain has at most 31"));
+            return Err(Failure::usage("boards: a chain has at most 31"));
         }
         let simulation = Simulation { profile, chain, boards, faults, seed };
         let inner = py.detach(|| Simulated::start(simulation))?;
@@ -145,11 +144,11 @@ impl SimulatedChain {
         self.inner.boards
     }
 
-    fn fault(&self, line: &str) -> Result<(), BoardFailure> {
+    fn fault(&self, line: &str) -> Result<(), Failure> {
         Fault::from_line(line)
             .map_err(|e| Failure::usage(e.to_string()).next("ucom help faults lists them"))?;
         let sender = self.inner.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        sender.send(line.into()).map_err(|_| BoardFailure::usage("the simulated chain has ended"))
+        sender.send(line.into()).map_err(|_| Failure::usage("the simulated chain has ended"))
     }
 
     fn end(&self, py: Python<'_>) {

@@ -15,7 +15,6 @@ use ucom_host::master::update::{
 };
 use ucom_host::session::Boards;
 
-use super::failure::BoardFailure;
 use super::hands::Hands;
 use super::shared::UPDATED;
 use crate::error::Failure;
@@ -65,13 +64,13 @@ impl Read {
         first: &Source,
         second: Option<&Source>,
         profile: &Profile,
-    ) -> Result<(UpdateImage, Option<UpdateImage>, u16), BoardFailure> {
+    ) -> Result<(UpdateImage, Option<UpdateImage>, u16), Failure> {
         let address_unit = match self.addresses.as_deref() {
             None => None,
             Some("byte") => Some(AddressUnit::Byte),
             Some("word") => Some(AddressUnit::Word),
             Some(other) => {
-                return Err(BoardFailure::usage(format!("addresses: {other:?} is neither byte nor word")));
+                return Err(Failure::usage(format!("addresses: {other:?} is neither byte nor word")));
             }
         };
         let gaps = if self.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
@@ -79,28 +78,28 @@ impl Read {
         let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
         if self.name_target && !has_header(profile) {
             let text = "name_target: the name goes into the header, and the profile sends none";
-            return Err(BoardFailure::usage(text));
+            return Err(Failure::usage(text));
         }
         let second = second.map(|source| image(source, &options)).transpose()?;
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
     /// The flash date in the profile's form; 0 where no header carries it.
-    fn day(&self, profile: &Profile) -> Result<u16, BoardFailure> {
+    fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: it goes into the header, and the profile sends none";
-            return self.date.map_or(Ok(0), |_| Err(BoardFailure::usage(text)));
+            return self.date.map_or(Ok(0), |_| Err(Failure::usage(text)));
         }
         let (year, month, day) = self.date.unwrap_or(self.today);
         let form = profile.prog_date;
         form.encode(year, month, day).ok_or_else(|| {
             let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
-            BoardFailure::usage(text)
+            Failure::usage(text)
         })
     }
 }
 
-fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, BoardFailure> {
+fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, Failure> {
     let read = match source {
         Source::File(path) => Image::read(path, options),
         Source::Bytes(bytes) => Image::parse(bytes, options),
@@ -140,15 +139,13 @@ fn advice(error: &ImageError) -> &'static str {
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
-fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, BoardFailure> {
+fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
             [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
             _ => {
                 let text = format!("flash_number names one board, but {} are meant", numbers.len());
-                Err(Failure::usage(text)
-                    .next("several take theirs from the inventory that init() makes")
-                    .into())
+                Err(Failure::usage(text).next("several take theirs from the inventory that init() makes"))
             }
         };
     }
@@ -165,19 +162,19 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
 }
 
 /// Nobody knows which board stands there.
-fn not_listed(hands: &Hands, board: u8) -> BoardFailure {
+fn not_listed(hands: &Hands, board: u8) -> Failure {
     let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
     let error = match hands.inventory {
         Some(_) => IdentifyError::NotListed { board, path },
         None => IdentifyError::NoInventory { board, path },
     };
-    let mut own = BoardFailure::about(&error, Some(board));
-    own.failure.next = "init() makes one; or update one board with its flash_number".into();
+    let mut own = Failure::of(&error);
+    own.next = "init() makes one; or update one board with its flash_number".into();
     own
 }
 
 /// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
-fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, BoardFailure> {
+fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, Failure> {
     let mut numbers = hands.driver.numbers(boards)?;
     if let (Boards::All, Some(inventory)) = (boards, &hands.inventory) {
         numbers.extend(inventory.boards().map(|board| board.number));
@@ -188,7 +185,7 @@ fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, BoardFailure> 
 }
 
 /// Programs the boards that are meant; `report` gets the progress.
-pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Result<Value, BoardFailure> {
+pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Result<Value, Failure> {
     let profile = hands.driver.master.profile();
     let numbers = numbers(hands, &update.boards)?;
     let targets = targets(hands, &update, &numbers)?;
@@ -245,7 +242,7 @@ fn step(progress: &Progress) -> Value {
 }
 
 /// What an update that did not end well ended with.
-fn failed(report: &UpdateReport, kind: ErrorKind) -> BoardFailure {
+fn failed(report: &UpdateReport, kind: ErrorKind) -> Failure {
     let failures: Vec<_> =
         report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?))).collect();
     let texts: Vec<String> =
@@ -255,13 +252,11 @@ fn failed(report: &UpdateReport, kind: ErrorKind) -> BoardFailure {
         let (message, next) = report.unproven();
         let next =
             [next.replace("`rewrite`", "rewrite=True"), "or accept it: unverified=True".into()].join("; ");
-        return Failure { kind, code: "not-verified".into(), message, next, facts: Default::default() }
-            .into();
+        return Failure::new(kind, "not-verified", message).next(next);
     };
-    let mut own = BoardFailure::about(*failure, Some(*board));
-    own.failure.kind = kind;
-    own.failure.message = texts.join("; ");
-    own.board = own.board.filter(|_| failures.len() == 1);
+    let mut own = Failure::of(*failure).message(texts.join("; "));
+    own.kind = kind;
+    own.facts.board = Some(*board).filter(|_| failures.len() == 1);
     own
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use host_kit::ErrorKind;
+use host_kit::{ErrorKind, Facts};
 use serde_json::{Value, json};
 use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
 use ucom_host::master::io::Kind as Buffer;
@@ -12,7 +12,6 @@ use ucom_host::session::{
     note_rounded, words, write,
 };
 
-use super::failure::BoardFailure;
 use super::hands::Hands;
 use super::objects;
 use crate::error::Failure;
@@ -21,7 +20,7 @@ use crate::error::Failure;
 const OLD_US: u64 = 500_000;
 
 /// The names of boards.
-pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let mut all = Vec::new();
     for board in numbers {
@@ -37,7 +36,7 @@ pub fn set(
     buffer: Option<Buffer>,
     (name, value): (&str, &str),
     force: bool,
-) -> Result<Value, BoardFailure> {
+) -> Result<Value, Failure> {
     let value = value.parse().map_err(|e| {
         Failure::usage(format!("{name}: {e}")).next("pass a number, \"15.5 deg\", \"0x05DC\" or a bool")
     })?;
@@ -77,7 +76,7 @@ pub fn set(
 }
 
 /// Outputs with their age, inputs and parameters of boards; those whose names are not known are asked.
-pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, BoardFailure> {
+pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let numbers = with_names(hands, &numbers, *boards == Boards::All)?;
     numbers.into_iter().map(|board| of_board(hands, board)).collect()
@@ -103,7 +102,7 @@ pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSe
 }
 
 /// The same of boards that run; outputs that are old are an error.
-pub fn running(hands: &mut Hands) -> Result<Value, BoardFailure> {
+pub fn running(hands: &mut Hands) -> Result<Value, Failure> {
     let numbers: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
     let all = values(hands, &Boards::Some(numbers))?;
     for one in all.as_array().into_iter().flatten().filter(|one| one["stale"] == json!(true)) {
@@ -119,7 +118,7 @@ pub fn running(hands: &mut Hands) -> Result<Value, BoardFailure> {
     Ok(all)
 }
 
-fn of_board(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
+fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     let (inputs, parameters) = objects::settings(&known, &hands.driver.master);
     let now_us = hands.driver.now_us();
@@ -144,7 +143,7 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
 }
 
 /// A value by its name: an output of a board that sends them, else an input, else a parameter. What is old is an error.
-pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, BoardFailure> {
+pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
         .into_iter()
@@ -169,23 +168,18 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, BoardFai
 }
 
 /// Nothing new of this board; `what` is one output, or all of them.
-fn no_value(board: u8, what: &str, age_s: Option<f64>) -> BoardFailure {
+fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
         Some(age_s) => ("stale", format!("board {board}: the last {what} came {age_s:.1} s ago")),
     };
-    let failure = Failure {
-        kind: ErrorKind::NoLink,
-        code: code.into(),
-        message,
-        next: "run() starts control loops; doctor() looks at bus and boards".into(),
-        facts: Default::default(),
-    };
-    BoardFailure { board: Some(board), ..failure.into() }
+    Failure::new(ErrorKind::NoLink, code, message)
+        .next("run() starts control loops; doctor() looks at bus and boards")
+        .with(Facts::default().at_board(board))
 }
 
 /// Writes a parameter file: what was written last as values, all other names as comments.
-pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, BoardFailure> {
+pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
     for board in hands.driver.numbers(boards)? {
         let known = hands.known(board)?;
@@ -220,7 +214,7 @@ pub fn apply_parameters(
     file: &ParameterFile,
     dry_run: bool,
     force: bool,
-) -> Result<usize, BoardFailure> {
+) -> Result<usize, Failure> {
     file.identities(&mut hands.driver)?;
     // What is written to must run. To check, what is known will do.
     let session = &mut hands.session;
@@ -240,7 +234,7 @@ pub fn apply_parameters(
 }
 
 /// What the boards want their inputs to be at first.
-pub fn initial_inputs(hands: &mut Hands, board: u8) -> Result<Value, BoardFailure> {
+pub fn initial_inputs(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     match hands.driver.run(Request::InitialInputs { board })? {
         ucom_host::master::Outcome::InitialInputs { values, .. } => {

@@ -85,7 +85,7 @@ pub(super) async fn take(
     let LeaseRequest { name, lasts_s, policy, ask } = request;
     let lasts = lasts(lasts_s)?;
     let name = caller.named(&name);
-    let key = random().map_err(|e| Problem::diagnosed(&e))?;
+    let key = random().map_err(|e| Problem::of(&e))?;
     let terms = (name.as_str(), lasts, policy);
     let (client, held) = {
         let (mut leases, now) = agent.shared.leases();

@@ -138,7 +138,7 @@ impl Hands {
                 ) => ErrorKind::Device,
                 (kind, _) => kind,
             };
-            return Problem::diagnosed(error).kind(kind);
+            return Problem::of(error).kind(kind);
         }
         self.shared.why_cancelled()
     }

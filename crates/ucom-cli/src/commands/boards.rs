@@ -1,6 +1,6 @@
 //! `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`: single acts on boards.
 
-use cli_kit::{Diagnose, ErrorKind, Failure, Output};
+use cli_kit::{Diagnose, ErrorKind, Failure, Output, error_object, exit};
 use serde_json::json;
 use ucom::{Profile, Status};
 use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted, state_name};
@@ -35,7 +35,7 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     if mirrors != Status(0) {
         return Err(Failure::usage(format!("{mirrors}: mirrors reality and cannot be written"))
-            .hint("ucom start, ucom stop and ucom init change what these bits show"));
+            .next("ucom start, ucom stop and ucom init change what these bits show"));
     }
     if let Some(bytes) = args.raw {
         return raw_status(args, bytes, link, out);
@@ -96,7 +96,7 @@ fn raw_status(
     });
     match all.iter().all(RawStatus::as_expected) {
         true => Ok(()),
-        false => Err(Failure::printed(ErrorKind::Device)),
+        false => Err(Failure::shown(ErrorKind::Device)),
     }
 }
 
@@ -135,7 +135,7 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     }
     if reports.ids.is_empty() {
         return Err(Failure::new(ErrorKind::NoLink, "no-boards", "no board reported after the reset")
-            .hint("ucom doctor looks for the reason"));
+            .next("ucom doctor looks for the reason"));
     }
     out.result(&json!({ "reports": reports.ids }), || {
         let ids: Vec<String> = reports.ids.iter().map(|id| format!("0x{id:02X}")).collect();
@@ -183,7 +183,7 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     }
     let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
     let mut failures: Vec<(u8, Failure)> = failed.into_iter().map(|(board, e)| (board, e.into())).collect();
-    let Some(worst) = failures.iter().map(|(_, f)| f).max_by_key(|f| f.exit()).map(|f| f.kind) else {
+    let Some(worst) = failures.iter().map(|(_, f)| f).max_by_key(|f| exit::of(f.kind)).map(|f| f.kind) else {
         out.result(&json!({ "boards": boards, "shared_numbers": shared }), || lines_of(&all));
         return Ok(());
     };
@@ -194,7 +194,7 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         return Err(failure);
     }
     let error = |(board, f): &(u8, Failure)| {
-        let mut value = f.to_json();
+        let mut value = error_object(f);
         value["board"] = json!(board);
         value
     };
@@ -203,5 +203,5 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         let numbers: Vec<String> = failures.iter().map(|(board, _)| board.to_string()).collect();
         lines_of(&all) + &format!("not stopped for certain: {}\n", numbers.join(", "))
     });
-    Err(Failure::printed(worst))
+    Err(Failure::shown(worst))
 }

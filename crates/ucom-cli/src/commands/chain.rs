@@ -1,6 +1,6 @@
 //! `ucom scan` and `init`: who is in the chain, and which numbers boards have.
 
-use cli_kit::{ErrorKind, Failure, Output, OutputFile};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile, error_object};
 use serde_json::json;
 use ucom_host::files::Inventory;
 use ucom_host::master::{InitOptions, Outcome, Request, ScanFinding, counted};
@@ -24,11 +24,11 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     });
     let shared = nothing_shared(&driver.master).err().map(Failure::from);
     if let Some(f) = &shared {
-        value["error"] = f.to_json();
+        value["error"] = error_object(f);
     }
     if report.boards.is_empty() && report.reports.ids.is_empty() {
         let failure = Failure::new(ErrorKind::NoLink, "no-boards", "no board answers")
-            .hint("ucom doctor looks for the reason");
+            .next("ucom doctor looks for the reason");
         return Err(failure);
     }
     out.result(&value, || {
@@ -50,8 +50,8 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match shared {
         // stdout has it already.
         Some(failure) => {
-            out.note(format!("{}\n  {}", failure.message, failure.hint));
-            Err(Failure::printed(failure.kind))
+            out.note(format!("{}\n  {}", failure.message, failure.next));
+            Err(Failure::shown(failure.kind))
         }
         None => Ok(()),
     }
@@ -124,6 +124,6 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     });
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(kind)),
+        Some(kind) => Err(Failure::shown(kind)),
     }
 }

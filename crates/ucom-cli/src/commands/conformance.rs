@@ -48,7 +48,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
         SessionError::Procedure(Error::Running(
             RunningError::Running { .. } | RunningError::LoopRuns { .. },
-        )) => Failure::from(e).hint("`ucom stop all` first; --force does not cover this"),
+        )) => Failure::from(e).next("`ucom stop all` first; --force does not cover this"),
         e => e.into(),
     });
     let report = match outcome? {
@@ -59,7 +59,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     print(&report, out);
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(kind)),
+        Some(kind) => Err(Failure::shown(kind)),
     }
 }
 
@@ -74,7 +74,7 @@ fn program(
         Boards::Some(numbers) if numbers.len() == 1 => numbers.first().copied().unwrap_or_default(),
         _ => {
             return Err(Failure::usage("--program IMAGE programs one board: name it")
-                .hint("ucom conformance 1 --flash-id 0x21 --program IMAGE"));
+                .next("ucom conformance 1 --flash-id 0x21 --program IMAGE"));
         }
     };
     let flash_number = match args.flash_id {

@@ -28,7 +28,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let value =
         json!({ "bus": link.url()?, "healthy": failure.is_none(), "findings": all, "boards": boards });
     out.result(&value, || all.iter().map(line).collect());
-    failure.map_or(Ok(()), |kind| Err(Failure::printed(kind)))
+    failure.map_or(Ok(()), |kind| Err(Failure::shown(kind)))
 }
 
 fn line(f: &Finding) -> String {
@@ -61,7 +61,7 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         // Nothing was measured: a profile of defaults would pass for what these boards are.
         let what = "no board answers: nothing was measured, no profile written";
         return Err(
-            Failure::new(ErrorKind::NoLink, "no-boards", what).hint("ucom doctor looks for the reason")
+            Failure::new(ErrorKind::NoLink, "no-boards", what).next("ucom doctor looks for the reason")
         );
     }
     if report.boards.is_empty() {

@@ -12,7 +12,7 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let found = if query.is_empty() { all.iter().collect() } else { find(&all, &query) };
     if found.is_empty() {
         return Err(Failure::usage(format!("nothing is known about \"{query}\""))
-            .hint("ucom explain lists every word; a number is that of an error"));
+            .next("ucom explain lists every word; a number is that of an error"));
     }
     let value = |w: &&Word| -> Value {
         json!({ "name": w.shown[0], "family": w.family, "shown": w.shown, "meaning": w.meaning, "next": w.next })

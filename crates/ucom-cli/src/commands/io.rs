@@ -25,7 +25,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     // What is there is a table that somebody has filled in.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e)
-            .hint("--template - shows the table, to be added by hand; --overwrite writes over it"),
+            .next("--template - shows the table, to be added by hand; --overwrite writes over it"),
         false => Failure::nothing_sent(e),
     })?;
     let mut driver = link.session()?;
@@ -231,7 +231,7 @@ fn move_for(
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(ErrorKind::NoLink, "no-outputs", format!("board {board} sent no outputs"))
-            .hint("ucom doctor looks for the reason"));
+            .next("ucom doctor looks for the reason"));
     }
     print_words("so", known, Kind::So, &words, out);
     Ok(())

@@ -59,7 +59,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                     "no-outputs",
                     "no board sends outputs: no control loop runs",
                 )
-                .hint("ucom run, in another terminal"));
+                .next("ucom run, in another terminal"));
             }
             driver
                 .note("no board sends outputs: no control loop runs (ucom run, in another terminal)".into());
@@ -82,7 +82,7 @@ fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
     let first = heads.next().unwrap_or_default();
     if heads.any(|other| other != first) {
         return Err(Failure::usage("boards with different outputs do not fit into one table")
-            .hint("one board at a time, or --json"));
+            .next("one board at a time, or --json"));
     }
     Ok(format!("time_s,board,{first}"))
 }

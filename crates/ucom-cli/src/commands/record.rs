@@ -18,7 +18,7 @@ use crate::session::shared_numbers;
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
-    Failure::new(ErrorKind::Fault, "recording", e).hint("is the disk full?")
+    Failure::new(ErrorKind::Fault, "recording", e).next("is the disk full?")
 }
 
 /// Reports that a recording does not end as one does.
@@ -126,7 +126,7 @@ fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>
     if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
         let what = format!("{}: nothing writes .{other} here", args.file.display());
         let forms = "forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP";
-        return Err(Failure::usage(what).hint(forms));
+        return Err(Failure::usage(what).next(forms));
     }
     let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
     let files = [Some(args.file.clone()), beside].into_iter().flatten();

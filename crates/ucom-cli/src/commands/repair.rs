@@ -16,7 +16,7 @@ pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let flash_number = match args.flash_id {
         Some(flash) => flash,
         // Which board is meant is the command line's matter: wrong usage.
-        None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).hint(e.hint()))?,
+        None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).next(e.hint()))?,
     };
     let mut driver = link.session()?;
     let profile = driver.master.profile();

@@ -74,7 +74,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     result?;
     if !running.is_empty() {
         let next = format!("without heartbeats they become safe by themselves; ucom stop {}", list.join(","));
-        return Err(Failure::new(ErrorKind::Fault, "not-stopped", not_stopped).hint(next));
+        return Err(Failure::new(ErrorKind::Fault, "not-stopped", not_stopped).next(next));
     }
     driver.nobody_lost(&boards)?;
     Ok(followed.nobody_left()?)

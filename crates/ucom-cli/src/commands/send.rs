@@ -23,7 +23,7 @@ pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let frames: Vec<RecordedFrame> = args.frames.iter().enumerate().map(frame).collect::<Result<_, _>>()?;
     if let Some(frame) = frames.iter().find(|frame| !args.intrusive && is_intrusive(frame)) {
         let what = format!("{frame} would reset, number, program, start or move boards; nothing was sent");
-        return Err(Failure::new(ErrorKind::Refused, "intrusive", what).hint("--intrusive sends it"));
+        return Err(Failure::new(ErrorKind::Refused, "intrusive", what).next("--intrusive sends it"));
     }
     let wire = |frame: &RecordedFrame| {
         replayed(frame).ok_or_else(|| Failure::usage(format!("{frame} is no frame that can be sent")))
@@ -40,7 +40,7 @@ pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     if bus.times_bus_off() > 0 {
         let what =
             format!("the CAN controller of this computer went bus-off: {WHY}; not all frames were sent");
-        return Err(Failure::new(ErrorKind::NoLink, "bus-off", what).hint(next(bus.url())));
+        return Err(Failure::new(ErrorKind::NoLink, "bus-off", what).next(next(bus.url())));
     }
     let texts: Vec<String> = frames.iter().map(ToString::to_string).collect();
     out.result(&json!({ "sent": texts }), || format!("sent: {}", texts.join(" ")));

@@ -28,14 +28,14 @@ const LOOK: Duration = Duration::from_millis(50);
 pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(Failure::usage("a bus and --sim: the agent owns one of them")
-            .hint("leave --bus out, and unset UCOM_BUS"));
+            .next("leave --bus out, and unset UCOM_BUS"));
     }
     if args.boards.is_some() && !args.sim {
-        return Err(Failure::usage("--boards is for simulated boards").hint("add --sim"));
+        return Err(Failure::usage("--boards is for simulated boards").next("add --sim"));
     }
     let token_file = args.token_file.clone().or_else(|| token_file("ucom-tokens.toml")).ok_or_else(|| {
         Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
-            .hint("name one with --token-file FILE")
+            .next("name one with --token-file FILE")
     })?;
     let config = Config {
         profile: link.profile()?,
@@ -55,7 +55,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
-            .hint("another agent may listen there: name another address with --listen")
+            .next("another agent may listen there: name another address with --listen")
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
@@ -82,7 +82,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     drop(simulated);
     gone.map_or(Ok(()), |why| {
         Err(Failure::new(ErrorKind::NoLink, "bus", why)
-            .hint("is the bus still there? ucom doctor looks at it"))
+            .next("is the bus still there? ucom doctor looks at it"))
     })
 }
 

@@ -26,7 +26,7 @@ pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         None => Vec::new(),
         Some(path) => {
             let wrong = |e: &dyn std::fmt::Display| {
-                Failure::usage(format!("{}: {e}", path.display())).hint("ucom help faults shows the form")
+                Failure::usage(format!("{}: {e}", path.display())).next("ucom help faults shows the form")
             };
             Fault::from_toml(&std::fs::read_to_string(path).map_err(|e| wrong(&e))?).map_err(|e| wrong(&e))?
         }
@@ -35,7 +35,7 @@ pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let chain = ChainSim::new(&config, faults, args.seed, &profile);
     let mut server =
         ChainServer::bind(&args.listen, chain, profile.bitrate, args.seed, |text| out.note(text))
-            .map_err(|e| Failure::usage(e).hint("--listen 127.0.0.1:0 takes a free port"))?;
+            .map_err(|e| Failure::usage(e).next("--listen 127.0.0.1:0 takes a free port"))?;
     let url = server.url();
     out.result(&json!({ "ready": url, "boards": boards }), || format!("ready: {url}"));
     let typed = typed();
@@ -59,7 +59,7 @@ pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
 fn config(args: &SimArgs, profile: &Profile) -> Result<ChainConfig, Failure> {
     let config = match &args.chain {
         Some(path) => ChainConfig::read(path, profile)
-            .map_err(|e| Failure::usage(e).hint("ucom help sim shows the form of chain files"))?,
+            .map_err(|e| Failure::usage(e).next("ucom help sim shows the form of chain files"))?,
         None => ChainConfig::head(profile),
     };
     let count = match args.boards {

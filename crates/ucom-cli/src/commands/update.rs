@@ -52,7 +52,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     print(&report, &files.names, &profile, out);
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(kind)),
+        Some(kind) => Err(Failure::shown(kind)),
     }
 }
 
@@ -99,7 +99,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
     }
     let report = UpdateReport { dry_run: args.dry_run, boards, ..UpdateReport::default() };
     print(&report, &[], profile, out);
-    Failure::printed(report.failure().unwrap_or(ErrorKind::Refused))
+    Failure::shown(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
@@ -108,7 +108,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
         return match numbers {
             [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
             _ => Err(Failure::usage(format!("--flash-id names one board, but {} are meant", numbers.len()))
-                .hint("a list takes the flash ids from the inventory that ucom init writes")),
+                .next("a list takes the flash ids from the inventory that ucom init writes")),
         };
     }
     // One board by its number alone is what the user asked for; a list needs to know who is who.

@@ -54,7 +54,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         // Some mistakes name the file themselves.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
-        failure.hint(advice(&e))
+        failure.next(advice(&e))
     })?;
     for note in image.notes() {
         out.note(format!("note: {}: {note}", file.display()));
@@ -105,7 +105,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
         if given.is_some() && plan != fits {
             let text = format!("{option} goes with `prog.plan` {fits}, but the profile has {plan}");
             let hint = "--profile FILE names the boards' profile; ucom help profile lists its keys and plans";
-            return Err(Failure::usage(text).hint(hint));
+            return Err(Failure::usage(text).next(hint));
         }
     }
     for (option, fits, given) in options {
@@ -114,7 +114,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
             None if plan == fits && plan != Plan::Raw => {
                 let text =
                     format!("`prog.plan` {plan} sends two images, and there is only one: {option} FILE");
-                return Err(Failure::usage(text).hint(match plan {
+                return Err(Failure::usage(text).next(match plan {
                     Plan::ExloaderApp => "IMAGE is the application, the other one the exloader for RAM",
                     _ => "IMAGE is for program memory, the other one for data memory",
                 }));
@@ -131,7 +131,7 @@ pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let date = match asked {
         Some(_) if !has_header(profile) => {
             return Err(Failure::usage("--date: the date goes into the header, and the profile sends none")
-                .hint("see prog.plan and prog.header in ucom help profile"));
+                .next("see prog.plan and prog.header in ucom help profile"));
         }
         None if !has_header(profile) => return Ok(0),
         Some(text) => match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
@@ -148,7 +148,7 @@ pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let year = u16::try_from(date.year()).ok();
     year.and_then(|year| form.encode(year, date.month().into(), date.day())).ok_or_else(|| {
         Failure::usage(format!("{date} is no date that prog.date = {form} can hold"))
-            .hint("--date takes its 16 bits as well, as 0x3AC1")
+            .next("--date takes its 16 bits as well, as 0x3AC1")
     })
 }
 
@@ -189,7 +189,7 @@ mod tests {
         // Bits only, as there is no calendar.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
-        assert!(day(None, &raw).is_err_and(|e| e.hint.contains("0x3AC1")));
+        assert!(day(None, &raw).is_err_and(|e| e.next.contains("0x3AC1")));
         // No header, no date.
         let none = Profile { prog_plan: Plan::Raw, ..fat };
         assert_eq!(day(None, &none).ok(), Some(0));

@@ -163,6 +163,6 @@ fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
         "changed": changed(b),
         "attempts": b.attempts,
         "time_s": b.time_us as f64 * 1e-6,
-        "error": b.failure.as_ref().map(|f| Failure::of(f).to_json()),
+        "error": b.failure.as_ref().map(|f| cli_kit::error_object(&Failure::of(f))),
     })
 }

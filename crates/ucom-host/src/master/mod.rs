@@ -36,7 +36,7 @@
 mod counted;
 pub mod doctor;
 mod engine;
-mod error;
+pub(crate) mod error;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;

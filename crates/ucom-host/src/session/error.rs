@@ -1,10 +1,11 @@
 //! Why a session did not do what was asked: a procedure failed, or what is around it did.
 use can_link::{CanError, InvalidFrame, OpenError};
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
 use super::bus_off;
 use crate::files::InventoryError;
 use crate::files::signals::ValueError;
+use crate::master::error::of_one;
 use crate::master::io::Kind;
 use crate::master::{Error, ExchangeError, MasterError, Outcome, SignalError};
 
@@ -219,6 +220,20 @@ impl Diagnose for SessionError {
         };
         Diagnosis::new(kind, code, next)
     }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Procedure(e) => e.facts(),
+            Self::Values(e) => e.facts(),
+            Self::BusOff { failure, .. } | Self::Partly { failure, .. } => failure.facts(),
+            Self::LeftLoop { boards } => of_one(boards),
+            Self::NoNames { failed } => {
+                let boards: Vec<u8> = failed.iter().map(|(board, _)| *board).collect();
+                of_one(&boards)
+            }
+            _ => Facts::default(),
+        }
+    }
 }
 
 impl From<Outcome> for SessionError {
@@ -255,6 +270,20 @@ impl Diagnose for ValuesError {
                 "params",
                 "nothing was written; ucom io shows names and ranges, ucom info the boards",
             ),
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Value { board, error, .. } => match **error {
+                ValueError::Range { value, limit, .. } => Facts::beyond(value, limit).at_board(*board),
+                _ => Facts::default().at_board(*board),
+            },
+            Self::NoSignal { board, .. }
+            | Self::Twice { board, .. }
+            | Self::NotMeant { board, .. }
+            | Self::Unknown { board, .. } => Facts::default().at_board(*board),
+            Self::File { .. } | Self::Misfit { .. } => Facts::default(),
         }
     }
 }

@@ -5,6 +5,7 @@
 mod channels;
 mod protocol;
 
+use agent_kit::api::Problem;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -27,7 +28,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 
 use self::channels::{PAUSE, STATUS, STOP, Subscriptions};
 use self::protocol::{Call, FromClient, NAMES, ToClient};
-use super::{Agent, Caller, ErrorObject};
+use super::{Agent, Caller};
 
 /// Longest message of a client.
 const MESSAGE_MAX: usize = 64 << 10;
@@ -69,7 +70,7 @@ pub(super) async fn foxglove(
     if !is_asked(&headers) {
         let message = format!("this socket speaks {}", NAMES.join(" and "));
         let next = "ask for one of them in Sec-WebSocket-Protocol; /api/stream needs none";
-        return ErrorObject::new("request", message, next).unreadable().into_response();
+        return Problem::new("request", message, next).unreadable().into_response();
     }
     let sockets = agent.sockets.clone();
     let upgrade = upgrade.protocols(NAMES).max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
@@ -176,7 +177,7 @@ fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
         if caller.looks_only {
             return Err("pages of this origin may only look".to_owned());
         }
-        agent.halt(&caller.clone().into(), command).map_err(|error| error.message.into())
+        agent.halt(&caller.clone().into(), command).map_err(|error| error.message.clone())
     });
     shared.answer(match done {
         Ok(sent) => {

@@ -30,7 +30,7 @@ pub(super) fn push(
         let message =
             format!("{}: the file gives no {}; nothing was sent", arm.name, set.missing().join(", no "));
         return Err(Failure::usage(message)
-            .hint("`jtc arm import` proposes starting values for a URDF, `jtc arm check FILE` names what is missing"));
+            .next("`jtc arm import` proposes starting values for a URDF, `jtc arm check FILE` names what is missing"));
     }
     set.check()?;
     arm.check_gains()?;
@@ -77,10 +77,10 @@ fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
         Error::Link(LinkError::Refused { request: jtc_wire::FrameType::SetSettings, code, .. }) => match code {
-            jtc_wire::DataStatus::NotAllowed => failure.hint(
+            jtc_wire::DataStatus::NotAllowed => failure.next(
                 "settings change without torque only: `jtc disable` (an arm without brakes falls), then push again; nothing was changed",
             ),
-            _ => failure.hint("`jtc arm check FILE` names the value; nothing was changed"),
+            _ => failure.next("`jtc arm check FILE` names the value; nothing was changed"),
         },
         Error::Extension(_) => failure,
         _ => Failure { message: format!("{}: {}", arm.name, failure.message), ..failure },
@@ -97,7 +97,7 @@ fn without_extensions(
 ) -> Result<(), Failure> {
     if store {
         let message = "this controller has no extensions: it keeps no arm; nothing was sent";
-        return Err(Failure::new(ErrorKind::Refused, "no-extension", message).hint("push without --store"));
+        return Err(Failure::new(ErrorKind::Refused, "no-extension", message).next("push without --store"));
     }
     let differences = limits::accept(arm, &Config::avena(), accept.accept_device_limits, out)?;
     let pushed = session.push(&arm.parameter_set(), |p| out.note(sent(p)))?;
@@ -149,7 +149,7 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
         }
         text.trim_end().to_owned()
     });
-    if equal { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
+    if equal { Ok(()) } else { Err(Failure::shown(ErrorKind::Refused)) }
 }
 
 fn as_table(differences: &[Difference]) -> String {

@@ -1,6 +1,6 @@
 //! The way from where the arm stands to the first point of a trajectory.
 
-use cli_kit::{ErrorKind, Failure, Output};
+use cli_kit::{ErrorKind, Failure, Output, error_object};
 use jtc_host::CheckError;
 use jtc_host::plan::{ApproachError, MoveSpeed};
 use serde_json::json;
@@ -24,11 +24,11 @@ pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Fail
     if !out.is_json() {
         return failure;
     }
-    let error = failure.to_json();
+    let error = error_object(&failure);
     let value = json!({ "outcome": "refused", "phase": "approach", "verdict": verdict, "error": error });
     out.result(&value, String::new);
-    out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-    Failure::printed(failure.kind)
+    out.note(format!("jtc: {}\n     {}", failure.message, failure.next));
+    Failure::shown(failure.kind)
 }
 
 /// The way to the first point cannot be gone; the trajectory itself is sound.
@@ -39,7 +39,7 @@ fn refused(why: &str, file: &str) -> Failure {
         "nothing moved, and {file} itself passed: bring the arm nearer to its first point (`jtc traj info {file}` shows it), by hand \
          with `jtc teach on` and `jtc teach off`, or with a trajectory of your own around what is in the way"
     );
-    Failure::new(ErrorKind::Refused, "approach", message).hint(hint)
+    Failure::new(ErrorKind::Refused, "approach", message).next(hint)
 }
 
 #[cfg(test)]
@@ -53,8 +53,8 @@ mod tests {
         assert_eq!((failure.kind, failure.code), (ErrorKind::Refused, "approach"));
         assert!(failure.message.contains("first point of 'my motion.csv' is refused: joint 2"));
         assert!(
-            failure.hint.contains("jtc traj info 'my motion.csv'") && failure.hint.contains("jtc teach on")
+            failure.next.contains("jtc traj info 'my motion.csv'") && failure.next.contains("jtc teach on")
         );
-        assert!(!failure.hint.contains("FILE") && !failure.hint.contains("traj check"), "{}", failure.hint);
+        assert!(!failure.next.contains("FILE") && !failure.next.contains("traj check"), "{}", failure.next);
     }
 }

@@ -94,7 +94,7 @@ pub fn conclude(
         .err()
         .map(|e| job.named(Failure { message: info.ending.reason.clone(), ..Failure::of(e) }));
     let failure = of_run.or(lost.into_iter().next());
-    let error = failure.as_ref().map(Failure::to_json);
+    let error = failure.as_ref().map(cli_kit::error_object);
     let runs = runs(&done, (phase, word, &summary));
     let value = json!({
         "outcome": word,
@@ -126,12 +126,12 @@ pub fn conclude(
     });
     match (outcome, failure) {
         (_, Some(failure)) if out.is_json() => {
-            out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-            Err(Failure::printed(failure.kind))
+            out.note(format!("jtc: {}\n     {}", failure.message, failure.next));
+            Err(Failure::shown(failure.kind))
         }
         (_, Some(failure)) => Err(failure),
-        (Ok(Outcome::Stopped(_)), None) => Err(Failure::printed(ErrorKind::Fault)),
-        (_, None) if cut => Err(Failure::printed(ErrorKind::Fault)),
+        (Ok(Outcome::Stopped(_)), None) => Err(Failure::shown(ErrorKind::Fault)),
+        (_, None) if cut => Err(Failure::shown(ErrorKind::Fault)),
         (_, None) => Ok(()),
     }
 }

@@ -273,5 +273,5 @@ pub fn cancelled(during: &str) -> Failure {
 /// An output cannot be written, and nothing moved yet.
 fn not_started(failure: Failure) -> Failure {
     Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
-        .hint("make room or name another place, and run again")
+        .next("make room or name another place, and run again")
 }

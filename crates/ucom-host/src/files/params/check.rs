@@ -32,7 +32,7 @@ pub struct ParamsWord {
 }
 
 /// One mistake of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
     /// Where in the file.
     pub place: Place,
@@ -56,7 +56,7 @@ impl core::fmt::Display for ParamsProblem {
 }
 
 /// What can be wrong.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsProblemKind {
     /// Nobody answers under this number.

@@ -190,7 +190,7 @@ impl Signal {
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
-                    return Err(self.outside(given));
+                    return Err(self.outside(given, self.scaled(number)));
                 }
                 number
             }
@@ -215,7 +215,7 @@ impl Signal {
                 let (low, high) = self.words();
                 let nearest = steps.round();
                 if !(f64::from(low)..=f64::from(high)).contains(&nearest) || !self.within(*value) {
-                    return Err(self.outside(given));
+                    return Err(self.outside(given, *value));
                 }
                 let (from, to) = self.allowed();
                 (nearest as i32).max(from).min(to)
@@ -224,9 +224,12 @@ impl Signal {
         Ok(number as u16)
     }
 
-    fn outside(&self, given: &SignalValue) -> ValueError {
+    /// The error of a value, in the signal's unit, that is outside of the limits.
+    fn outside(&self, given: &SignalValue, value: f64) -> ValueError {
         let (min, max) = self.limits();
-        ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone() }
+        let (low, high) = self.range();
+        let limit = if value < low { low } else { high };
+        ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone(), value, limit }
     }
 }
 

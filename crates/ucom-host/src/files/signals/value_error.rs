@@ -1,6 +1,6 @@
 //! Why a value cannot be written to a signal.
 /// Why a value cannot be written to a signal.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
     /// Too large or too small.
     #[error("{given} is outside {min}..{max}{}", space(unit))]
@@ -13,6 +13,10 @@ pub enum ValueError {
         max: String,
         /// Their unit.
         unit: String,
+        /// The value as a number in this unit.
+        value: f64,
+        /// The limit that it is beyond.
+        limit: f64,
     },
     /// Given in another unit than the signal's.
     #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]

@@ -18,6 +18,7 @@ pub(crate) use identity::SHARED_CAUSE;
 pub use master::MasterError;
 pub use plan::{PlanError, SecondImageError, TargetError};
 pub use procedure::Error;
+pub(crate) use procedure::of_one;
 pub use running::RunningError;
 pub use signal::SignalError;
 pub use status::StatusError;

@@ -7,7 +7,7 @@ use crate::master::error::plan::{PlanError, TargetError};
 use crate::master::error::running::RunningError;
 use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
-use host_kit::{Diagnose, Diagnosis};
+use host_kit::{Diagnose, Diagnosis, Facts};
 
 /// Why a procedure did not do what was asked. The kind of an update that failed is that of its report, see
 /// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
@@ -48,5 +48,47 @@ impl Diagnose for Error {
             Self::Plan(e) => e.diagnosis(),
             Self::Master(e) => e.diagnosis(),
         }
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Exchange(
+                ExchangeError::NoBoard { number: board, .. }
+                | ExchangeError::NoAnswer { board, .. }
+                | ExchangeError::Incomplete { board, .. }
+                | ExchangeError::Contradiction { board, .. }
+                | ExchangeError::Device { board, .. },
+            )
+            | Self::Identity(
+                IdentityError::WrongSequence { board, .. }
+                | IdentityError::WrongBoard { board, .. }
+                | IdentityError::NumberShared { board, .. },
+            )
+            | Self::Address(AddressError::MayTakeNumber { board, .. })
+            | Self::Status(
+                StatusError::StatusNotTaken { board, .. }
+                | StatusError::NotReached { board, .. }
+                | StatusError::AdminRefused { board, .. },
+            )
+            | Self::Running(RunningError::Lost { board })
+            | Self::Signal(
+                SignalError::NoSignal { board, .. }
+                | SignalError::NoApplication { board, .. }
+                | SignalError::StaleNames { board },
+            ) => Facts::default().at_board(*board),
+            Self::Running(RunningError::Running { boards } | RunningError::LoopRuns { boards }) => {
+                of_one(boards)
+            }
+            Self::Running(RunningError::Load(load)) => Facts::beyond(load.percent(), f64::from(load.limit)),
+            _ => Facts::default(),
+        }
+    }
+}
+
+/// Facts of several boards. A number is set if it is one board only.
+pub(crate) fn of_one(boards: &[u8]) -> Facts {
+    match boards {
+        [board] => Facts::default().at_board(*board),
+        _ => Facts::default(),
     }
 }

@@ -1,0 +1,68 @@
+//! The one carrier of a failure. Commands, agents and the Python package render it.
+
+use crate::{Diagnose, Diagnosis, ErrorKind, Facts};
+
+/// Reason why something was not done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// Kind: a command makes its exit code of it, an agent its HTTP status, Python its exception.
+    pub kind: ErrorKind,
+    /// Short name for programs.
+    pub code: &'static str,
+    /// Sentence for people: request, place, value and limit.
+    pub message: String,
+    /// Next step; empty if no step helps.
+    pub next: String,
+    /// Place and size, for programs.
+    pub facts: Box<Facts>,
+}
+
+impl Failure {
+    /// Makes a failure without a next step and without facts.
+    pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
+        Self { kind, code, message: message.to_string(), next: String::new(), facts: Box::default() }
+    }
+
+    /// Takes everything that an error of a library knows.
+    pub fn of(error: &impl Diagnose) -> Self {
+        let Diagnosis { kind, code, next } = error.diagnosis();
+        Self::new(kind, code, error).next(next).with(error.facts())
+    }
+
+    /// Makes a failure about wrong usage or unreadable input.
+    pub fn usage(message: impl ToString) -> Self {
+        Self::new(ErrorKind::Usage, "usage", message)
+    }
+
+    /// Sets the next step.
+    pub fn next(self, next: impl ToString) -> Self {
+        Self { next: next.to_string(), ..self }
+    }
+
+    /// Sets the facts.
+    pub fn with(self, facts: Facts) -> Self {
+        Self { facts: Box::new(facts), ..self }
+    }
+
+    /// Makes a failure whose message stands in the printed result already. Only the kind counts.
+    pub fn shown(kind: ErrorKind) -> Self {
+        Self::new(kind, "", "")
+    }
+
+    /// Returns `true` if the printed result has the message.
+    pub fn is_shown(&self) -> bool {
+        self.message.is_empty()
+    }
+
+    /// Adds to the message that the port or the bus was not used.
+    pub fn nothing_sent(failure: impl Into<Self>) -> Self {
+        let failure = failure.into();
+        Self { message: format!("{}; nothing was sent", failure.message), ..failure }
+    }
+}
+
+impl<E: Diagnose> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::of(&error)
+    }
+}

@@ -211,6 +211,28 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
+/// A joint that swings with a growing amplitude, far below its torque limit: gains on trial are taken back. Gains that held before are kept.
+#[test]
+fn j71_a_swing_that_grows_ends_the_trial() {
+    for (wait, taken_back) in [(600, true), (2_300, false)] {
+        let (mut arm, mut rig) = held_with(0.3);
+        assert_eq!(give(&mut arm, &mut rig, &times(0.1)), DataStatus::NoError);
+        arm.run(&mut rig, wait);
+        let mut fastest = 0.0f64;
+        for ms in 0..1_000 {
+            let time = f64::from(ms) * 1e-3;
+            arm.push[0] = 15.0 * time * (std::f64::consts::TAU * 2.0 * time).sin();
+            arm.tick(&mut rig);
+            fastest = fastest.max(arm.v[0].abs());
+        }
+        arm.push[0] = 0.0;
+        arm.run(&mut rig, 1_500);
+        let stopped = rig.controller.reactions().stop.map(|(cause, _)| cause.kind);
+        println!("after {wait} ms: {stopped:?}, {fastest:.3} rad/s");
+        assert_eq!(stopped, taken_back.then_some(StopKind::Gains), "after {wait} ms, {fastest} rad/s");
+    }
+}
+
 /// No torque steps when gains come in, whatever the integral has of it.
 #[test]
 fn j71_gains_come_in_without_a_step_of_the_torque() {

@@ -106,8 +106,11 @@ const COMMANDS: &[(&str, &str)] = &[
     ("--deg", "degrees=True"),
 ];
 
-/// What helps, in terms of Python.
+/// Returns a next step in terms of Python. Commands of `ucom` stay as they are typed.
 pub fn in_python(next: &str) -> String {
+    if next.contains("`ucom ") {
+        return next.replace('`', "");
+    }
     COMMANDS.iter().fold(next.to_owned(), |text, (command, here)| {
         let here = if here.contains('`') { (*here).to_owned() } else { format!("`{here}`") };
         text.replace(&format!("`{command}`"), &here)

@@ -22,9 +22,30 @@ pub struct Ended {
     pub seconds: f64,
 }
 
-/// Calls `run` with each of `items`, with one more at once than there are processors; `log` is a file for what that one prints. `ended` has
-/// what came of each, as they end.
-pub fn beside<T: Send, R>(
+/// Result of a program that ran at the same time as others.
+pub trait Ran {
+    /// Returns the output if the program failed.
+    fn failure(&self) -> Option<&str>;
+}
+
+impl Ran for Result<Ended> {
+    fn failure(&self) -> Option<&str> {
+        self.as_ref().ok().filter(|ended| !ended.passed).map(|ended| &*ended.output)
+    }
+}
+
+impl Ran for Result<Option<Ended>> {
+    fn failure(&self) -> Option<&str> {
+        self.as_ref().ok()?.as_ref().filter(|ended| !ended.passed).map(|ended| &*ended.output)
+    }
+}
+
+/// Calls `run` with each of `items`, with one more at once than there are processors; `log` is a file for the output. Calls `ended` with
+/// each result.
+///
+/// Tests with simulated arms and browsers watch clocks, and a busy computer can make them fail. So a program that failed runs again
+/// when all others have ended. Then its second result counts, and the output tells of both.
+pub fn beside<T: Send, R: Ran + Send>(
     items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,
     ended: impl FnMut(T, R) + Send,
@@ -32,13 +53,19 @@ pub fn beside<T: Send, R>(
     let scratch = Scratch::new("beside")?;
     let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
     let (waiting, ended) = (Mutex::new(VecDeque::from(items)), Mutex::new(ended));
+    let failed = Mutex::new(Vec::new());
     let worker = |number: usize| {
         let log = scratch.path().join(number.to_string());
         loop {
             let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
             let Some(item) = next else { return };
             let came = run(&item, &log);
-            ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
+            if let Some(output) = came.failure() {
+                println!("\n{}\n-- it failed and will run again, alone", output.trim());
+                failed.lock().unwrap_or_else(PoisonError::into_inner).push(item);
+            } else {
+                ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
+            }
         }
     };
     std::thread::scope(|scope| {
@@ -47,6 +74,13 @@ pub fn beside<T: Send, R>(
             worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
         });
     });
+    let log = scratch.path().join("alone");
+    for item in failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        let came = run(&item, &log);
+        let word = if came.failure().is_none() { "passed" } else { "failed" };
+        println!("\n-- run again, alone, it {word}:");
+        ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
+    }
     Ok(())
 }
 

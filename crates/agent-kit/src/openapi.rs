@@ -31,10 +31,11 @@ fn share_responses(description: &mut OpenApi) {
     // The most frequent one of a status has the name without a number.
     counts.sort_by_key(|(status, _, count)| (status.clone(), Reverse(*count)));
     let mut names: Vec<String> = Vec::new();
-    for (i, (status, ..)) in counts.iter().enumerate() {
-        let number = counts[..i].iter().filter(|(other, ..)| other == status).count() + 1;
+    for (status, ..) in &counts {
         let name = status_name(status);
-        names.push(if number == 1 { name } else { format!("{name}{number}") });
+        let numbered = (2..).map(|number| format!("{name}{number}"));
+        let free = [name.clone()].into_iter().chain(numbered).find(|name| !names.contains(name));
+        names.extend(free);
     }
     for_each_response(description, |status, response| {
         if let Some(i) = counts.iter().position(|(of, same, _)| of == status && same == response) {

@@ -45,7 +45,7 @@ impl Problem {
         Self { status: StatusCode::NOT_FOUND, ..problem }
     }
 
-    /// Of this kind.
+    /// Sets the kind, and the status that belongs to it.
     pub fn kind(self, kind: ErrorKind) -> Self {
         Failure { kind, ..self.failure }.into()
     }
@@ -65,12 +65,12 @@ impl Problem {
         Self { failure: self.failure.with(facts), ..self }
     }
 
-    /// Who asks may not ask for that, whatever goes on.
+    /// Sets the status 403: the client may never do that.
     pub fn forbidden(self) -> Self {
         Self { status: StatusCode::FORBIDDEN, ..self }
     }
 
-    /// The request itself is wrong.
+    /// Sets the status 400: the request itself is wrong.
     pub fn unreadable(self) -> Self {
         Self { status: StatusCode::BAD_REQUEST, ..self }
     }

@@ -28,7 +28,7 @@ pub trait Diagnose: Error {
     /// Kind, name and what helps.
     fn diagnosis(&self) -> Diagnosis;
 
-    /// Returns place and size of the error.
+    /// Returns where the error is, its value and its limit.
     fn facts(&self) -> Facts {
         Facts::default()
     }

@@ -13,7 +13,7 @@ pub struct Failure {
     pub message: String,
     /// Next step; empty if no step helps.
     pub next: String,
-    /// Place and size, for programs.
+    /// Where the failure is, its value and its limit.
     pub facts: Box<Facts>,
 }
 
@@ -44,19 +44,22 @@ impl Failure {
         Self { facts: Box::new(facts), ..self }
     }
 
-    /// Makes a failure whose message stands in the printed result already. Only the kind counts.
+    /// Makes a failure whose reason stands in the printed result already. Only its kind counts; it has no code.
     pub fn shown(kind: ErrorKind) -> Self {
         Self::new(kind, "", "")
     }
 
-    /// Returns `true` if the printed result has the message.
+    /// Returns `true` if the printed result has the reason already.
     pub fn is_shown(&self) -> bool {
-        self.message.is_empty()
+        self.code.is_empty()
     }
 
-    /// Adds to the message that the port or the bus was not used.
+    /// Adds to the message that the port or the bus was not used. A shown failure stays as it is.
     pub fn nothing_sent(failure: impl Into<Self>) -> Self {
         let failure = failure.into();
+        if failure.is_shown() {
+            return failure;
+        }
         Self { message: format!("{}; nothing was sent", failure.message), ..failure }
     }
 }
@@ -64,5 +67,18 @@ impl Failure {
 impl<E: Diagnose> From<E> for Failure {
     fn from(error: E) -> Self {
         Self::of(&error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shown_failure_gets_no_message() {
+        let shown = Failure::nothing_sent(Failure::shown(ErrorKind::Refused));
+        assert!(shown.is_shown() && shown.message.is_empty(), "{shown:?}");
+        let told = Failure::nothing_sent(Failure::usage("no such file"));
+        assert_eq!((told.is_shown(), &*told.message), (false, "no such file; nothing was sent"));
     }
 }

@@ -9,7 +9,7 @@ use jtc_host::plan::{
     COLD, MARGIN_PCT, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint, margin_in_range,
 };
 use jtc_host::recording::RecordingInfo;
-use jtc_host::waypoints::{WaypointError, WaypointFile};
+use jtc_host::waypoints::WaypointFile;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -123,7 +123,7 @@ impl Planner {
         let blend = self.blend(blend)?;
         self.plan(py, |planner| {
             let options = WayOptions { line: self.line, blend, blend_m: self.blend_m };
-            let way = Way::of(&file, &self.arm, options).map_err(|error| of_waypoints(&error))?;
+            let way = Way::of(&file, &self.arm, options).map_err(Failure::from)?;
             way.planned(&HostPlanner { blend, ..planner.clone() })
                 .map_err(|error| Failure::of(&error).message(file.located(&error)))
         })
@@ -143,10 +143,6 @@ pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
     Ok(percent)
-}
-
-fn of_waypoints(error: &WaypointError) -> Failure {
-    Failure::of(error)
 }
 
 #[pymethods]

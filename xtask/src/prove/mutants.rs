@@ -145,6 +145,8 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     let commit = commit()?;
     let mut gamma: Command = command(program());
     gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
+    // This profile keeps all assertions and optimises the crates that compute: simulated arms take most of the time.
+    gamma.args(["--profile", "release"]);
     gamma.arg("--artifact-dir").arg(&results);
     if which == Which::Left {
         gamma.arg("--resume-testing");

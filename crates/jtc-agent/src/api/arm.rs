@@ -150,7 +150,7 @@ pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
             limit: *limit,
             ..Facts::default()
         };
-        let object = Problem::new("arm", message, next.replace('`', ""));
+        let object = Problem::new("arm", message, next);
         return Err(object.kind(ErrorKind::Usage).with(facts));
     }
     Ok(arm)

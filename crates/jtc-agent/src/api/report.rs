@@ -40,13 +40,12 @@ pub(super) async fn report(
     let job = found(&agent, number)?;
     if job.stage == Stage::Running {
         let message = format!("job {number} goes on: its report is made when it is over");
-        return Err(Problem::new("busy", message, "ask again behind its event `ended`"));
+        return Err(Problem::new("busy", message, "ask again after its event ended"));
     }
     let report = job.done.report.ok_or_else(|| {
         let message =
             format!("job {number} has no report: it has moved nothing, or later ones have taken its place");
-        let next =
-            "`report` of GET /api/jobs shows those that there are; jtc serve --record keeps all motions";
+        let next = "GET /api/jobs shows which jobs have a report; jtc serve --record keeps all motions";
         Problem::nothing("report", number, "/api/jobs").message(message).next(next)
     })?;
     let room = agent.reports.clone().acquire_owned().await;

@@ -1,11 +1,11 @@
 //! A client that has no connection of its own: it asks by HTTP, and shows by each request that it is there.
-use agent_kit::api::Problem;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use agent_kit::api::Problem;
 use jtc_host::Session;
 use jtc_host::session::Flow;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};

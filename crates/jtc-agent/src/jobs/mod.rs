@@ -11,12 +11,12 @@ mod stops;
 mod store;
 mod task;
 
-use agent_kit::api::Problem;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
+use agent_kit::api::Problem;
 use jtc_host::{Arm, Session};
 
 pub use commander::{Commander, Turn, Unable, Wish};

@@ -1,10 +1,10 @@
 //! A run of a job: its steps go into the journal, and a Stop of another client ends it.
-use agent_kit::api::Problem;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use agent_kit::api::Problem;
 use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Digest, Summary};
@@ -288,6 +288,6 @@ fn not_begun(error: &StartError) -> Problem {
         StartError::Approach(_) => object.next(
             "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way",
         ),
-        StartError::Open(_) => object.next("`approach` leads back to its first point before each run"),
+        StartError::Open(_) => object.next("approach: true leads back to its first point before each run"),
     }
 }

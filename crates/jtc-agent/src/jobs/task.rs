@@ -1,7 +1,7 @@
 //! What a job has beside its client's end of the line.
-use agent_kit::api::Problem;
 use std::sync::mpsc::Receiver;
 
+use agent_kit::api::Problem;
 use jtc_host::Arm;
 
 use super::{Commander, Happening, Journal, Wish};

@@ -1,7 +1,7 @@
 //! Commands of a PLC, done with the one client of the line that all of its connections share.
-use agent_kit::api::Problem;
 use std::sync::Arc;
 
+use agent_kit::api::Problem;
 use jtc_host::session::Flow;
 use jtc_host::{Error, Session};
 use serde_json::json;

@@ -11,7 +11,7 @@ mod state;
 mod upload;
 
 use host_kit::ErrorKind;
-pub use host_kit::{Diagnose, Diagnosis, Facts, Failure};
+pub use host_kit::{Diagnose, Diagnosis, Facts};
 
 pub use check::CheckError;
 pub use extension::ExtensionError;

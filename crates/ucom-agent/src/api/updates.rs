@@ -9,7 +9,7 @@ use axum::extract::{FromRequest as _, Request, State};
 use axum::http::StatusCode;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use host_kit::ErrorKind;
+use host_kit::{ErrorKind, Facts};
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
 use ucom_host::files::image::{AddressUnit, Format, Gaps, ImageAdvice};
@@ -207,8 +207,14 @@ async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Probl
 /// What an update that did not end well ended with.
 fn failed(report: &UpdateReport) -> Option<Problem> {
     let kind = report.failure()?;
-    let failures = report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?)));
-    let texts: Vec<String> = failures.map(|(board, failure)| format!("board {board}: {failure}")).collect();
+    let failures: Vec<_> =
+        report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?))).collect();
+    let texts: Vec<String> =
+        failures.iter().map(|(board, failure)| format!("board {board}: {failure}")).collect();
+    let board = match *failures {
+        [(board, _)] => Some(board),
+        _ => None,
+    };
     let cancelled = report
         .boards
         .iter()
@@ -218,7 +224,8 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
         true => report.unproven(),
         false => (texts.join("; "), "the job's update has what became of each board"),
     };
-    Some(Problem::new(code, message, next).kind(kind))
+    let facts = Facts { board, ..Facts::default() };
+    Some(Problem::new(code, message, next).kind(kind).with(facts))
 }
 
 /// Programs boards: checked, transferred twice, verified by reading back. Never two at once.

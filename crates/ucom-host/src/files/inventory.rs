@@ -12,7 +12,7 @@
 //! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key alone: everything else in
 //! the file stays as it is, comments included.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_whole};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -150,6 +150,15 @@ impl Diagnose for IdentifyError {
             Self::Inventory(_) => (ErrorKind::Usage, "usage", ""),
         };
         Diagnosis::new(kind, code, next)
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::NoInventory { board, .. } | Self::NotListed { board, .. } => {
+                Facts::default().at_board(*board)
+            }
+            Self::Inventory(_) => Facts::default(),
+        }
     }
 }
 

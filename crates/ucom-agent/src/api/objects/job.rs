@@ -1,6 +1,6 @@
 //! Jobs, and what they brought about.
 use agent_kit::api::Problem;
-use host_kit::{Diagnose as _, Finding, Severity};
+use host_kit::{Diagnose as _, Facts, Finding, Severity};
 use ucom_host::master::update::{UpdateReport, UpdateResult};
 use utoipa::ToSchema;
 
@@ -99,8 +99,9 @@ impl UpdateObject {
             attempts: result.attempts,
             time_s: result.time_us as f64 * 1e-6,
             error: result.failure.as_ref().map(|failure| {
-                Problem::new("update", failure.to_string(), failure.hint().replace('`', ""))
+                Problem::new("update", failure.to_string(), failure.hint())
                     .kind(failure.kind())
+                    .with(Facts::default().at_board(result.board))
             }),
         };
         Self {

@@ -228,7 +228,9 @@ impl Signal {
     fn outside(&self, given: &SignalValue, value: f64) -> ValueError {
         let (min, max) = self.limits();
         let (low, high) = self.range();
-        let limit = if value < low { low } else { high };
+        let (limit, shown) = if value < low { (low, &min) } else { (high, &max) };
+        // As it is shown, without the digits that calculating with fractions adds.
+        let limit = shown.parse().unwrap_or(limit);
         ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone(), value, limit }
     }
 }

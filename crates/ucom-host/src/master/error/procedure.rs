@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Facts of several boards. A number is set if it is one board only.
+/// Facts of several boards. Sets the board if there is exactly one.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

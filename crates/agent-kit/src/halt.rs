@@ -1,10 +1,10 @@
 //! Halts are counted: what was asked for before one does nothing behind it, however long it was on its way.
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
+use host_kit::Facts;
 use utoipa::IntoParams;
 
 use crate::api::{Asked, Problem};
-use host_kit::Facts;
 
 /// What counts the halts that were asked for.
 pub trait Halts {

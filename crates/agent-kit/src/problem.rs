@@ -101,7 +101,7 @@ impl Serialize for Problem {
 struct ErrorObject<'a> {
     /// Short name, for programs.
     code: &'a str,
-    /// What was wrong, for people.
+    /// Sentence for people: request, place, value and limit.
     message: &'a str,
     /// Board of a chain.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -112,17 +112,17 @@ struct ErrorObject<'a> {
     /// Point of the trajectory, from 0; in motion the 1 ms point.
     #[serde(skip_serializing_if = "Option::is_none")]
     point: Option<u32>,
-    /// What was found, in the unit of the message.
+    /// Value that was found, in the unit of the message.
     #[serde(skip_serializing_if = "Option::is_none")]
     value: Option<f64>,
-    /// What is allowed.
+    /// Limit of the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     limit: Option<f64>,
-    /// What usually causes it.
+    /// Usual cause.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>)]
     cause: Option<&'static str>,
-    /// What helps.
+    /// Next step.
     next: String,
 }
 

@@ -159,7 +159,8 @@ impl Dynamics {
             Err((_, error)) if one => Err(pose_failure(error)),
             Err((row, error)) => {
                 let failure = pose_failure(error);
-                Err(failure.clone().message(format!("row {row}: {}", failure.message)))
+                let message = format!("row {row}: {}", failure.message);
+                Err(failure.message(message))
             }
         }
     }

@@ -88,10 +88,6 @@ pub(super) fn pose_error(error: &PoseError) -> Problem {
         PoseError::Unknown { .. } => {
             object.next("GET /api/poses lists them; PUT /api/poses/{name} saves where the arm stands")
         }
-        PoseError::Outside { joint, value, min, max, .. } => {
-            let limit = Some(if value < min { *min } else { *max });
-            object.with(Facts { joint: Some(joint.number()), value: Some(*value), limit, ..Facts::default() })
-        }
         _ => object,
     }
 }

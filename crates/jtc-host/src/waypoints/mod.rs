@@ -126,7 +126,8 @@ impl Diagnose for WaypointError {
         match self {
             Self::Route(error) => error.facts(),
             Self::Flange { source, .. } => facts::of_pose(source),
-            Self::File(_) | Self::Pose { .. } => Facts::default(),
+            Self::Pose { source, .. } => source.facts(),
+            Self::File(_) => Facts::default(),
         }
     }
 }

@@ -138,7 +138,7 @@ export interface components {
              * @description Board of a chain.
              */
             board?: number | null;
-            /** @description What usually causes it. */
+            /** @description Usual cause. */
             cause?: string | null;
             /** @description Short name, for programs. */
             code: string;
@@ -149,12 +149,12 @@ export interface components {
             joint?: number | null;
             /**
              * Format: double
-             * @description What is allowed.
+             * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description What was wrong, for people. */
+            /** @description Sentence for people: request, place, value and limit. */
             message: string;
-            /** @description What helps. */
+            /** @description Next step. */
             next: string;
             /**
              * Format: u-int32
@@ -163,7 +163,7 @@ export interface components {
             point?: number | null;
             /**
              * Format: double
-             * @description What was found, in the unit of the message.
+             * @description Value that was found, in the unit of the message.
              */
             value?: number | null;
         };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_wire::Joint;
 
 use super::NAME_MAX;
@@ -94,5 +94,14 @@ impl Diagnose for PoseError {
             Self::File(e) => return e.diagnosis(),
         };
         Diagnosis::new(kind, code, next)
+    }
+
+    fn facts(&self) -> Facts {
+        match self {
+            Self::Outside { joint, value, min, max, .. } => {
+                Facts::beyond(*value, if value < min { *min } else { *max }).at_joint(joint.number())
+            }
+            _ => Facts::default(),
+        }
     }
 }

@@ -44,12 +44,12 @@ impl Ran for Result<Option<Ended>> {
 /// each result.
 ///
 /// Tests with simulated arms and browsers watch clocks, and a busy computer can make them fail. So a program that failed runs again
-/// when all others have ended. Then its second result counts, and the output tells of both.
+/// when all others have ended. Then its second result counts. Returns how many of `items` passed only then.
 pub fn beside<T: Send, R: Ran + Send>(
     items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,
     ended: impl FnMut(T, R) + Send,
-) -> Result<()> {
+) -> Result<u64> {
     let scratch = Scratch::new("beside")?;
     let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
     let (waiting, ended) = (Mutex::new(VecDeque::from(items)), Mutex::new(ended));
@@ -75,13 +75,14 @@ pub fn beside<T: Send, R: Ran + Send>(
         });
     });
     let log = scratch.path().join("alone");
+    let mut passed_alone = 0;
     for item in failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let came = run(&item, &log);
-        let word = if came.failure().is_none() { "passed" } else { "failed" };
-        println!("\n-- run again, alone, it {word}:");
+        println!("\n-- the result of the second run:");
+        passed_alone += u64::from(came.failure().is_none());
         ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
     }
-    Ok(())
+    Ok(passed_alone)
 }
 
 /// Runs a command whose output goes to `log`.

@@ -118,6 +118,7 @@ fn counted(output: &str) -> Counts {
         passed: number(&["passed"]),
         failed: number(&["failed", "error", "errors"]),
         skipped: number(&["skipped"]),
+        ..Counts::default()
     }
 }
 

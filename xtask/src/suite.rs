@@ -153,7 +153,8 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
         }
         beside::run(&mut command, log)
     };
-    beside::beside(programs, run, ended)?;
+    let passed_alone = beside::beside(programs, run, ended)?;
+    counts.passed_alone += passed_alone;
     Ok(failures)
 }
 

@@ -23,6 +23,8 @@ pub struct Counts {
     pub failed: u64,
     /// Skipped.
     pub skipped: u64,
+    /// Programs of tests that failed at first and passed when they ran again, alone.
+    pub passed_alone: u64,
 }
 
 /// The steps so far.
@@ -63,6 +65,7 @@ impl Tally {
                 self.counts.passed += counts.passed;
                 self.counts.failed += counts.failed;
                 self.counts.skipped += counts.skipped;
+                self.passed_alone(counts.passed_alone);
                 if counts.failed > 0 {
                     // Repeated at the end: the last part of a long log shows the reason.
                     let failure = format!("{title}: {} failed\n{}", counts.failed, printed.trim());
@@ -86,6 +89,11 @@ impl Tally {
         }
     }
 
+    /// Counts programs that failed at first and passed when they ran again, alone.
+    pub fn passed_alone(&mut self, programs: u64) {
+        self.counts.passed_alone += programs;
+    }
+
     /// What failed and what was skipped once more, then the closing line.
     pub fn finish(self) -> ExitCode {
         println!();
@@ -95,7 +103,10 @@ impl Tally {
         for failure in &self.failures {
             println!("failed: {failure}");
         }
-        let Counts { passed, failed, skipped } = self.counts;
+        let Counts { passed, failed, skipped, passed_alone } = self.counts;
+        if passed_alone > 0 {
+            println!("programs that failed at first and passed when they ran again, alone: {passed_alone}");
+        }
         println!("{passed} passed, {failed} failed, {skipped} skipped");
         if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
     }

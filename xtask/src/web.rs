@@ -116,7 +116,12 @@ pub fn counted(Ended { output, passed, seconds }: &Ended) -> Result<Outcome> {
         let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));
         lines.filter_map(|line| line.strip_prefix(word)?.trim().parse::<u64>().ok()).sum::<u64>()
     };
-    let counts = Counts { passed: number("pass "), failed: number("fail "), skipped: number("skipped ") };
+    let counts = Counts {
+        passed: number("pass "),
+        failed: number("fail "),
+        skipped: number("skipped "),
+        ..Counts::default()
+    };
     ensure!(*passed || counts.failed > 0, "the tests broke off");
     ensure!(counts.passed > 0, "no test was run at all");
     Ok(Outcome::Counted(counts, tally::failures(output, "✖ failing tests:").to_owned()))

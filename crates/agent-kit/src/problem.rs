@@ -5,7 +5,7 @@ use std::ops::Deref;
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use host_kit::{Diagnose, ErrorKind, Facts, Failure};
+use host_kit::{Diagnose, ErrorKind, Facts, Failure, FrontEnd, Next};
 use serde::{Serialize, Serializer};
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::Schema;
@@ -22,8 +22,8 @@ pub struct Problem {
 
 impl Problem {
     /// Something that was refused, with what helps.
-    pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<String>) -> Self {
-        let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next.into());
+    pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<Next>) -> Self {
+        let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next);
         Self { failure, status: StatusCode::CONFLICT }
     }
 
@@ -56,8 +56,8 @@ impl Problem {
     }
 
     /// With this that helps.
-    pub fn next(self, next: impl Into<String>) -> Self {
-        Self { failure: self.failure.next(next.into()), ..self }
+    pub fn next(self, next: impl Into<Next>) -> Self {
+        Self { failure: self.failure.next(next), ..self }
     }
 
     /// With these facts.
@@ -141,7 +141,7 @@ impl<'a> From<&'a Failure> for ErrorObject<'a> {
             limit: finite(limit),
             cause,
             // Marks of code in the texts for terminals.
-            next: failure.next.replace('`', ""),
+            next: failure.next.plain(FrontEnd::Agent),
         }
     }
 }

@@ -150,7 +150,7 @@ impl Output {
         if self.json {
             let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error_object(failure) }));
         }
-        self.warn(&failure.message, &failure.next);
+        self.warn(&failure.message, &failure.next.to_string());
     }
 
     /// What is wrong and what to do next, as it is printed at the end of a command; on a terminal broken between words.

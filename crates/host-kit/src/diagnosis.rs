@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::io;
 
-use crate::{ErrorKind, Facts};
+use crate::{ErrorKind, Facts, Next};
 
 /// Parts of an error that a caller can use without a `match` of its variants.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,12 +13,12 @@ pub struct Diagnosis {
     /// A short name for programs.
     pub code: &'static str,
     /// Next step; empty if no step helps.
-    pub next: String,
+    pub next: Next,
 }
 
 impl Diagnosis {
     /// A kind, a short name, and what helps.
-    pub fn new(kind: ErrorKind, code: &'static str, next: impl Into<String>) -> Self {
+    pub fn new(kind: ErrorKind, code: &'static str, next: impl Into<Next>) -> Self {
         Self { kind, code, next: next.into() }
     }
 }
@@ -43,9 +43,9 @@ pub trait Diagnose: Error {
         self.diagnosis().code
     }
 
-    /// Returns the next step; empty if no step helps.
+    /// Returns the next step in words of the command line; empty if no step helps.
     fn hint(&self) -> String {
-        self.diagnosis().next
+        self.diagnosis().next.to_string()
     }
 }
 

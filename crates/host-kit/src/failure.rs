@@ -1,6 +1,6 @@
 //! The one carrier of a failure. Commands, agents and the Python package render it.
 
-use crate::{Diagnose, Diagnosis, ErrorKind, Facts};
+use crate::{Diagnose, Diagnosis, ErrorKind, Facts, Next};
 
 /// Reason why something was not done.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub struct Failure {
     /// Sentence for people: request, place, value and limit.
     pub message: String,
     /// Next step; empty if no step helps.
-    pub next: String,
+    pub next: Next,
     /// Where the failure is, its value and its limit.
     pub facts: Box<Facts>,
 }
@@ -20,7 +20,7 @@ pub struct Failure {
 impl Failure {
     /// Makes a failure without a next step and without facts.
     pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
-        Self { kind, code, message: message.to_string(), next: String::new(), facts: Box::default() }
+        Self { kind, code, message: message.to_string(), next: Next::default(), facts: Box::default() }
     }
 
     /// Takes everything that an error of a library knows.
@@ -35,8 +35,8 @@ impl Failure {
     }
 
     /// Sets the next step.
-    pub fn next(self, next: impl ToString) -> Self {
-        Self { next: next.to_string(), ..self }
+    pub fn next(self, next: impl Into<Next>) -> Self {
+        Self { next: next.into(), ..self }
     }
 
     /// Sets the facts.

@@ -3,6 +3,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::Next;
+
 /// How bad a finding is, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -36,7 +38,7 @@ pub struct Finding {
     /// What probably is the cause; may be empty.
     pub why: String,
     /// The next command or act; empty when there is nothing to do.
-    pub next: String,
+    pub next: Next,
 }
 
 impl fmt::Display for Finding {
@@ -63,18 +65,18 @@ impl Findings {
         severity: Severity,
         what: impl Into<String>,
         why: impl Into<String>,
-        next: impl Into<String>,
+        next: impl Into<Next>,
     ) {
         self.0.push(Finding { severity, what: what.into(), why: why.into(), next: next.into() });
     }
 
     /// Adds what has to be gone before anything works.
-    pub fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
+    pub fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Problem, what, why, next);
     }
 
     /// Adds what is not as it should be.
-    pub fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
+    pub fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Warning, what, why, next);
     }
 

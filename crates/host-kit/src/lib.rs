@@ -10,6 +10,7 @@ mod kind;
 mod likeness;
 #[cfg(feature = "mcap")]
 pub mod mcap;
+mod next;
 mod user_folder;
 mod whole;
 
@@ -20,5 +21,6 @@ pub use failure::Failure;
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;
 pub use likeness::{likeness, nearest};
+pub use next::{Action, FrontEnd, Next};
 pub use user_folder::user_folder;
 pub use whole::write_whole;

@@ -1,6 +1,7 @@
 //! What of an arm file a controller does not use: listed, and refused where it matters.
 
 use cli_kit::{ErrorKind, Failure, Output, error_object};
+use host_kit::Next;
 use jtc_core::Config;
 use jtc_host::arm::{Arm, Difference, NOT_CARRIED};
 use serde_json::json;
@@ -20,7 +21,7 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
             values(count)
         )
     };
-    listed(differences, accepted, ("device-limits", message, &hint), out)
+    listed(differences, accepted, ("device-limits", message, hint.into()), out)
 }
 
 /// The same for all numbers of an arm that a controller `has` (J-55).
@@ -30,7 +31,7 @@ pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Ve
     let message = |count| {
         format!("{}: the controller has another arm, {}: {}", arm.name, has.name, values_differ(count))
     };
-    listed(arm.differences(has), accepted, ("other-arm", message, hint), out)
+    listed(arm.differences(has), accepted, ("other-arm", message, hint.into()), out)
 }
 
 fn values(count: usize) -> String {
@@ -46,7 +47,7 @@ pub fn values_differ(count: usize) -> String {
 fn listed(
     differences: Vec<Difference>,
     accepted: bool,
-    (code, message, hint): (&'static str, impl Fn(usize) -> String, &str),
+    (code, message, hint): (&'static str, impl Fn(usize) -> String, Next),
     out: &Output,
 ) -> Result<Vec<Difference>, Failure> {
     if differences.is_empty() {
@@ -60,7 +61,7 @@ fn listed(
     }
     let message = message(differences.len());
     if out.is_json() {
-        let error = error_object(&Failure::new(ErrorKind::Refused, code, &message).next(hint));
+        let error = error_object(&Failure::new(ErrorKind::Refused, code, &message).next(hint.clone()));
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);
     }
     out.note(format!("jtc: {message}"));

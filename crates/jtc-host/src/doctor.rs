@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use host_kit::Findings;
+use host_kit::{Action, Findings, next};
 pub use host_kit::{Finding, Severity};
 use jtc_bus::warning;
 use jtc_wire::{ControllerState, Joint, NodeState, Reactions, Status, StopCause, StopKind, error};
@@ -123,7 +123,7 @@ fn link(seen: &Observation, all: &mut Findings) {
                 Problem,
                 format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
                 "wrong rate, or another device at this port",
-                "`jtc doctor --baud RATE` with the rate of the controller (it starts with 115200)",
+                next!("{} with the rate of the controller (it starts with 115200)", DoctorAtRate),
             ),
         }
         return;
@@ -144,7 +144,7 @@ fn link(seen: &Observation, all: &mut Findings) {
             Warning,
             format!("only {rate:.0} statuses per second, 25 are usual"),
             "bytes are lost on the way, or this computer is busy",
-            "`jtc monitor` shows the link",
+            next!("{} shows the link", Monitor),
         );
     } else {
         all.good(format!("link: {rate:.0} statuses per second at {baud}"));
@@ -169,14 +169,14 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
                 Severity::Warning,
                 what,
                 "no motion is executed, no teaching",
-                "`jtc bench present` ends it",
+                next!("{} ends it", BenchPresent),
             );
         } else {
             all.add(
                 Severity::Problem,
                 format!("{joint} is set absent, and its drive answers ({})", state.name()),
                 "either it is there, or a drive has the wrong number",
-                "`jtc bench present`, then `jtc recover`; or take the drive off the bus",
+                next!("{}, then {}; or take the drive off the bus", BenchPresent, Recover),
             );
         }
     }
@@ -201,7 +201,7 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             Severity::Problem,
             format!("{joint}: the encoder has jumped"),
             "no trajectory is executed until its drive was reset",
-            held_stop::AFTER_ENCODER_JUMP,
+            held_stop::after_encoder_jump(),
         );
     }
 }
@@ -220,7 +220,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             Problem,
             "the safety input is low",
             "emergency stop pressed, or its wire broken (it is pulled down)",
-            "make the cell safe, release it, then `jtc recover`",
+            next!("make the cell safe, release it, then {}", Recover),
         );
     }
     for flag in words::can_flags(s.can_current) {
@@ -228,7 +228,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             Problem,
             format!("joint bus: {flag}"),
             "supply or cable of this node",
-            "`jtc recover` when it is back",
+            next!("{} when it is back", Recover),
         );
     }
     for (j, joint) in s.joints.iter().enumerate() {
@@ -240,9 +240,14 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             }
             if s.is_held_stop() {
                 let why = "held stop: the arm met something, or its model lacks a load";
-                all.add(Problem, what, why, "remove the cause or give the payload, then `jtc clear`");
+                all.add(Problem, what, why, next!("remove the cause or give the payload, then {}", Clear));
             } else {
-                all.add(Problem, what, "", "`jtc recover`, after the trajectory or the model was corrected");
+                all.add(
+                    Problem,
+                    what,
+                    "",
+                    next!("{}, after the trajectory or the model was corrected", Recover),
+                );
             }
         }
         for word in words::node_errors(joint.errors).into_iter().chain(words::motor_faults(joint.mc_current))
@@ -251,19 +256,19 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
                 Problem,
                 format!("{who}: {word}"),
                 "reported by the drive",
-                "`jtc explain`, then `jtc recover`",
+                next!("{}, then {}", Explain, Recover),
             );
         }
         for word in words::node_warnings(joint.warnings) {
             let severity = if joint.warnings & warning::SAFETY_LINE != 0 { Problem } else { Warning };
-            all.add(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`");
+            all.add(severity, format!("{who}: {word}"), "reported by the drive", Action::Explain);
         }
         if joint.state.is_fault() {
-            all.add(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`");
+            all.add(Problem, format!("{who}: drive in its fault state"), "", Action::Recover);
         }
     }
     if s.state == ControllerState::Error && !all.has_problem() {
-        all.add(Problem, "an error is latched whose cause is gone", words::errors_line(s), "`jtc recover`");
+        all.add(Problem, "an error is latched whose cause is gone", words::errors_line(s), Action::Recover);
     }
 }
 
@@ -275,7 +280,7 @@ fn set_up(s: &Status, all: &mut Findings) {
             Problem,
             format!("not given yet: {}", missing.join(", ")),
             "the controller waits for it in Init",
-            "`jtc params push FILE` or `jtc params use-defaults`",
+            next!("{} or {}", ParamsPush, UseDefaults),
         );
     }
     for n in words::nodes_in(s.node_init) {
@@ -294,7 +299,12 @@ fn set_up(s: &Status, all: &mut Findings) {
             _ => "it is being brought up",
         };
         let what = format!("{} is not ready ({})", words::node(n), state.name());
-        all.add(if s.is_coming_up() { Problem } else { Warning }, what, why, "wait 10 s; then `jtc recover`");
+        all.add(
+            if s.is_coming_up() { Problem } else { Warning },
+            what,
+            why,
+            next!("wait 10 s; then {}", Recover),
+        );
     }
     if s.errors == 0 && s.jtc_init == 0 && s.node_init == 0 {
         let line = format!("controller: {}, trajectory {}", s.state.name(), s.trajectory.name());
@@ -310,7 +320,7 @@ fn temperatures(s: &Status, all: &mut Findings) {
         // Above 200 the byte is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
             let what = format!("{}: bearing at {} °C", words::node(j), joint.temperature);
-            all.add(Severity::Warning, what, "long motion at high torque", "let it cool; `jtc monitor`");
+            all.add(Severity::Warning, what, "long motion at high torque", next!("let it cool; {}", Monitor));
         }
     }
 }

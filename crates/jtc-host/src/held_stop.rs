@@ -1,14 +1,22 @@
 //! A held stop (J-69) as every front end shows it: cause, values, and what helps.
 
+use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
 use serde::Serialize;
 
 use crate::explain::{self, Page};
 use crate::words;
 
-/// What leads on after an encoder has jumped (J-35), with commands.
-pub const AFTER_ENCODER_JUMP: &str = "support the arm, `jtc disable`, compare the joint with its marks, `jtc reset --joints JOINT`, \
-     then `jtc recover`; if it comes again, the encoder, its cable or the setting `velocity_full_scale_rad_s` is wrong";
+/// Returns the next step after an encoder has jumped (J-35).
+pub fn after_encoder_jump() -> Next {
+    next!(
+        "support the arm, {}, compare the joint with its marks, {}, then {}; if it comes again, the encoder, its cable or the setting \
+         `velocity_full_scale_rad_s` is wrong",
+        Disable,
+        ResetJoint,
+        Recover
+    )
+}
 
 /// The last held stop of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -148,14 +156,14 @@ fn clause(sentence: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// What leads on from a held stop, with commands.
-pub fn next_step(status: &Status, cause: Option<&StopCause>) -> String {
+/// Returns the next step after a held stop.
+pub fn next_step(status: &Status, cause: Option<&StopCause>) -> Next {
     match cause.map(|cause| cause.kind) {
-        Some(StopKind::EncoderJump) => AFTER_ENCODER_JUMP.to_owned(),
+        Some(StopKind::EncoderJump) => after_encoder_jump(),
         Some(kind) if status.is_held_stop() && status.state != ControllerState::Teaching => {
-            words::next_step(status).replacen(words::REMOVE_THE_CAUSE, &remedy(kind), 1)
+            words::after_removing(&remedy(kind))
         }
-        _ => words::next_step(status).to_owned(),
+        _ => words::next_step(status),
     }
 }
 
@@ -211,12 +219,15 @@ mod tests {
             ..Status::default()
         };
         let next = next_step(&held, Some(&PUSH));
-        assert!(next.starts_with(&remedy(StopKind::Push)) && next.contains("`jtc clear`"), "{next}");
+        assert!(
+            next.to_string().starts_with(&remedy(StopKind::Push)) && next.to_string().contains("`jtc clear`"),
+            "{next}"
+        );
         assert_eq!(next_step(&held, None), words::next_step(&held));
         let jump = StopCause { kind: StopKind::EncoderJump, ..PUSH };
-        assert!(next_step(&held, Some(&jump)).contains("`jtc disable`"));
+        assert!(next_step(&held, Some(&jump)).to_string().contains("`jtc disable`"));
         let taught = Status { state: ControllerState::Teaching.into(), ..held };
-        assert!(next_step(&taught, Some(&PUSH)).starts_with("`jtc teach off`"));
+        assert!(next_step(&taught, Some(&PUSH)).to_string().starts_with("`jtc teach off`"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The controller's numbers in words.
 
+use host_kit::{Action, Next, next};
 pub use jtc_bus::GRIPPER;
 use jtc_bus::{NODES, NodeState, warning};
 use jtc_wire::{
@@ -189,9 +190,6 @@ pub fn causes(s: &Status) -> Vec<String> {
     all
 }
 
-/// What helps out of a held stop whose cause is not known.
-pub(crate) const REMOVE_THE_CAUSE: &str = "remove the cause";
-
 /// Causes of a held stop, in one line.
 pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
@@ -248,30 +246,38 @@ pub fn waiting_for(s: &Status) -> String {
     if missing.is_empty() { head } else { format!("{head}; {}", missing.join(", ")) }
 }
 
-/// The command that leads on from here.
-pub fn next_step(s: &Status) -> &'static str {
+/// Returns the next step after a held stop whose cause needs this act.
+pub(crate) fn after_removing(cause: &str) -> Next {
+    let then =
+        next!(", wait until the arm stands, then {}: it is held, and nothing is executed until then", Clear);
+    Next::from(cause.to_owned()).then(then)
+}
+
+/// Returns the next step in this state.
+pub fn next_step(s: &Status) -> Next {
     if s.is_held_stop() && s.state == ControllerState::Teaching {
-        "`jtc teach off`, then `jtc clear`"
+        next!("{}, then {}", TeachOff, Clear)
     } else if s.is_held_stop() {
-        "remove the cause, wait until the arm stands, then `jtc clear`: it is held, and nothing is executed until then"
+        after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        "`jtc recover --arm FILE`, or `--defaults` for the arm that is built into the controller"
+        next!("{}, or `--defaults` for the arm that is built into the controller", RecoverWithArm)
     } else if s.errors != 0 || s.state == ControllerState::Error {
-        "`jtc recover`"
+        Action::Recover.into()
     } else if s.jtc_init != 0 {
-        "`jtc params push FILE` or `jtc params use-defaults`"
+        next!("{} or {}", ParamsPush, UseDefaults)
     } else if s.is_coming_up() && s.node_init != 0 {
-        "`jtc doctor` looks at the nodes that are not ready"
+        next!("{} looks at the nodes that are not ready", Doctor)
     } else if s.state == ControllerState::Teaching {
-        "`jtc teach off`"
+        Action::TeachOff.into()
     } else if s.is_executing() {
-        "`jtc traj stop` ends the motion"
+        next!("{} ends the motion", Stop)
     } else if s.state == ControllerState::HoldPos && !absent(s).is_empty() {
-        "`jtc jog JOINT RATE` moves a joint that is there; `jtc bench present` ends the work on a bench"
+        let then = next!(" moves a joint that is there; {} ends the work on a bench", BenchPresent);
+        Next::typed(Action::Jog, "jtc jog JOINT RATE").then(then)
     } else if s.state == ControllerState::HoldPos {
-        "`jtc traj run FILE` moves the arm"
+        next!("{} moves the arm", TrajRun)
     } else {
-        "`jtc monitor` shows how it goes on"
+        next!("{} shows how it goes on", Monitor)
     }
 }
 

@@ -246,7 +246,10 @@ fn a_margin_is_zero_to_fifty_percent() {
             text.contains(&wrong.to_string()) && text.contains("0 to 50 %") && text.contains("15"),
             "{text}"
         );
-        assert!(diagnosis.kind == ErrorKind::Usage && diagnosis.next.contains("0 plans"), "{diagnosis:?}");
+        assert!(
+            diagnosis.kind == ErrorKind::Usage && diagnosis.next.to_string().contains("0 plans"),
+            "{diagnosis:?}"
+        );
         assert!(plan::margin_of(&wrong.to_string()).is_err(), "{wrong}");
     }
     for text in ["", "x", "15%", "1,5", "0x10", "--", "15 %"] {

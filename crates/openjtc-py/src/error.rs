@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use host_kit::{Diagnose, ErrorKind, Facts};
+use host_kit::{Diagnose, ErrorKind, Facts, FrontEnd, Next};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -28,17 +28,17 @@ impl Failure {
     }
 
     /// What a check refuses; nothing was done.
-    pub fn refused(code: &'static str, message: impl ToString, next: impl ToString) -> Self {
+    pub fn refused(code: &'static str, message: impl ToString, next: impl Into<Next>) -> Self {
         Self::new(ErrorKind::Refused, code, message).next(next)
     }
 
     /// What went wrong on the way.
-    pub fn fault(code: &'static str, message: impl ToString, next: impl ToString) -> Self {
+    pub fn fault(code: &'static str, message: impl ToString, next: impl Into<Next>) -> Self {
         Self::new(ErrorKind::Fault, code, message).next(next)
     }
 
     /// The same with the act that helps.
-    pub fn next(self, next: impl ToString) -> Self {
+    pub fn next(self, next: impl Into<Next>) -> Self {
         Self(self.0.next(next))
     }
 
@@ -74,47 +74,10 @@ impl<E: Diagnose> From<E> for Failure {
     }
 }
 
-/// Commands of `jtc`, and what does the same here: while a program has the port no command gets at it.
-const COMMANDS: &[(&str, &str)] = &[
-    ("jtc traj run FILE --approach", "robot.run(…, approach=True)"),
-    ("jtc traj run FILE", "robot.run(…)"),
-    ("jtc traj pause", "robot.pause()"),
-    ("jtc traj resume", "robot.resume()"),
-    ("jtc traj stop", "robot.stop()"),
-    ("jtc clear", "robot.recover()"),
-    ("jtc traj check", "robot.check(…)"),
-    ("jtc status", "robot.status"),
-    ("jtc doctor --baud RATE", "openjtc.connect(…, baud=…)"),
-    ("jtc doctor", "robot.doctor()"),
-    ("jtc recover --arm FILE", "robot.recover(arm=…)"),
-    ("jtc recover --defaults", "robot.recover(defaults=True)"),
-    ("jtc recover", "robot.recover()"),
-    ("jtc arm push --store", "robot.push_arm(arm, store=True)"),
-    ("jtc arm push FILE", "robot.push_arm(arm)"),
-    ("jtc arm check FILE", "openjtc.Arm.load(…).findings()"),
-    ("jtc payload show", "robot.payload"),
-    ("jtc payload set", "robot.payload = …"),
-    ("jtc payload clear", "robot.payload = None"),
-    ("jtc teach off", "the end of the block `with robot.teach():`"),
-    ("jtc params use-defaults", "robot.use_defaults()"),
-    ("jtc disable", "robot.disable()"),
-    ("jtc info", "robot.info"),
-    ("jtc jog", "robot.jog(…)"),
-    ("jtc log fetch", "robot.flight_log()"),
-    ("--accept-device-limits", "accept_device_limits=True"),
-    ("--baud", "baud="),
-    ("--deg", "degrees=True"),
-];
-
 /// Returns a next step in terms of Python. Commands of `ucom` stay as they are typed.
-pub fn in_python(next: &str) -> String {
-    if next.contains("`ucom ") {
-        return next.replace('`', "");
-    }
-    COMMANDS.iter().fold(next.to_owned(), |text, (command, here)| {
-        let here = if here.contains('`') { (*here).to_owned() } else { format!("`{here}`") };
-        text.replace(&format!("`{command}`"), &here)
-    })
+pub fn in_python(next: &Next) -> String {
+    let text = next.sentence(FrontEnd::Python);
+    if text.contains("`ucom ") { text.replace('`', "") } else { text }
 }
 
 impl From<Failure> for PyErr {

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 
 use crate::arm::Arm;
 use crate::dynamics::PayloadNumbers;
-use crate::error::Failure;
+use crate::error::{Failure, in_python};
 use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
@@ -29,7 +29,7 @@ pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, P
     let low = verdict.margin.and_then(|margin| margin.warning());
     let warnings: Vec<String> = verdict.warnings().map(ToString::to_string).chain(low).collect();
     all.set_item("warnings", warnings)?;
-    all.set_item("next", if verdict.is_ok() { String::new() } else { verdict.hint() })?;
+    all.set_item("next", if verdict.is_ok() { String::new() } else { in_python(&verdict.hint()) })?;
     Ok(all)
 }
 

@@ -85,7 +85,7 @@ fn variables_of_options_that_act_are_named_and_ignored_or_refused() {
     );
     let refused = report(&["go"], &[("TRY_SPEED", "9")]).refused.unwrap();
     assert_eq!(
-        (crate::exit::of(refused.kind), refused.next.as_str()),
+        (crate::exit::of(refused.kind), refused.next.to_string().as_str()),
         (2, "type --speed, or unset TRY_SPEED")
     );
     assert!(refused.message.contains("TRY_SPEED=9") && refused.message.contains("`try go`"), "{refused:?}");

@@ -53,7 +53,7 @@ impl AbsentObject {
         let mut absent = [None; JOINTS];
         for AbsentJoint { joint: number, position_rad } in &self.absent {
             let (number, value) = (usize::from(*number), *position_rad);
-            let refused = |what: String, next: &str, limit: Option<f64>| {
+            let refused = |what: String, next: &'static str, limit: Option<f64>| {
                 let facts = Facts {
                     joint: Joint::from_number(number).map(Joint::number),
                     value: Some(value),

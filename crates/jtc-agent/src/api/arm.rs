@@ -6,7 +6,7 @@ use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
-use host_kit::Severity;
+use host_kit::{Severity, next};
 use jtc_host::arm::ArmFinding;
 use jtc_host::error::Facts;
 use jtc_host::{Arm, ErrorKind, Session};
@@ -142,7 +142,11 @@ pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     let worst = checked.findings.iter().find(|found| found.finding.severity == Severity::Problem);
     if let Some(ArmFinding { finding, joint, value, limit, .. }) = worst {
         let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
-        let next = if finding.next.is_empty() { "jtc arm check lists all of it" } else { &finding.next };
+        let next = if finding.next.is_empty() {
+            next!("{} lists all of it", ArmCheck)
+        } else {
+            finding.next.clone()
+        };
         let message = format!("{}{why}; nothing was sent", finding.what);
         let facts = Facts {
             joint: joint.map(|joint| joint.number()),

@@ -4,6 +4,7 @@ use std::time::Duration;
 use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
+use host_kit::FrontEnd;
 use jtc_host::doctor::{Finding, Observation, Severity, findings};
 use jtc_host::{Session, words};
 use jtc_wire::{JOINTS, Joint, STATUS_LEN, Status, error};
@@ -48,8 +49,8 @@ impl From<Finding> for FindingObject {
             Severity::Warning => "warning",
             Severity::Good => "good",
         };
-        let plain = |text: String| text.replace('`', "");
-        Self { severity: severity.to_owned(), what, why: plain(why), next: plain(next) }
+        let (why, next) = (why.replace('`', ""), next.plain(FrontEnd::Agent));
+        Self { severity: severity.to_owned(), what, why, next }
     }
 }
 

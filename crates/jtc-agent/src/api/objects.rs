@@ -1,4 +1,5 @@
 //! What the API sends: one type for each object, from which its description is made.
+use host_kit::{FrontEnd, Next};
 use jtc_host::explain::{self, Family};
 use jtc_host::held_stop::{self, HeldStop};
 use jtc_host::sample::is_measured;
@@ -157,10 +158,10 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// What leads on from here.
-    fn next_step(&self, status: &Status) -> String {
+    /// Returns the next step.
+    fn next_step(&self, status: &Status) -> Next {
         if self.jumped != 0 && !status.is_held_stop() {
-            return held_stop::AFTER_ENCODER_JUMP.to_owned();
+            return held_stop::after_encoder_jump();
         }
         held_stop::next_step(status, self.stop.as_ref().map(|(cause, _)| cause))
     }
@@ -205,7 +206,7 @@ impl ControllerObject {
             errors_occurred: texts(words::errors(status.occurred)),
             commanded_rad,
             joints: joints.collect(),
-            next: found.next_step(status).replace('`', ""),
+            next: found.next_step(status).plain(FrontEnd::Agent),
         }
     }
 }

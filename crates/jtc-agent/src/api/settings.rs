@@ -145,7 +145,7 @@ impl SettingChange {
             let message = format!("{} is part of the payload; nothing was changed", row.name);
             return Err(none(message, "PUT /api/payload changes it, and checks that the arm can hold it"));
         }
-        let refused = |what: &str, next: &str| {
+        let refused = |what: &str, next: &'static str| {
             let message = format!("{}: {what}; nothing was changed", self.words());
             Err(none(message, next).with(self.facts()))
         };
@@ -191,7 +191,7 @@ fn short(name: &str) -> String {
 }
 
 /// Nothing of this is changed.
-fn none(message: String, next: &str) -> Problem {
+fn none(message: String, next: &'static str) -> Problem {
     Problem::new(CODE, message, next).kind(ErrorKind::Usage)
 }
 

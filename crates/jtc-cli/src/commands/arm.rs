@@ -7,6 +7,7 @@ mod show;
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output};
+use host_kit::FrontEnd;
 use jtc_host::arm::{Arm, ArmFinding};
 use jtc_host::doctor::Finding;
 use serde_json::json;
@@ -63,7 +64,7 @@ fn as_text(findings: &[ArmFinding]) -> String {
         text += &format!("{} {what}{}{why}\n", severity.mark(), if why.is_empty() { "" } else { ": " });
         let same = findings.get(i + 1).is_some_and(|after| &after.finding.next == next);
         if !next.is_empty() && !same {
-            text += &format!("    next: {}\n", next.replace('`', ""));
+            text += &format!("    next: {}\n", next.plain(FrontEnd::Command));
         }
     }
     text

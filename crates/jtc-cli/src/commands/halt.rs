@@ -49,7 +49,7 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let is_only_one = ends.len() == 1 && !failed.is_empty();
     let words: Vec<String> = ends.iter().flatten().map(Stopped::words).collect();
     if !is_only_one {
-        failed.iter().for_each(|failure| out.warn(&failure.message, &failure.next));
+        failed.iter().for_each(|failure| out.warn(&failure.message, &failure.next.to_string()));
     }
     if !not_asked.is_empty() {
         out.note(format_args!(
@@ -292,10 +292,10 @@ impl NotHalted {
                 "the controller has confirmed the {name}, but no status shows that the arm stands: if it moves, press the emergency stop"
             ),
         };
-        let next = &self.failure.next;
+        let next = self.failure.next.to_string();
         // The words of an error may name the emergency stop alone.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
-        Failure { next: hint.trim_end_matches([' ', '.']).to_owned(), ..self.failure }
+        Failure { next: hint.trim_end_matches([' ', '.']).to_owned().into(), ..self.failure }
     }
 }
 
@@ -388,7 +388,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
         }
     }
     let message = "one program after the other opens the port of the arm";
-    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(halt::STILL_MOVING_HELP);
+    let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(halt::still_moving_help());
     Err(NotHalted::after(Sent::Confirmed, failure))
 }
 

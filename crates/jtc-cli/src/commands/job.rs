@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, exit::REFUSED};
+use host_kit::{Action, Next};
 use jtc_core::{Config, Friction, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, ProblemKind, Suspicion, Verdict};
@@ -159,12 +160,13 @@ impl Job {
     }
 
     /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
-    pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> String {
+    pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
                 "`jtc status` shows where the arm is; `jtc {}` plans it anew from there",
                 self.words
-            );
+            )
+            .into();
         }
         if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
             let words = &self.words;
@@ -174,7 +176,8 @@ impl Job {
             };
             return format!(
                 "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
-            );
+            )
+            .into();
         }
         let ends_in_motion = verdict.refusals().any(|p| p.kind == ProblemKind::NotAtRest);
         if self.loaded.form == Form::Recording && ends_in_motion {
@@ -182,7 +185,8 @@ impl Job {
             return format!(
                 "the recording shows a part of a motion: `jtc traj continue {words} --trajectory FILE` runs the rest of that file, `jtc traj \
                  replay {words} --measured` the part that was measured, from rest to rest"
-            );
+            )
+            .into();
         }
         verdict.hint_with(&self.words, self.speed, passing_speed)
     }
@@ -240,8 +244,10 @@ impl Job {
 
     /// A failure of this job, with the file's name where its hint leaves it open.
     pub fn named(&self, failure: Failure) -> Failure {
-        let again = if self.made { self.words.clone() } else { format!("traj run {}", self.words) };
-        let next = failure.next.replace("traj run FILE", &again);
+        let again =
+            if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
+        let next = failure.next.with_command(Action::TrajRun, &again);
+        let next = next.with_command(Action::TrajRunWithApproach, &format!("{again} --approach"));
         Failure { next, ..failure }
     }
 

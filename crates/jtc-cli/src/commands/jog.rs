@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
 use jtc_host::arm::Arm;
-use jtc_host::port::halt::STILL_MOVING_HELP;
+use jtc_host::port::halt::still_moving_help;
 use jtc_host::words;
 use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
@@ -223,7 +223,7 @@ fn without_error(status: Option<Status>) -> Result<(), Failure> {
 fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
     session.jog_to_rest().map_err(|error| Failure::of(&error))?.ok_or_else(|| {
-        Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves").next(STILL_MOVING_HELP)
+        Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves").next(still_moving_help())
     })
 }
 

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output, Stop};
+use host_kit::{Action, FrontEnd};
 use jtc_host::arm::Arm;
 use jtc_host::session::ParameterSource;
 use jtc_host::{Error, ParametersError, words};
@@ -35,7 +36,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
         if s.errors == 0 {
             format!("cleared; state {}", s.state.name())
         } else {
-            let next = words::next_step(&s).replace('`', "");
+            let next = words::next_step(&s).plain(FrontEnd::Command);
             format!("still there: {}\nnext: {next}", words::errors_line(&s))
         }
     });
@@ -106,9 +107,10 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
 /// A recovery that failed is not mended by the same command: what keeps the error is to be looked at.
 fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
+    let recovers = [Action::Recover, Action::RecoverWithArm, Action::RecoverWithDefaults];
     // Without numbers for the arm it is the same command with an option that helps.
     if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
-        || !failure.next.contains("jtc recover")
+        || !recovers.iter().any(|action| failure.next.names(*action))
     {
         return failure;
     }

@@ -88,6 +88,6 @@ fn coldest(status: &jtc_wire::Status) -> f64 {
 fn refused(error: &PlanError, name: &str) -> Failure {
     let message = format!("no move to {name}: {}", error.of_move());
     let failure = Failure { message, ..Failure::of(error) };
-    let next = error.next_of_move().map_or(failure.next.clone(), str::to_owned);
+    let next = error.next_of_move().unwrap_or_else(|| failure.next.clone());
     Failure::nothing_sent(failure.next(next))
 }

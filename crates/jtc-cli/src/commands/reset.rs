@@ -87,9 +87,16 @@ mod tests {
     fn a_bare_mask_is_refused_with_both_things_that_it_may_mean() {
         let failure = of_mask("3");
         assert_eq!(failure.kind, ErrorKind::Usage);
-        assert!(failure.next.contains("`jtc reset --joints 3` resets joint 3"), "{}", failure.next);
-        assert!(failure.next.contains("`jtc reset --joints 1,2`"), "{}", failure.next);
-        assert!(of_mask("0x44").next.contains("--joints 3 --gripper"));
-        assert!(of_mask("0x80").next.contains("--all") && of_mask("elbow").next.contains("--all"));
+        assert!(
+            failure.next.to_string().contains("`jtc reset --joints 3` resets joint 3"),
+            "{}",
+            failure.next
+        );
+        assert!(failure.next.to_string().contains("`jtc reset --joints 1,2`"), "{}", failure.next);
+        assert!(of_mask("0x44").next.to_string().contains("--joints 3 --gripper"));
+        assert!(
+            of_mask("0x80").next.to_string().contains("--all")
+                && of_mask("elbow").next.to_string().contains("--all")
+        );
     }
 }

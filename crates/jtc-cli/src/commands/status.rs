@@ -1,6 +1,7 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
 use cli_kit::{Failure, Output, figure, table};
+use host_kit::FrontEnd;
 use jtc_host::held_stop::{self, HeldStop};
 use jtc_host::sample::is_measured;
 use jtc_host::words::{self, GRIPPER};
@@ -18,7 +19,7 @@ pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut value = as_json(&status);
     value["held_stop"] = json!(stop);
     if let Some((cause, _)) = reactions.as_ref().and_then(|reactions| reactions.stop.as_ref()) {
-        value["next"] = held_stop::next_step(&status, Some(cause)).replace('`', "").into();
+        value["next"] = held_stop::next_step(&status, Some(cause)).plain(FrontEnd::Command).into();
     }
     out.result(&value, || text(&status, reactions.as_ref()));
     Ok(())
@@ -78,7 +79,7 @@ pub fn as_json(s: &Status) -> Value {
         "can_flags_occurred": words::can_flags(s.can_occurred),
         "joints": joints,
         "gripper": gripper,
-        "next": words::next_step(s).replace('`', ""),
+        "next": words::next_step(s).plain(FrontEnd::Command),
     })
 }
 
@@ -162,7 +163,7 @@ fn text(s: &Status, reactions: Option<&Reactions>) -> String {
         text += &format!("{}\n", words::waiting_for(s));
     }
     let next = held_stop::next_step(s, stop.map(|(cause, _)| cause));
-    text += &format!("next: {}\n", next.replace('`', ""));
+    text += &format!("next: {}\n", next.plain(FrontEnd::Command));
     text
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, figure, table};
+use host_kit::FrontEnd;
 use jtc_core::{Config, Payload};
 use jtc_host::check::Verdict;
 use jtc_host::session::UploadOptions;
@@ -97,7 +98,7 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
         let without = job.without().map_or(String::new(), |words| words + "\n");
         // What is refused has its reasons already.
         let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
-        format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.replace('`', ""))
+        format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.plain(FrontEnd::Command))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::shown(ErrorKind::Refused)) }
 }

@@ -6,7 +6,7 @@ mod limits;
 mod moving;
 mod stability;
 
-use host_kit::{Finding, Severity};
+use host_kit::{Finding, Next, Severity};
 use jtc_core::settings;
 use jtc_core::{Config, ConfigError, Friction, JOINTS, OutOfBounds};
 use jtc_dynamics::{ArmModel, Link, ModelError};
@@ -42,7 +42,7 @@ pub struct ArmFinding {
 
 impl ArmFinding {
     fn new(severity: Severity, code: &'static str, what: impl Into<String>) -> Self {
-        let finding = Finding { severity, what: what.into(), why: String::new(), next: String::new() };
+        let finding = Finding { severity, what: what.into(), why: String::new(), next: Next::default() };
         let (joint, name, value, limit, unit, pose_rad) = (None, None, None, None, None, None);
         Self { code, finding, joint, name, value, limit, unit, pose_rad }
     }
@@ -52,7 +52,7 @@ impl ArmFinding {
         self
     }
 
-    fn next(mut self, next: impl Into<String>) -> Self {
+    fn next(mut self, next: impl Into<Next>) -> Self {
         self.finding.next = next.into();
         self
     }

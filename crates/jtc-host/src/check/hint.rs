@@ -1,5 +1,6 @@
 //! What helps after a verdict: the next command, in words.
 
+use host_kit::{Action, Next};
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 use super::kind::ProblemKind;
@@ -33,27 +34,28 @@ impl Verdict {
     }
 
     /// The next command or act that helps, with `FILE` for the trajectory's file.
-    pub fn hint(&self) -> String {
+    pub fn hint(&self) -> Next {
         self.hint_for("FILE", 100.0)
     }
 
     /// The next command or act that helps for a trajectory that was checked at `speed_pct` of its own speed. `file` is its name as it
     /// is typed, with the options that belong to it.
-    pub fn hint_for(&self, file: &str, speed_pct: f64) -> String {
+    pub fn hint_for(&self, file: &str, speed_pct: f64) -> Next {
         self.hint_with(file, speed_pct, self.slower(speed_pct))
     }
 
     /// As [`Verdict::hint_for`], where it is known which speed (% of the file's own) passes the check, if any does.
-    pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> String {
+    pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> Next {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);
         let speed = if speed_pct == 100.0 { String::new() } else { format!(" --speed {speed_pct}") };
         if self.is_ok() {
-            format!("`jtc traj run {file}{speed}`")
+            Next::typed(Action::TrajRun, format!("jtc traj run {file}{speed}"))
         } else if has(ProblemKind::TooManyPoints) {
             format!(
                 "at most {POINTS_MAX} points: give points further apart in time (steps of up to 1000 ms), or run it in parts"
             )
+            .into()
         } else if has(ProblemKind::SegmentPoints) || has(ProblemKind::TooManySegments) {
             let least = self.points.div_ceil(SEGMENTS_MAX).max(1);
             format!(
@@ -61,8 +63,10 @@ impl Verdict {
                  segments; without it the length of the segments is chosen",
                 self.points
             )
+            .into()
         } else if only(ProblemKind::StartPose) {
-            format!("`jtc traj run {file}{speed} --approach` moves the arm to the first point before")
+            Next::typed(Action::TrajRunWithApproach, format!("jtc traj run {file}{speed} --approach"))
+                .then(" moves the arm to the first point before")
         } else if self.suspicion() == Suspicion::Degrees {
             "the positions look like degrees: all numbers of a trajectory are in rad, rad/s and rad/s² (90° = 1.5708)"
                 .into()
@@ -81,9 +85,10 @@ impl Verdict {
             } else {
                 ""
             };
-            format!("`--speed PCT` runs it slower{load}: `jtc traj check {file} --speed {percent}`")
+            let check = Next::typed(Action::TrajCheck, format!("jtc traj check {file} --speed {percent}"));
+            Next::from(format!("`--speed PCT` runs it slower{load}: ")).then(check)
         } else {
-            format!("correct the file; `jtc traj info {file}` shows its figures")
+            format!("correct the file; `jtc traj info {file}` shows its figures").into()
         }
     }
 }

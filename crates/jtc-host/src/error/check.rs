@@ -1,6 +1,6 @@
 //! Errors of a check for a run.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 
 use super::facts;
 use crate::arm::{Difference, NOT_CARRIED};
@@ -42,10 +42,9 @@ impl Diagnose for CheckError {
             Self::DeviceLimits { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "device-limits",
-                format!(
-                    "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries \
-                     {NOT_CARRIED}: they belong into the firmware"
-                ),
+                next!("a controller with extensions takes the whole arm by {}; ", ArmPush).then(format!(
+                    "for others no frame carries {NOT_CARRIED}: they belong into the firmware"
+                )),
             ),
             Self::Arm(e) => e.diagnosis(),
         }

@@ -1,6 +1,6 @@
 //! Errors of reading, giving and keeping an arm as one thing.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_core::settings::SettingError;
 use jtc_wire::{Code, ControllerState, Joint, StoreState, TrajectoryState};
 
@@ -103,22 +103,25 @@ impl Diagnose for ExtensionError {
             Self::NoArm { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-arm",
-                "its firmware is of another version: `jtc info`; `jtc arm push FILE` gives it an arm",
+                next!("its firmware is of another version: {}; {} gives it an arm", Info, ArmPush),
             ),
             Self::Incomplete { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "incomplete-arm",
-                "`jtc arm check FILE` names what is missing; nothing was sent",
+                next!("{} names what is missing; nothing was sent", ArmCheck),
             ),
             Self::Differs { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "other-arm",
-                "`jtc arm diff FILE` lists every value; `jtc arm push FILE` gives the controller this arm",
+                next!("{} lists every value; {} gives the controller this arm", ArmDiff, ArmPush),
             ),
             Self::Powered { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "powered",
-                "an arm is stored while it has no torque: `jtc disable` (an arm without brakes falls), then push again",
+                next!(
+                    "an arm is stored while it has no torque: {} (an arm without brakes falls), then push again",
+                    Disable
+                ),
             ),
             Self::Setting(_) => Diagnosis::new(
                 ErrorKind::Usage,
@@ -133,18 +136,29 @@ impl Diagnose for ExtensionError {
             Self::TooHeavy { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-heavy",
-                "nothing was changed. Is the mass in kg and the centre of mass in m, along the axes of the flange? Else move the \
-                 arm to a pose that takes less (`jtc jog`), or take less on",
+                next!(
+                    "nothing was changed. Is the mass in kg and the centre of mass in m, along the axes of the flange? Else move the \
+                     arm to a pose that takes less ({}), or take less on",
+                    Jog
+                ),
             ),
             Self::PayloadInMotion { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "in-motion",
-                "nothing was changed; `jtc traj pause` brings a motion to rest, `jtc status` shows what goes on",
+                next!(
+                    "nothing was changed; {} brings a motion to rest, {} shows what goes on",
+                    Pause,
+                    Status
+                ),
             ),
             Self::NotStored { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "not-stored",
-                "the arm is in use until the device is switched off; `jtc info` shows its memory, `jtc arm push --store` tries again",
+                next!(
+                    "the arm is in use until the device is switched off; {} shows its memory, {} tries again",
+                    Info,
+                    ArmStore
+                ),
             ),
         }
     }

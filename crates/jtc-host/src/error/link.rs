@@ -1,6 +1,6 @@
 //! Errors of an exchange with the controller.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, TrajectoryState};
 
 use crate::port::PortError;
@@ -72,60 +72,100 @@ fn received(bytes: u64) -> String {
 
 impl Diagnose for LinkError {
     fn diagnosis(&self) -> Diagnosis {
-        let no_link = |code, next: String| Diagnosis::new(ErrorKind::NoLink, code, next);
+        let no_link = |code, next: Next| Diagnosis::new(ErrorKind::NoLink, code, next);
         match self {
             Self::Port(e) => e.diagnosis(),
             Self::NoLink { bytes: 0, .. } => no_link(
                 "no-link",
-                "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into(),
+                next!(
+                    "check cable and power of the controller, then {}; is it the right one of `jtc ports`?",
+                    Doctor
+                ),
             ),
             Self::NoLink { baud, .. } => {
                 let baud = baud.map_or("none".into(), |b| b.to_string());
                 no_link(
                     "no-link",
-                    format!("the rate is probably wrong ({baud} Bd here): try `--baud`, `jtc doctor` tries them all"),
+                    Next::from(format!("the rate is probably wrong ({baud} Bd here): try ")).then(next!(
+                        "{}, {} tries them all",
+                        Baud,
+                        Doctor
+                    )),
                 )
             }
             Self::NotConfirmed { .. } => {
-                no_link("not-confirmed", "the line towards the controller loses bytes: `jtc doctor`".into())
+                no_link("not-confirmed", next!("the line towards the controller loses bytes: {}", Doctor))
             }
             Self::NoExtension { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-extension",
-                "its firmware knows the protocol of existing devices only; `jtc info` shows what could be found out",
+                next!(
+                    "its firmware knows the protocol of existing devices only; {} shows what could be found out",
+                    Info
+                ),
             ),
             Self::Denied { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "not-sent",
-                "`jtc status` shows the state, and the agent's status who commands; a Stop and a Pause are taken from everyone",
+                next!(
+                    "{} shows the state, and the agent's status who commands; a Stop and a Pause are taken from everyone",
+                    Status
+                ),
             ),
             Self::Refused { request, code, state, trajectory } => {
                 let next = match request {
                     FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
-                    FrameType::ArmModel | FrameType::ArmModelUseDefault if *code == DataStatus::IncorrectValue => Some(
-                        "a number is beyond its bounds, or a joint of this arm is too light for the gains that the controller has (`jtc arm \
-                         check FILE`), or a joint cannot hold this arm where it stands, with its payload: `jtc payload show`, `jtc payload \
-                         clear`",
-                    ),
-                    FrameType::PidParam | FrameType::PidParamUseDefault if *code == DataStatus::IncorrectValue => Some(
-                        "a gain is beyond its bounds, or a joint is too light for it (`jtc arm check FILE`); while the arm is held, also a Kp \
-                         that hardly holds it, and an integral that cannot hold any more what it holds",
-                    ),
+                    FrameType::ArmModel | FrameType::ArmModelUseDefault
+                        if *code == DataStatus::IncorrectValue =>
+                    {
+                        Some(next!(
+                            "a number is beyond its bounds, or a joint of this arm is too light for the gains that the controller has \
+                             ({}), or a joint cannot hold this arm where it stands, with its payload: {}, {}",
+                            ArmCheck,
+                            PayloadShow,
+                            PayloadClear
+                        ))
+                    }
+                    FrameType::PidParam | FrameType::PidParamUseDefault
+                        if *code == DataStatus::IncorrectValue =>
+                    {
+                        Some(next!(
+                            "a gain is beyond its bounds, or a joint is too light for it ({}); while the arm is held, also a Kp that \
+                             hardly holds it, and an integral that cannot hold any more what it holds",
+                            ArmCheck
+                        ))
+                    }
                     FrameType::ClearCurrentErrors | FrameType::ClearOccurredErrors
                         if *code == DataStatus::NotAllowed =>
                     {
-                        Some("the cause is still there, a joint still yields, or the arm still moves: free it, wait until it stands, then again")
+                        Some(Next::from(
+                            "the cause is still there, a joint still yields, or the arm still moves: free it, wait until it stands, then \
+                             again",
+                        ))
                     }
-                    FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => Some(
-                        "settings change without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
-                    ),
-                    FrameType::Jog if *code == DataStatus::NotAllowed && *state == ControllerState::HoldPos => Some(
-                        "`jtc traj stop` ends a paused trajectory, `jtc clear` a held stop. Where neither is there, gravity leaves nothing of a \
-                         joint's torque limit for this direction: jog it the other way, or take payload off",
-                    ),
+                    FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => {
+                        Some(next!(
+                            "settings change without torque only: {} (an arm without brakes falls), then again; nothing was changed",
+                            Disable
+                        ))
+                    }
+                    FrameType::Jog
+                        if *code == DataStatus::NotAllowed && *state == ControllerState::HoldPos =>
+                    {
+                        Some(next!(
+                            "{} ends a paused trajectory, {} a held stop. Where neither is there, gravity leaves nothing of a joint's \
+                             torque limit for this direction: jog it the other way, or take payload off",
+                            Stop,
+                            Clear
+                        ))
+                    }
                     _ => None,
                 };
-                Diagnosis::new(ErrorKind::Device, "refused", next.unwrap_or_else(|| after_refusal(*code, *state)))
+                Diagnosis::new(
+                    ErrorKind::Device,
+                    "refused",
+                    next.unwrap_or_else(|| after_refusal(*code, *state)),
+                )
             }
         }
     }
@@ -149,27 +189,33 @@ fn after_refused_execution(
     code: DataStatus,
     state: Code<ControllerState>,
     trajectory: Code<TrajectoryState>,
-) -> Option<&'static str> {
+) -> Option<Next> {
     use TrajectoryState::*;
     if trajectory == Pause && is_place(code) {
-        return Some(
-            "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. `jtc traj stop`, then \
-             `jtc traj run FILE --approach`",
-        );
+        return Some(next!(
+            "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. {}, then {}",
+            Stop,
+            TrajRunWithApproach
+        ));
     }
     let loaded = state == ControllerState::HoldPos && trajectory.is_in(&[Stop, Finish]);
     if loaded && code == DataStatus::IncorrectValue {
-        return Some(
-            "the trajectory in the controller breaks a limit, or a bearing is outside the temperatures of the friction table: `jtc status` \
-             shows the joint and what has occurred. Check the file: `jtc traj check FILE`",
-        );
+        return Some(next!(
+            "the trajectory in the controller breaks a limit, or a bearing is outside the temperatures of the friction table: {} \
+             shows the joint and what has occurred. Check the file: {}",
+            Status,
+            TrajCheck
+        ));
     }
     // Execution from there is refused for another reason, and resume is not sent.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
-    (idle && code == DataStatus::NotAllowed).then_some(
-        "nothing is being executed, so there is nothing to pause or stop; after a held stop `jtc clear` comes first. `jtc status` shows \
-         the state",
-    )
+    (idle && code == DataStatus::NotAllowed).then(|| {
+        next!(
+            "nothing is being executed, so there is nothing to pause or stop; after a held stop {} comes first. {} shows the state",
+            Clear,
+            Status
+        )
+    })
 }
 
 /// The arm is not where the command needs it. On a line that did not ask for more, code 6 stands for 7 and 8 (J-51).
@@ -178,22 +224,31 @@ fn is_place(code: DataStatus) -> bool {
 }
 
 /// What helps after a refusal with this code in this state.
-pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &'static str {
+pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> Next {
     match (code, state.known()) {
         (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
-            "the controller is not ready yet: `jtc doctor` names what is missing"
+            next!("the controller is not ready yet: {} names what is missing", Doctor)
         }
-        (DataStatus::NotAllowed, Some(ControllerState::Error)) => "the controller is in Error: `jtc recover`",
-        (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => "`jtc teach off` first",
+        (DataStatus::NotAllowed, Some(ControllerState::Error)) => {
+            next!("the controller is in Error: {}", Recover)
+        }
+        (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => next!("{} first", TeachOff),
         (DataStatus::NotAllowed, _) => {
-            "`jtc status` shows the state; `jtc traj stop` ends a trajectory, `jtc clear` a held stop. No motion and no teaching where joints \
-             are set absent"
+            next!(
+                "{} shows the state; {} ends a trajectory, {} a held stop. No motion and no teaching where joints are set absent",
+                Status,
+                Stop,
+                Clear
+            )
         }
         (DataStatus::StartPositionMismatch, _) => {
-            "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first. Where it is, a torque limit leaves too \
-             little for the rest of the way: begin in another pose, or take payload off"
+            next!(
+                "the arm is not at the first point: {} moves it there first. Where it is, a torque limit leaves too little for the \
+                 rest of the way: begin in another pose, or take payload off",
+                TrajRunWithApproach
+            )
         }
-        _ => "`jtc explain` explains each code",
+        _ => next!("{} explains each code", Explain),
     }
 }
 

@@ -10,8 +10,8 @@ mod parameters;
 mod state;
 mod upload;
 
-use host_kit::ErrorKind;
 pub use host_kit::{Diagnose, Diagnosis, Facts};
+use host_kit::{ErrorKind, next};
 
 pub use check::CheckError;
 pub use extension::ExtensionError;
@@ -89,10 +89,10 @@ impl Diagnose for Error {
             Self::Frame(_) => Diagnosis::new(
                 ErrorKind::Usage,
                 "frame",
-                "`jtc traj check` and `jtc params show` show what the file holds",
+                next!("{} and `jtc params show` show what the file holds", TrajCheck),
             ),
             Self::Cancelled => {
-                Diagnosis::new(ErrorKind::Fault, "cancelled", "`jtc status` shows where the arm is")
+                Diagnosis::new(ErrorKind::Fault, "cancelled", next!("{} shows where the arm is", Status))
             }
         }
     }

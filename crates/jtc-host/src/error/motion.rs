@@ -1,6 +1,6 @@
 //! Errors of an execution: before it begins, and on the way.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectoryState};
 
 use super::{LinkError, facts};
@@ -75,17 +75,21 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
 }
 
 /// What leads on from a held stop in a motion.
-fn after_held_stop(cause: Option<&StopCause>) -> String {
+fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
         None => "remove what the arm met, or give its payload".to_owned(),
         // No trajectory goes on before the drive was reset.
-        Some(StopKind::EncoderJump) => return held_stop::AFTER_ENCODER_JUMP.to_owned(),
+        Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),
     };
-    format!(
-        "{remedy}; then `jtc clear`. `jtc traj resume` goes on if each joint still stands within 0.02 rad of the path; otherwise \
-         `jtc traj stop`, then `jtc traj run FILE --approach`"
-    )
+    let then = next!(
+        "; then {}. {} goes on if each joint still stands within 0.02 rad of the path; otherwise {}, then {}",
+        Clear,
+        Resume,
+        Stop,
+        TrajRunWithApproach
+    );
+    Next::from(remedy).then(then)
 }
 
 /// What is known about the motion when the link is gone.
@@ -128,31 +132,40 @@ impl Diagnose for MotionError {
             Self::NotUploaded => (
                 ErrorKind::Refused,
                 "not-uploaded",
-                "check it again from the pose of the arm, upload it, then execute it (`jtc traj run FILE`)",
+                next!("check it again from the pose of the arm, upload it, then execute it ({})", TrajRun),
             ),
             Self::NotPaused { trajectory, .. } => (
                 ErrorKind::Refused,
                 "not-paused",
                 if *trajectory == TrajectoryState::Execute {
-                    "a pause takes up to half a second: `jtc traj resume` again once `jtc status` shows Pause"
+                    next!("a pause takes up to half a second: {} again once {} shows Pause", Resume, Status)
                 } else {
-                    "`jtc traj run FILE` checks a trajectory and starts it"
+                    next!("{} checks a trajectory and starts it", TrajRun)
                 },
             ),
             Self::RestRefused { .. } => (
                 ErrorKind::Refused,
                 "rest-refused",
-                "`jtc payload show` shows what the controller computes with, `jtc payload set` corrects it; `jtc traj stop` ends the motion",
+                next!(
+                    "{} shows what the controller computes with, {} corrects it; {} ends the motion",
+                    PayloadShow,
+                    PayloadSet,
+                    Stop
+                ),
             ),
             Self::RunFault { .. } => (
                 ErrorKind::Fault,
                 "run-fault",
-                "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos",
+                next!("{} shows what is wrong, {} leads back to HoldPos", Status, Recover),
             ),
             Self::LinkLost { .. } => (
                 ErrorKind::NoLink,
                 "link-lost",
-                "press the emergency stop if it must stand; or restore the link, then `jtc traj stop` and `jtc status`",
+                next!(
+                    "press the emergency stop if it must stand; or restore the link, then {} and {}",
+                    Stop,
+                    Status
+                ),
             ),
         };
         Diagnosis::new(kind, code, next)
@@ -185,7 +198,7 @@ mod tests {
             trajectory: TrajectoryState::Execute.into(),
         };
         assert!(early.to_string().contains("still slowing down"), "{early}");
-        assert!(early.diagnosis().next.contains("resume` again"), "{}", early.diagnosis().next);
+        assert!(early.diagnosis().next.to_string().contains("resume` again"), "{}", early.diagnosis().next);
         let never = MotionError::NotPaused {
             state: ControllerState::HoldPos.into(),
             trajectory: TrajectoryState::Finish.into(),

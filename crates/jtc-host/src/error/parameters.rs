@@ -1,6 +1,6 @@
 //! Errors of giving friction, gains and arm model to the controller.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{DataStatus, FrameType};
 
 use crate::arm::{Beyond, ParameterError};
@@ -29,7 +29,7 @@ pub enum ParametersError {
         /// Which joint, the value and its limit.
         problem: String,
         /// What to do about it.
-        next: String,
+        next: Next,
     },
     /// The controller needs parameters, and no source of them was named.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
@@ -60,13 +60,16 @@ impl Diagnose for ParametersError {
             Self::Unstable { next, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "unstable-gains",
-                format!("{next}; `jtc arm check FILE` lists all of it"),
+                next.clone().then(next!("; {} lists all of it", ArmCheck)),
             ),
             Self::NoSource { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "no-parameters",
-                "`jtc recover --arm FILE` gives the numbers of your arm; `jtc recover --defaults` those of the arm that is built into \
-                 the controller, when it is that one",
+                next!(
+                    "{} gives the numbers of your arm; {} those of the arm that is built into the controller, when it is that one",
+                    RecoverWithArm,
+                    RecoverWithDefaults
+                ),
             ),
             Self::IncompleteArm { .. } => Diagnosis::new(
                 ErrorKind::Refused,

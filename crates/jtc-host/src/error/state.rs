@@ -1,6 +1,6 @@
 //! Errors of waiting for a state.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
 
 use super::facts;
@@ -94,13 +94,13 @@ impl Diagnose for StateError {
             Self::Device { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "device-error",
-                "`jtc recover` leads back to HoldPos, `jtc explain CODE` explains each error",
+                next!("{} leads back to HoldPos, {} explains each error", Recover, ExplainCode),
             ),
             Self::HeldStop { status, cause } => {
                 Diagnosis::new(ErrorKind::Fault, "held-stop", held_stop::next_step(status, cause.as_ref()))
             }
             Self::EncoderJumped { .. } => {
-                Diagnosis::new(ErrorKind::Fault, "encoder-jumped", held_stop::AFTER_ENCODER_JUMP)
+                Diagnosis::new(ErrorKind::Fault, "encoder-jumped", held_stop::after_encoder_jump())
             }
             Self::Timeout { status, .. } => {
                 Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))
@@ -109,18 +109,18 @@ impl Diagnose for StateError {
                 Diagnosis::new(ErrorKind::Device, "not-ready", words::next_step(status))
             }
             Self::Moving { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "moving", "wait until it stands, or `jtc traj pause`")
+                Diagnosis::new(ErrorKind::Refused, "moving", next!("wait until it stands, or {}", Pause))
             }
             Self::NotMeasured { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "not-measured",
-                "`jtc status` shows the joints, `jtc recover` brings them up",
+                next!("{} shows the joints, {} brings them up", Status, Recover),
             ),
             Self::WouldFall { state, .. } => {
                 let next = if *state == ControllerState::Operate {
-                    "`jtc traj stop` first"
+                    next!("{} first", Stop)
                 } else {
-                    "`jtc teach off` first"
+                    next!("{} first", TeachOff)
                 };
                 Diagnosis::new(ErrorKind::Refused, "powered", next)
             }
@@ -132,7 +132,13 @@ impl Diagnose for StateError {
             Self::Absent { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "absent-joints",
-                "`jtc bench show` shows them; `jtc jog` moves the joints that are there; `jtc disable`, then `jtc bench present` ends it",
+                next!(
+                    "{} shows them; {} moves the joints that are there; {}, then {} ends it",
+                    BenchShow,
+                    Jog,
+                    Disable,
+                    BenchPresent
+                ),
             ),
         }
     }

@@ -1,6 +1,6 @@
 //! Errors of an upload.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
 
 use super::link::after_refusal;
@@ -43,7 +43,9 @@ impl Diagnose for UploadError {
             Self::SegmentRefused { code, .. } => {
                 ("segment-refused", after_refusal(*code, ControllerState::HoldPos.into()))
             }
-            Self::Incomplete { .. } => ("upload-failed", "`jtc doctor` looks at the line; then run it again"),
+            Self::Incomplete { .. } => {
+                ("upload-failed", next!("{} looks at the line; then run it again", Doctor))
+            }
         };
         Diagnosis::new(ErrorKind::Device, code, next)
     }

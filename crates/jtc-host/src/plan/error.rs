@@ -1,6 +1,6 @@
 //! Why there is no plan.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_core::POINTS_MAX;
 use jtc_plan::kinematics;
 
@@ -88,14 +88,16 @@ impl PlanError {
     }
 
     /// What helps a move whose end, or where the arm stands, is outside the limits; `None` where [`Diagnose`] has it.
-    pub fn next_of_move(&self) -> Option<&'static str> {
+    pub fn next_of_move(&self) -> Option<Next> {
         match self {
             Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
-                Some("`jtc jog` brings the joint back inside its limits")
+                Some(next!("{} brings the joint back inside its limits", Jog))
             }
-            Self::Plan(jtc_plan::PlanError::Position { .. }) => Some(
-                "choose a place inside the limits, which `jtc arm show` lists; positions are in rad, and in degrees with --deg",
-            ),
+            Self::Plan(jtc_plan::PlanError::Position { .. }) => Some(next!(
+                "choose a place inside the limits, which {} lists; positions are in rad, and in degrees with {}",
+                ArmShow,
+                Degrees
+            )),
             _ => None,
         }
     }
@@ -160,10 +162,15 @@ impl Diagnose for PlanError {
                 "a larger margin is for an arm whose model is uncertain; 0 plans with the whole torque",
             ),
             Self::Blend { unit, .. } => {
-                let of_joints = "is it in degrees? A blend is in rad (5° = 0.0873 rad), and in degrees with `--deg`, as the positions are";
-                let of_flange = "is it in mm? This blend is in m (20 mm = 0.02 m)";
-                let hint = if *unit == "m" { of_flange } else { of_joints };
-                Diagnosis::new(ErrorKind::Usage, "waypoints", hint)
+                let next = if *unit == "m" {
+                    Next::from("is it in mm? This blend is in m (20 mm = 0.02 m)")
+                } else {
+                    next!(
+                        "is it in degrees? A blend is in rad (5° = 0.0873 rad), and in degrees with {}, as the positions are",
+                        Degrees
+                    )
+                };
+                Diagnosis::new(ErrorKind::Usage, "waypoints", next)
             }
             Self::TooManyCorners { .. } | Self::TooFine { .. } => Diagnosis::new(
                 ErrorKind::Refused,

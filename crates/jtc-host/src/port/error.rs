@@ -2,7 +2,7 @@
 
 use std::io;
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 
 /// Why a port cannot be opened, read or written.
 #[derive(Debug, thiserror::Error)]
@@ -133,14 +133,14 @@ fn process_words(process: Option<i32>) -> String {
 
 impl Diagnose for PortError {
     fn diagnosis(&self) -> Diagnosis {
-        let next = match self {
+        let next: Next = match self {
             PortError::NotFound { .. } | PortError::NoPort { .. } => "`jtc ports` lists the ports that are there".into(),
             PortError::Permission { path } if cfg!(target_os = "linux") => {
-                format!("`sudo usermod -aG dialout $USER`, then log in again (owner and group: `ls -l {path}`)")
+                format!("`sudo usermod -aG dialout $USER`, then log in again (owner and group: `ls -l {path}`)").into()
             }
             PortError::Permission { .. } => "run with the rights to open this port".into(),
             PortError::Busy { path } if cfg!(target_os = "linux") => {
-                format!("`fuser -v {path}` names the program that has it; end it and try again")
+                format!("`fuser -v {path}` names the program that has it; end it and try again").into()
             }
             PortError::Busy { .. } => "close the program that has it and try again".into(),
             PortError::Baud { .. } => "try `--baud 115200`, the rate the controller starts with".into(),
@@ -149,7 +149,7 @@ impl Diagnose for PortError {
             PortError::NotLetIn { .. } => {
                 "give the token with --token-file, the file that `jtc serve` names when it starts".into()
             }
-            PortError::AgentGone { url, .. } => format!("`jtc status --port {url}` shows whether it is back"),
+            PortError::AgentGone { url, .. } => format!("`jtc status --port {url}` shows whether it is back").into(),
             PortError::Stalled { .. } => {
                 "check cable and power; a device with flow control holds the line: the controller uses none".into()
             }
@@ -159,11 +159,11 @@ impl Diagnose for PortError {
                     .into()
             }
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
-            PortError::Halted { .. } => "`jtc status` shows where the arm is".into(),
+            PortError::Halted { .. } => next!("{} shows where the arm is", Status),
             PortError::HolderSilent { .. } | PortError::NotHalted { .. } => {
                 "if the arm is moving, press the emergency stop".into()
             }
-            PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
+            PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is").into(),
         };
         let (kind, code) = match self {
             PortError::NotLetIn { .. } => (ErrorKind::Refused, "not-let-in"),

@@ -11,6 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use host_kit::{Next, next};
 use jtc_wire::{ControllerState, ExecCommand, Status};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -124,8 +125,10 @@ impl Answer {
     }
 }
 
-/// What to do about an arm that moves after a Stop.
-pub const STILL_MOVING_HELP: &str = "press the emergency stop; `jtc status` shows the joints";
+/// Returns the next step for an arm that moves after a Stop.
+pub fn still_moving_help() -> Next {
+    next!("press the emergency stop; {} shows the joints", Status)
+}
 
 impl End {
     /// Of the last status.
@@ -151,13 +154,16 @@ impl End {
         Self { stands, moved: standstill.moved(), moving, state, trajectory, held_stop }
     }
 
-    /// What to do about an arm that still moves.
-    pub fn next_step(&self) -> &'static str {
+    /// Returns the next step for an arm that still moves.
+    pub fn next_step(&self) -> Next {
         if self.held_stop {
-            "keep clear and wait: the controller gives way to a push or lowers a load, and holds the arm where it comes to rest; `jtc status` \
-             shows the cause. The emergency stop takes the torque away: an arm without brakes falls"
+            next!(
+                "keep clear and wait: the controller gives way to a push or lowers a load, and holds the arm where it comes to rest; \
+                 {} shows the cause. The emergency stop takes the torque away: an arm without brakes falls",
+                Status
+            )
         } else {
-            STILL_MOVING_HELP
+            still_moving_help()
         }
     }
 }
@@ -337,11 +343,14 @@ mod tests {
         let standstill = Standstill::after(Halt::Stop);
         let mut status = Status { state: ControllerState::HoldPos.into(), ..Status::default() };
         status.joints[1].velocity = 0.3;
-        assert_eq!(End::of(&status, &standstill).next_step(), STILL_MOVING_HELP);
+        assert_eq!(End::of(&status, &standstill).next_step(), still_moving_help());
         (status.errors, status.joints[1].internal) =
             (jtc_wire::error::INTERNAL_JOINTS, jtc_wire::joint_error::TORQUE);
         let next = End::of(&status, &standstill).next_step();
-        assert!(next.starts_with("keep clear and wait") && next.contains("falls"), "{next}");
+        assert!(
+            next.to_string().starts_with("keep clear and wait") && next.to_string().contains("falls"),
+            "{next}"
+        );
     }
 
     #[test]

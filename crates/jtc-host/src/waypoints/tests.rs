@@ -213,7 +213,7 @@ fn a_broken_file_is_refused_with_its_place() {
         error.to_string(),
         ", line 3, column 1: the arm avena has no pose \"above-tabel\"; it has above-table, home"
     );
-    assert!(error.diagnosis().next.contains("is \"above-table\" meant?"));
+    assert!(error.diagnosis().next.to_string().contains("is \"above-table\" meant?"));
     let many = "pose\n".to_owned() + &"home\n".repeat(WAYPOINTS_MAX + 1);
     assert!(WaypointFile::parse(&many).unwrap_err().to_string().contains("10001 waypoints, more than 10000"));
 }

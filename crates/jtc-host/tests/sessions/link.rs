@@ -260,7 +260,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         "{}",
         jtc_host::words::errors_line(&held)
     );
-    assert!(jtc_host::words::next_step(&held).contains("jtc clear"));
+    assert!(jtc_host::words::next_step(&held).to_string().contains("jtc clear"));
     // Nothing that moves the arm is sent, and the reason is the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();

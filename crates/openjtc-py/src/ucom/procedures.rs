@@ -49,7 +49,7 @@ pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Fa
 }
 
 /// A failure that several findings are.
-fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &str) -> Failure {
+fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'static str) -> Failure {
     Failure::new(kind, code, texts.join("; ")).next(next)
 }
 

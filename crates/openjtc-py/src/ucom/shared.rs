@@ -117,7 +117,7 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// A failure of the session itself.
-pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &str) -> Failure {
+pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'static str) -> Failure {
     Failure::new(kind, code, message).next(next)
 }
 

@@ -100,7 +100,7 @@ pub struct UpdateRequest {
     accept_unverified: bool,
 }
 
-fn usage(message: impl Into<String>, next: &str) -> Problem {
+fn usage(message: impl Into<String>, next: &'static str) -> Problem {
     Problem::new("image", message, next).kind(ErrorKind::Usage)
 }
 

@@ -33,7 +33,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 
 fn line(f: &Finding) -> String {
     let mut text = format!("{} {}\n", f.severity.mark(), f.what);
-    for (word, more) in [("why", &f.why), ("next", &f.next)] {
+    for (word, more) in [("why", &f.why), ("next", &f.next.to_string())] {
         if !more.is_empty() {
             text += &format!("    {word}: {}\n", more.replace('`', ""));
         }

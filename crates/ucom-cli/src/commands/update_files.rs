@@ -189,7 +189,7 @@ mod tests {
         // Bits only, as there is no calendar.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
-        assert!(day(None, &raw).is_err_and(|e| e.next.contains("0x3AC1")));
+        assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));
         // No header, no date.
         let none = Profile { prog_plan: Plan::Raw, ..fat };
         assert_eq!(day(None, &none).ok(), Some(0));

@@ -188,7 +188,7 @@ impl Diagnose for SessionError {
             Self::Procedure(e) => return e.diagnosis(),
             Self::Values(e) => return e.diagnosis(),
             Self::BusOff { failure, url } => {
-                return Diagnosis { next: bus_off::next(url), ..failure.diagnosis() };
+                return Diagnosis { next: bus_off::next(url).into(), ..failure.diagnosis() };
             }
             Self::Inventory(_) => (Usage, "usage", ""),
             Self::Open(e) if matches!(**e, OpenError::Url(_)) => {
@@ -212,7 +212,7 @@ impl Diagnose for SessionError {
                 let mut diagnosis = first.unwrap_or(Diagnosis::new(NoLink, "no-boards", ""));
                 if started {
                     let boards: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
-                    diagnosis.next = format!("`ucom start {}`", boards.join(","));
+                    diagnosis.next = format!("`ucom start {}`", boards.join(",")).into();
                 }
                 return diagnosis;
             }

@@ -187,8 +187,9 @@ impl Picture<'_> {
             };
             list.push(text);
             // It is this view that would show more.
-            let own = finding.next.is_empty() || finding.next.contains("ucom monitor");
-            next.push(if own { "ucom doctor".into() } else { finding.next });
+            let helps = finding.next.to_string();
+            let own = helps.is_empty() || helps.contains("ucom monitor");
+            next.push(if own { "ucom doctor".into() } else { helps });
         }
         for (number, _) in boards.iter().filter(|(_, b)| b.info.is_some_and(|i| !i.has_application())) {
             problems.warnings.push(format!("board {number} has no valid application"));

@@ -70,7 +70,7 @@ fn d10_a_wrong_byte_order_is_named() {
         let problems: Vec<_> = all.iter().filter(|f| f.severity != Severity::Good).collect();
         assert_eq!(problems.len(), 1, "{problems:?}");
         assert!(
-            problems[0].what.contains("byte order") && problems[0].next.contains("ucom probe"),
+            problems[0].what.contains("byte order") && problems[0].next.to_string().contains("ucom probe"),
             "{problems:?}"
         );
         // `update` is refused while the board has its old program; `info` shows the numbers, and reports that they are wrong.

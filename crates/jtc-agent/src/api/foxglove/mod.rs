@@ -18,6 +18,7 @@ use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
+use host_kit::FrontEnd;
 use jtc_host::recording::{MessageWriter, Topic};
 use jtc_host::sample::Sample;
 use jtc_host::words;
@@ -325,7 +326,7 @@ impl Sender<'_> {
             "errors": words::causes(status),
             "held_stop": cause.map(ToString::to_string).unwrap_or_default(),
             "errors_occurred": words::errors(status.occurred),
-            "next": jtc_host::held_stop::next_step(status, cause).replace('`', ""),
+            "next": jtc_host::held_stop::next_step(status, cause).plain(FrontEnd::Agent),
             "age_ms": age.as_millis() as u64,
             "commanded_by": self.agent.line.commander().unwrap_or_default(),
             "simulated": self.agent.simulated,

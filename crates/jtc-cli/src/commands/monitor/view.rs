@@ -179,7 +179,7 @@ impl View {
                 if causes.is_empty() && s.is_coming_up() {
                     warnings.insert(0, words::waiting_for(s));
                 }
-                (causes, warnings, words::next_step(s).to_owned())
+                (causes, warnings, words::next_step(s).to_string())
             }
         };
         Trouble { causes, warnings, next, message: reply }

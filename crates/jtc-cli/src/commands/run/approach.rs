@@ -53,8 +53,13 @@ mod tests {
         assert_eq!((failure.kind, failure.code), (ErrorKind::Refused, "approach"));
         assert!(failure.message.contains("first point of 'my motion.csv' is refused: joint 2"));
         assert!(
-            failure.next.contains("jtc traj info 'my motion.csv'") && failure.next.contains("jtc teach on")
+            failure.next.to_string().contains("jtc traj info 'my motion.csv'")
+                && failure.next.to_string().contains("jtc teach on")
         );
-        assert!(!failure.next.contains("FILE") && !failure.next.contains("traj check"), "{}", failure.next);
+        assert!(
+            !failure.next.to_string().contains("FILE") && !failure.next.to_string().contains("traj check"),
+            "{}",
+            failure.next
+        );
     }
 }

@@ -247,8 +247,18 @@ fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warning = warned(23_000.0).expect("a warning");
     assert_eq!((warning.finding.severity, warning.value), (Severity::Warning, Some(80.0)));
     assert!(warning.finding.what.contains(" kg at the flange"), "{}", warning.finding.what);
-    let advice: f64 =
-        warning.finding.next.split("Ki of ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let advice: f64 = warning
+        .finding
+        .next
+        .to_string()
+        .split("Ki of ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
     assert_eq!(warned(advice - 1.0), None, "{}", warning.finding.next);
     assert!(warned(advice + 100.0).is_some());
 }

@@ -1,6 +1,6 @@
 //! Jobs, and what they brought about.
 use agent_kit::api::Problem;
-use host_kit::{Diagnose as _, Facts, Finding, Severity};
+use host_kit::{Diagnose as _, Facts, Finding, FrontEnd, Severity};
 use ucom_host::master::update::{UpdateReport, UpdateResult};
 use utoipa::ToSchema;
 
@@ -36,9 +36,9 @@ impl From<&Finding> for FindingObject {
             Severity::Warning => "warning",
             Severity::Good => "good",
         };
-        let plain = |text: &str| text.replace('`', "");
         let Finding { what, why, next, .. } = finding;
-        Self { severity: severity.into(), what: what.clone(), why: plain(why), next: plain(next) }
+        let (why, next) = (why.replace('`', ""), next.plain(FrontEnd::Agent));
+        Self { severity: severity.into(), what: what.clone(), why, next }
     }
 }
 

@@ -1,0 +1,310 @@
+//! Next steps: sentences that name actions, which each front end words in its own way.
+use std::borrow::Cow;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// Front end that shows a next step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrontEnd {
+    /// Command-line tool.
+    Command,
+    /// Agent: its HTTP API and its dashboard.
+    Agent,
+    /// Python package.
+    Python,
+}
+
+/// Defines [`Action`] and its names in each front end.
+macro_rules! actions {
+    ($($(#[$doc:meta])* $action:ident: $command:literal, $agent:literal, $python:literal;)*) => {
+        /// Something that a user of an arm can do next.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Action {
+            $($(#[$doc])* $action,)*
+        }
+
+        impl Action {
+            /// All actions.
+            pub const ALL: &[Self] = &[$(Self::$action),*];
+
+            /// Returns the name of the action in a front end: a command, a request with the button of the dashboard, or a Python expression.
+            ///
+            /// An action that a front end does not have is named as the command.
+            pub const fn name(self, front_end: FrontEnd) -> &'static str {
+                match (self, front_end) {
+                    $(
+                        (Self::$action, FrontEnd::Command) => $command,
+                        (Self::$action, FrontEnd::Agent) => $agent,
+                        (Self::$action, FrontEnd::Python) => $python,
+                    )*
+                }
+            }
+        }
+    };
+}
+
+actions! {
+    /// Give the controller an arm.
+    ArmPush: "jtc arm push FILE", "PUT /api/arm", "robot.push_arm(arm)";
+    /// Give the controller an arm and store it there.
+    ArmStore: "jtc arm push --store", "PUT /api/arm with store: true", "robot.push_arm(arm, store=True)";
+    /// Check an arm file.
+    ArmCheck: "jtc arm check FILE", "jtc arm check FILE", "openjtc.Arm.load(…).findings()";
+    /// Show the values of the arm in use.
+    ArmShow: "jtc arm show", "GET /api/arm/model", "jtc arm show";
+    /// Compare an arm file with the arm in use.
+    ArmDiff: "jtc arm diff FILE", "jtc arm diff FILE", "jtc arm diff FILE";
+    /// Use the arm that is built into the controller.
+    UseDefaults: "jtc params use-defaults", "POST /api/arm/defaults", "robot.use_defaults()";
+    /// Give the controller friction and gains.
+    ParamsPush: "jtc params push FILE", "PUT /api/arm", "robot.push_arm(arm)";
+    /// List the joints that are set absent.
+    BenchShow: "jtc bench show", "GET /api/absent", "jtc bench show";
+    /// Set all joints present.
+    BenchPresent: "jtc bench present", "PUT /api/absent with absent: []", "jtc bench present";
+    /// Acknowledge a held stop and clear errors whose cause is gone.
+    Clear: "jtc clear", "Acknowledge (POST /api/clear)", "robot.recover()";
+    /// Take the torque off all joints.
+    Disable: "jtc disable", "Take the torque off (POST /api/disable)", "robot.disable()";
+    /// Look for what is wrong.
+    Doctor: "jtc doctor", "Look for what is wrong (GET /api/doctor)", "robot.doctor()";
+    /// Look for what is wrong, at the rate of the controller.
+    DoctorAtRate: "jtc doctor --baud RATE", "jtc doctor --baud RATE", "openjtc.connect(…, baud=…)";
+    /// Explain states and errors.
+    Explain: "jtc explain", "Explain (GET /api/explain)", "jtc explain";
+    /// Explain one code.
+    ExplainCode: "jtc explain CODE", "Explain (GET /api/explain/{code})", "jtc explain CODE";
+    /// Show versions and memory of the controller.
+    Info: "jtc info", "GET /api/info", "robot.info";
+    /// Move one joint while it is asked for.
+    Jog: "jtc jog", "Jog (POST /api/jog)", "robot.jog(…)";
+    /// Fetch the log of the flight recorder.
+    LogFetch: "jtc log fetch", "GET /api/log", "robot.flight_log()";
+    /// Give positions in degrees.
+    Degrees: "--deg", "degrees: true", "degrees=True";
+    /// Choose the rate of the serial line.
+    Baud: "--baud", "--baud", "baud=";
+    /// Watch the state.
+    Monitor: "jtc monitor", "GET /api/status", "robot.status";
+    /// Show the payload.
+    PayloadShow: "jtc payload show", "GET /api/payload", "robot.payload";
+    /// Set the payload.
+    PayloadSet: "jtc payload set", "Payload (PUT /api/payload)", "robot.payload = …";
+    /// Remove the payload.
+    PayloadClear: "jtc payload clear", "Payload (PUT /api/payload)", "robot.payload = None";
+    /// Return to a held arm from any state.
+    Recover: "jtc recover", "Recover (POST /api/recover)", "robot.recover()";
+    /// Return to a held arm and give the controller this arm.
+    RecoverWithArm: "jtc recover --arm FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
+    /// Return to a held arm and use the arm that is built into the controller.
+    RecoverWithDefaults:
+        "jtc recover --defaults", "Recover (POST /api/recover with defaults: true)", "robot.recover(defaults=True)";
+    /// Restart a drive.
+    ResetJoint: "jtc reset --joints JOINT", "POST /api/reset with joints: [JOINT]", "jtc reset --joints JOINT";
+    /// Show the state.
+    Status: "jtc status", "GET /api/status", "robot.status";
+    /// End Teaching.
+    TeachOff:
+        "jtc teach off", "End teaching (POST /api/teach with on: false)", "the end of the block `with robot.teach():`";
+    /// Check a trajectory.
+    TrajCheck: "jtc traj check FILE", "GET /api/trajectories/{number}/check", "robot.check(…)";
+    /// Run a trajectory.
+    TrajRun: "jtc traj run FILE", "Run (POST /api/runs)", "robot.run(…)";
+    /// Move to the first point and run a trajectory.
+    TrajRunWithApproach:
+        "jtc traj run FILE --approach", "Run (POST /api/runs with approach: true)", "robot.run(…, approach=True)";
+    /// Pause the motion.
+    Pause: "jtc traj pause", "Pause (POST /api/pause)", "robot.pause()";
+    /// Resume the motion.
+    Resume: "jtc traj resume", "Resume (POST /api/resume)", "robot.resume()";
+    /// End the motion.
+    Stop: "jtc traj stop", "Stop (POST /api/stop)", "robot.stop()";
+}
+
+/// Part of a next step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Part {
+    /// Words that are the same in each front end. What a user types stands between backticks.
+    Words(Cow<'static, str>),
+    /// Action, which each front end names itself.
+    Action(Action),
+    /// The same with the arguments of its command.
+    Typed(Action, String),
+}
+
+/// Sentence about the next step, without a full stop; empty if no step helps.
+///
+/// [`next!`](crate::next!) makes one with actions. Its [`Display`](fmt::Display) form is that of the command line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Next(Vec<Part>);
+
+impl Next {
+    /// Returns `true` if no step helps.
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().all(|part| matches!(part, Part::Words(words) if words.is_empty()))
+    }
+
+    /// Counts the places `{}` in a sentence.
+    #[doc(hidden)]
+    pub const fn places(sentence: &str) -> usize {
+        let bytes = sentence.as_bytes();
+        let (mut i, mut count) = (1, 0);
+        while i < bytes.len() {
+            count += (bytes[i - 1] == b'{' && bytes[i] == b'}') as usize;
+            i += 1;
+        }
+        count
+    }
+
+    /// Fills the places `{}` of a sentence.
+    #[doc(hidden)]
+    pub fn filled(sentence: &'static str, actions: &[Action]) -> Self {
+        let mut pieces = sentence.split("{}").map(Self::from);
+        let first = pieces.next().unwrap_or_default();
+        pieces.zip(actions).fold(first, |next, (piece, &action)| next.then(action).then(piece))
+    }
+
+    /// Returns `true` if the sentence names this action.
+    pub fn names(&self, wanted: Action) -> bool {
+        self.0
+            .iter()
+            .any(|part| matches!(part, Part::Action(action) | Part::Typed(action, _) if *action == wanted))
+    }
+
+    /// Sets the command of an action, with all arguments, wherever the sentence names the action.
+    #[must_use]
+    pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
+        for part in &mut self.0 {
+            if *part == Part::Action(wanted) {
+                *part = Part::Typed(wanted, command.to_owned());
+            }
+        }
+        self
+    }
+
+    /// Adds words or an action at the end.
+    #[must_use]
+    pub fn then(mut self, more: impl Into<Self>) -> Self {
+        self.0.extend(more.into().0);
+        self
+    }
+
+    /// Makes a next step of an action and its command with all arguments.
+    pub fn typed(action: Action, command: impl Into<String>) -> Self {
+        Self(vec![Part::Typed(action, command.into())])
+    }
+
+    /// Returns the sentence of a front end. What a user types stands between backticks.
+    pub fn sentence(&self, front_end: FrontEnd) -> String {
+        let parts = self.0.iter().map(|part| {
+            let name = match part {
+                Part::Words(words) => return words.clone(),
+                Part::Typed(_, command) if front_end == FrontEnd::Command => command,
+                Part::Action(action) | Part::Typed(action, _) => action.name(front_end),
+            };
+            // Some names are words with an expression among them.
+            if name.contains('`') { name.to_owned().into() } else { format!("`{name}`").into() }
+        });
+        parts.collect()
+    }
+
+    /// Returns the sentence of a front end without backticks.
+    pub fn plain(&self, front_end: FrontEnd) -> String {
+        self.sentence(front_end).replace('`', "")
+    }
+}
+
+impl fmt::Display for Next {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.sentence(FrontEnd::Command))
+    }
+}
+
+impl Serialize for Next {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl From<Action> for Next {
+    fn from(action: Action) -> Self {
+        Self(vec![Part::Action(action)])
+    }
+}
+
+impl From<&'static str> for Next {
+    fn from(words: &'static str) -> Self {
+        Self(vec![Part::Words(words.into())])
+    }
+}
+
+impl From<String> for Next {
+    fn from(words: String) -> Self {
+        Self(vec![Part::Words(words.into())])
+    }
+}
+
+/// Makes a [`Next`] of a sentence. Each `{}` in it stands for one of the [`Action`]s that follow, in their order.
+#[macro_export]
+macro_rules! next {
+    ($sentence:literal $(, $action:ident)* $(,)?) => {{
+        const ACTIONS: &[$crate::Action] = &[$($crate::Action::$action),*];
+        const { assert!($crate::Next::places($sentence) == ACTIONS.len(), "as many actions as places") };
+        $crate::Next::filled($sentence, ACTIONS)
+    }};
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_front_end_names_the_action_in_its_words() {
+        let next = next!("free it, then {}; ", Clear).then("else `ls`");
+        assert_eq!(next.to_string(), "free it, then `jtc clear`; else `ls`");
+        assert_eq!(next.sentence(FrontEnd::Python), "free it, then `robot.recover()`; else `ls`");
+        assert_eq!(next.plain(FrontEnd::Agent), "free it, then Acknowledge (POST /api/clear); else ls");
+        let check = Next::typed(Action::TrajCheck, "jtc traj check a.csv --speed 50");
+        assert_eq!(check.to_string(), "`jtc traj check a.csv --speed 50`");
+        assert_eq!(check.sentence(FrontEnd::Python), "`robot.check(…)`");
+        assert!(check.names(Action::TrajCheck) && !check.names(Action::TrajRun));
+        let run = next!("then {}", TrajRun).with_command(Action::TrajRun, "jtc traj run 'my motion.csv'");
+        assert_eq!(run.to_string(), "then `jtc traj run 'my motion.csv'`");
+        let block = Next::from(Action::TeachOff).sentence(FrontEnd::Python);
+        assert_eq!(block, "the end of the block `with robot.teach():`");
+    }
+
+    /// The methods and properties that the Python package has, and the words of its expressions.
+    #[test]
+    fn each_expression_of_python_exists() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../openjtc-py/python/openjtc");
+        let files = std::fs::read_dir(folder).expect("the Python package");
+        let paths = files.map(|file| file.expect("a file").path()).filter(|path| path.is_file());
+        let source: String = paths.map(|path| std::fs::read_to_string(path).expect("text")).collect();
+        let word =
+            |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+        for action in Action::ALL {
+            let name = action.name(FrontEnd::Python);
+            for method in name.split("robot.").skip(1).chain(name.split("openjtc.").skip(1)).map(word) {
+                let defined =
+                    [format!("def {method}("), format!("class {method}:"), format!("class {method}(")];
+                assert!(defined.iter().any(|definition| source.contains(definition)), "{action:?}: {method}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_words_are_no_step() {
+        assert!(Next::default().is_empty() && Next::from("").is_empty());
+        assert!(!Next::from(Action::Stop).is_empty() && !Next::from("wait").is_empty());
+    }
+
+    #[test]
+    fn no_two_actions_have_the_same_command() {
+        let commands: Vec<_> = Action::ALL.iter().map(|action| action.name(FrontEnd::Command)).collect();
+        for (i, command) in commands.iter().enumerate() {
+            assert!(!commands[..i].contains(command), "{command}");
+        }
+    }
+}

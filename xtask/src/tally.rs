@@ -4,6 +4,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 
+use crate::shell;
+
 /// What a step came to.
 pub enum Outcome {
     /// One check, passed.
@@ -53,13 +55,18 @@ impl Tally {
             return;
         }
         println!("\n== {title}");
-        let start = Instant::now();
+        let (start, before) = (Instant::now(), shell::processor_seconds());
         let result = body();
-        let seconds = start.elapsed().as_secs_f64();
+        let time = match (before, shell::processor_seconds()) {
+            (Some(before), Some(after)) => {
+                format!("{:.1} s, processors {:.0} s", start.elapsed().as_secs_f64(), after - before)
+            }
+            _ => format!("{:.1} s", start.elapsed().as_secs_f64()),
+        };
         match result {
             Ok(Outcome::Passed) => {
                 self.counts.passed += 1;
-                println!("-- {title}: ok ({seconds:.1} s)");
+                println!("-- {title}: ok ({time})");
             }
             Ok(Outcome::Counted(counts, printed)) => {
                 self.counts.passed += counts.passed;
@@ -72,7 +79,7 @@ impl Tally {
                     self.failures.push(failure.trim_end().to_owned());
                 }
                 println!(
-                    "-- {title}: {} passed, {} failed, {} skipped ({seconds:.1} s)",
+                    "-- {title}: {} passed, {} failed, {} skipped ({time})",
                     counts.passed, counts.failed, counts.skipped
                 );
             }
@@ -83,7 +90,7 @@ impl Tally {
             }
             Err(error) => {
                 self.counts.failed += 1;
-                println!("-- {title}: FAILED ({seconds:.1} s): {error:#}");
+                println!("-- {title}: FAILED ({time}): {error:#}");
                 self.failures.push(format!("{title}: {error:#}"));
             }
         }

@@ -1,73 +1,75 @@
-//! What of an arm file a controller does not use: listed, and refused where it matters.
+//! Parameters of an arm file that a controller does not use: listed, and refused if they matter.
 
 use cli_kit::{ErrorKind, Failure, Output, error_object};
-use host_kit::Next;
+use host_kit::next;
 use jtc_core::Config;
-use jtc_host::arm::{Arm, Difference, NOT_CARRIED};
+use jtc_host::CheckError;
+use jtc_host::arm::{Arm, Difference};
 use serde_json::json;
 
-/// Returns the settings of `arm` that the controller uses otherwise; where there are any, they must have been accepted. They are
-/// listed either way.
+/// Returns the settings of `arm` that differ from the controller's, and prints each of them as a warning. Refuses them
+/// if they are not accepted.
 pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let differences = arm.device_differences(device);
-    let hint = format!(
-        "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries {NOT_CARRIED}: \
-         they belong into the firmware"
-    );
-    let message = |count| {
-        format!(
-            "{}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
-            arm.name,
-            values(count)
-        )
-    };
-    listed(differences, accepted, ("device-limits", message, hint.into()), out)
+    if !differences.is_empty() && !accepted {
+        return Err(refused(&arm.name, &differences, out));
+    }
+    Ok(warned(differences, out))
 }
 
-/// The same for all numbers of an arm that a controller `has` (J-55).
+/// Prints the settings of an arm that differ from the controller's, and returns the failure.
+pub fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
+    let error = CheckError::DeviceLimits { arm: arm.to_owned(), differences: differences.to_vec() };
+    let message = format!(
+        "{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
+        values(differences.len())
+    );
+    listed(&Failure { message, ..Failure::of(&error) }, differences, out)
+}
+
+/// Like [`accept`], for all parameters of an arm and the arm that a controller `has` (J-55).
 pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
-    let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has, which counts \
-                where --arm is left out";
-    let message = |count| {
-        format!("{}: the controller has another arm, {}: {}", arm.name, has.name, values_differ(count))
-    };
-    listed(arm.differences(has), accepted, ("other-arm", message, hint.into()), out)
+    let differences = arm.differences(has);
+    if differences.is_empty() || accepted {
+        return Ok(warned(differences, out));
+    }
+    let message = format!(
+        "{}: the controller has another arm, {}: {}",
+        arm.name,
+        has.name,
+        values_differ(differences.len())
+    );
+    let failure = Failure::new(ErrorKind::Refused, "other-arm", message).next(next!(
+        "{} gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has, which counts where --arm is left out",
+        ArmPush
+    ));
+    Err(listed(&failure, &differences, out))
 }
 
 fn values(count: usize) -> String {
     if count == 1 { "1 value".into() } else { format!("{count} values") }
 }
 
-/// So many values differ, in words.
+/// Returns how many values differ, as text.
 pub fn values_differ(count: usize) -> String {
     format!("{} {}", values(count), if count == 1 { "differs" } else { "differ" })
 }
 
-/// Lists differences; an error, with its code, message and hint, where there are any that nobody has accepted.
-fn listed(
-    differences: Vec<Difference>,
-    accepted: bool,
-    (code, message, hint): (&'static str, impl Fn(usize) -> String, Next),
-    out: &Output,
-) -> Result<Vec<Difference>, Failure> {
-    if differences.is_empty() {
-        return Ok(differences);
-    }
-    if accepted {
-        for difference in &differences {
-            out.note(format!("warning: {difference}"));
-        }
-        return Ok(differences);
-    }
-    let message = message(differences.len());
+fn warned(differences: Vec<Difference>, out: &Output) -> Vec<Difference> {
+    differences.iter().for_each(|difference| out.note(format!("warning: {difference}")));
+    differences
+}
+
+/// Prints a failure with the differences that are its reason. Returns a failure that is already shown.
+fn listed(failure: &Failure, differences: &[Difference], out: &Output) -> Failure {
     if out.is_json() {
-        let error = error_object(&Failure::new(ErrorKind::Refused, code, &message).next(hint.clone()));
+        let error = error_object(failure);
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);
     }
-    out.note(format!("jtc: {message}"));
-    for difference in &differences {
+    out.note(format!("jtc: {}", failure.message));
+    for difference in differences {
         out.note(format!("     {difference}"));
     }
-    out.note(format!("     {hint}"));
-    Err(Failure::shown(ErrorKind::Refused))
+    out.note(format!("     {}", failure.next));
+    Failure::shown(ErrorKind::Refused)
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,22 @@ def test_another_arm_than_the_one_that_was_named_is_neither_moved_nor_let_go(tmp
         robot.push_arm(arm)
         robot.wait_ready()
         assert robot.move(HOME).outcome == "finished"
+
+
+def test_recover_checks_the_arm_that_it_gives(tmp_path: Path):
+    text = openjtc.Arm.avena().to_toml()
+    slow, shaky = tmp_path / "slow.toml", tmp_path / "shaky.toml"
+    slow.write_text(re.sub(r"velocity_max_rad_s = [0-9.]+", "velocity_max_rad_s = 0.5", text, count=1))
+    shaky.write_text(re.sub(r"kd = [0-9.]+", "kd = 9000.0", text, count=1))
+    with openjtc.connect("sim:", speed=None) as robot:
+        robot.disable()
+        for file, code in ((slow, "device-limits"), (shaky, "unstable-gains")):
+            with pytest.raises(openjtc.RefusedError) as caught:
+                robot.recover(arm=openjtc.Arm.load(file))
+            assert caught.value.code == code, caught.value
+            assert robot.status.state != "HoldPos"
+        steps = robot.recover(arm=openjtc.Arm.load(slow), accept_device_limits=True)
+        assert steps[0].startswith("warning: ") and robot.status.state == "HoldPos"
 
 
 def test_a_speed_override_acts_and_is_noted():

@@ -1,4 +1,6 @@
-//! The way back to a held arm.
+//! Recovery to position hold.
+use std::sync::Arc;
+
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -6,7 +8,8 @@ use agent_kit::lease::LeaseKey;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
-use jtc_host::{Arm, ErrorKind, Session};
+use jtc_host::session::RecoverParameters;
+use jtc_host::{ErrorKind, Session};
 use serde_json::json;
 use utoipa::ToSchema;
 
@@ -15,50 +18,48 @@ use super::arm::{in_words, taken};
 use super::body::read;
 use super::error::Denials;
 use super::runs::JobObject;
-use crate::jobs::{Numbers, Task, recover};
+use crate::jobs::{Task, recover};
 use crate::owner::ClientPort;
 
-/// The way back to a held arm.
+/// Options of a recovery.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecoverRequest {
-    /// Where the controller has not been given its arm: let it use its defaults, the stored arm where there is one.
+    /// `true`: a controller without arm parameters uses its defaults, which are those of the stored arm if there is
+    /// one.
     #[serde(default)]
     pub defaults: bool,
-    /// The text of an arm file, or of a robot description: the controller is given its friction, gains and model. Not beside `defaults`.
+    /// Text of an arm file or a robot description: its friction, gains and model are sent to the controller. Not
+    /// together with `defaults`.
     #[serde(default)]
     pub arm: Option<String>,
-    /// The controller uses other limits than this arm has, and they are safe for it.
+    /// `true`: the limits of the controller differ from those of this arm, and are safe for it.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
 
 impl RecoverRequest {
-    /// Whose numbers a controller is given that misses some.
-    fn numbers(self) -> Result<Numbers, Problem> {
+    /// Returns the source of the parameters for a controller that misses some.
+    fn parameters(self) -> Result<RecoverParameters, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {
             Some(_) if defaults => {
                 let message = "arm and defaults name two sets of numbers; nothing was sent";
                 Err(Problem::new("request", message, "name one").kind(ErrorKind::Usage))
             }
-            Some(text) => Ok(Numbers::Arm(Box::new(whole(&text)?), accept_device_limits)),
-            None if defaults => Ok(Numbers::Defaults),
-            None => Ok(Numbers::None),
+            Some(text) => {
+                let parameters =
+                    RecoverParameters::Arm { arm: Arc::new(taken(&text)?), accept_device_limits };
+                parameters.check().map_err(|error| Problem::of(&error))?;
+                Ok(parameters)
+            }
+            None if defaults => Ok(RecoverParameters::ControllerDefaults),
+            None => Ok(RecoverParameters::None),
         }
     }
 }
 
-/// An arm that has all that a controller is given.
-fn whole(text: &str) -> Result<Arm, Problem> {
-    let arm = taken(text)?;
-    let set = arm.parameter_set();
-    let source = jtc_host::session::ParameterSource::Arm { name: &arm.name, set: &set };
-    source.check().map_err(|error| Problem::of(&error))?;
-    Ok(arm)
-}
-
-/// Leads the controller back to a held arm, whatever its state is: a job.
+/// Recovers the controller to position hold from any state, as a job.
 #[utoipa::path(
     post,
     path = "/api/recover",
@@ -73,17 +74,18 @@ pub(super) async fn begin(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Nobody else's text is read.
+    // The body is read only for the holder of the lease.
     agent.commander(&asker)?;
-    let numbers = read(&agent, request, RecoverRequest::numbers).await?;
+    let parameters = read(&agent, request, RecoverRequest::parameters).await?;
     let (commander, turn) = agent.mover(&asker, after)?;
-    let (what, hash) = match &numbers {
-        Numbers::Arm(arm, _) => {
+    let (what, hash) = match &parameters {
+        RecoverParameters::Arm { arm, .. } => {
             (format!("recover with the arm {}", agent_kit::gate::plain(&arm.name)), arm.hash().ok().flatten())
         }
-        Numbers::None | Numbers::Defaults => ("recover".to_owned(), None),
+        RecoverParameters::None | RecoverParameters::ControllerDefaults => ("recover".to_owned(), None),
     };
-    let recover = move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &numbers);
+    let recover =
+        move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &parameters);
     let job = agent.jobs.begin(&commander, turn, what.clone(), recover)?;
     let hash = hash.map(in_words);
     agent.note("job", json!({ "client": commander.client.0, "job": job.number, "what": what, "hash": hash }));

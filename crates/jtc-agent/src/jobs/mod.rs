@@ -1,5 +1,5 @@
-//! What an agent does for clients that have no connection of their own: it keeps their end of the line, runs what they ask for, and
-//! writes down what happens, so that they can come back and read it.
+//! Work of an agent for clients without a connection of their own: keeps their connections to the line, runs their
+//! jobs, and writes a journal that a client can read when it returns.
 mod commander;
 mod give;
 mod happening;
@@ -23,7 +23,7 @@ pub use commander::{Commander, Turn, Unable, Wish};
 pub use give::{Given, give};
 pub use happening::{Happening, Journal};
 pub use poses::{POSES_MAX, PoseStore, PoseStoreError};
-pub use recover::{Numbers, recover};
+pub use recover::recover;
 pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};
 pub use stops::Stops;
@@ -33,44 +33,45 @@ use crate::line::{Introduction, Policy, Role};
 use crate::owner::{ClientPort, Line};
 pub use task::{STOPPED, Task, stopped};
 
-/// Jobs that are remembered.
+/// Number of jobs that are kept.
 const KEPT: usize = 256;
-/// Clients without a connection at once.
+/// Largest number of clients without a connection of their own.
 const COMMANDERS_MAX: usize = 32;
-/// A client that has asked for nothing for so long behind the end of its lease is forgotten.
+/// Time after the end of its lease until a silent client is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Stops and Pauses are written at most so often, the last one always: one who repeats them is not to crowd out what others did.
+/// Shortest interval between events for Stops and Pauses; the last one is always written. Repeated Stops must not push
+/// other events out.
 const HALTS_APART: Duration = Duration::from_millis(200);
-/// How often is looked whether something has changed where nothing announces it.
+/// Interval at which changes are checked that are not announced.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// How a job is.
+/// Stage of a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// It goes on.
+    /// Running.
     Running,
-    /// It came to its end.
+    /// Completed.
     Finished,
-    /// Somebody stopped it.
+    /// Stopped by a client.
     Stopped,
-    /// It failed.
+    /// Failed.
     Failed,
 }
 
-/// A job, while it goes on and afterwards.
+/// Job, while it runs and afterwards.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// Its number.
+    /// Number of the job.
     pub number: u64,
-    /// What it does.
+    /// Description of the job.
     pub what: String,
-    /// Who asked for it.
+    /// Name of the client that requested it.
     pub client: String,
-    /// How it is.
+    /// Stage of the job.
     pub stage: Stage,
-    /// How far it came.
+    /// Progress and results.
     pub done: Done,
-    /// Why it failed.
+    /// Reason of a failure.
     pub error: Option<Problem>,
 }
 
@@ -82,26 +83,26 @@ struct Kept {
     ended: Ended,
 }
 
-/// How many jobs have ended, and how.
+/// Numbers of ended jobs, by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
-    /// They came to their end.
+    /// Number of completed jobs.
     pub finished: u64,
-    /// Somebody stopped them.
+    /// Number of jobs stopped by a client.
     pub stopped: u64,
-    /// They failed.
+    /// Number of failed jobs.
     pub failed: u64,
 }
 
-/// The jobs of an agent, and who asks for them.
+/// Jobs of an agent, and the clients that request them.
 pub struct Jobs {
     line: Line,
-    /// What happened.
+    /// Journal of events.
     pub journal: Journal,
-    /// Trajectories by number.
+    /// Store of trajectories by number.
     pub store: Store,
     arm: Arm,
-    /// Asks questions for all who may look.
+    /// Session that asks questions for all clients.
     asker: Arc<Commander>,
     /// Held stops and their causes.
     pub stops: Stops,
@@ -109,7 +110,7 @@ pub struct Jobs {
 }
 
 impl Jobs {
-    /// Those of a line. `arm` is that of controllers that cannot be asked for theirs.
+    /// Returns the jobs of a line. `arm` is used for controllers that cannot be asked for theirs.
     pub fn new(line: Line, store: Store, arm: Arm) -> Arc<Self> {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
@@ -128,22 +129,24 @@ impl Jobs {
         jobs
     }
 
-    /// Asks questions for all who may look.
+    /// Returns the session that asks questions for all clients.
     pub fn asker(&self) -> &Arc<Commander> {
         &self.asker
     }
 
-    /// The arm of controllers that cannot be asked for theirs.
+    /// Returns the arm for controllers that cannot be asked for theirs.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }
 
-    /// A client comes that will ask with `key`, and shows at least so often that it is there. `None`: there is no room for another.
+    /// Registers a client that will send requests with `key`, at intervals of at most `lasts`. Returns `None` if too
+    /// many clients are registered.
     pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<Commander>> {
         let commander = Commander::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.commanders.len() >= COMMANDERS_MAX {
-            // One that neither commands nor does anything makes room: a program that is begun again and again keeps nobody out.
+            // A client without lease and work is removed, so that a program that restarts again and again blocks no
+            // other client.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .commanders
@@ -156,14 +159,14 @@ impl Jobs {
         Some(commander)
     }
 
-    /// Who asks with this key, and how often at least.
+    /// Returns the client with this key, and the duration of its lease without a request.
     pub fn commander(&self, key: &str) -> Option<(Arc<Commander>, Duration)> {
         let found = self.lock().commanders.get(key).cloned()?;
         found.0.see();
         Some(found)
     }
 
-    /// The client with this key goes.
+    /// Removes the client with this key.
     pub fn dismiss(&self, key: &str) {
         self.lock().commanders.remove(key);
     }
@@ -172,7 +175,7 @@ impl Jobs {
     ///
     /// # Errors
     ///
-    /// [`Unable`]: nothing was begun.
+    /// [`Unable`]: the job was not begun.
     pub fn begin(
         self: &Arc<Self>,
         commander: &Arc<Commander>,
@@ -186,7 +189,7 @@ impl Jobs {
             kept.last += 1;
             Job { number: kept.last, what, client, stage: Stage::Running, done: Done::default(), error: None }
         };
-        // Before it can end.
+        // Stored before the job can end.
         self.remember(job.clone());
         let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(commander));
         let unfinished = Unfinished { jobs: self.clone(), number: job.number };
@@ -205,17 +208,17 @@ impl Jobs {
         accepted.map(|()| job)
     }
 
-    /// A job by its number.
+    /// Returns a job by its number.
     pub fn job(&self, number: u64) -> Option<Job> {
         self.lock().jobs.iter().find(|job| job.number == number).cloned()
     }
 
-    /// Those that are remembered, oldest first.
+    /// Returns the kept jobs, oldest first.
     pub fn list(&self) -> Vec<Job> {
         self.lock().jobs.iter().cloned().collect()
     }
 
-    /// How many go on, and how the others have ended.
+    /// Returns the number of running jobs, and the outcomes of the ended ones.
     pub fn counts(&self) -> (usize, Ended) {
         let kept = self.lock();
         (kept.jobs.iter().filter(|job| job.stage == Stage::Running).count(), kept.ended)
@@ -260,7 +263,7 @@ impl Jobs {
     }
 }
 
-/// A job that has not ended: where it does so by a fault of the agent, that is its end.
+/// Job that has not ended; if this is dropped because of a fault of the agent, the job ends as failed.
 struct Unfinished {
     jobs: Arc<Jobs>,
     number: u64,
@@ -282,7 +285,7 @@ impl Drop for Unfinished {
 }
 
 impl Stage {
-    /// In a word.
+    /// Returns a word for the stage.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -293,18 +296,18 @@ impl Stage {
     }
 }
 
-/// What the journal says of the line itself.
+/// State of the line that the journal has reported.
 #[derive(Default)]
 struct Seen {
     holder: Option<String>,
     halt: u64,
-    /// When the last one was written.
+    /// Time of the last event for a Stop or a Pause.
     halted: Option<Instant>,
     state: Option<(String, String, Vec<String>)>,
     lost: Option<String>,
 }
 
-/// Writes down what changes on the line, and forgets clients that do not come back, as long as there is an agent.
+/// Writes changes on the line to the journal, and forgets clients that do not return, until the agent ends.
 fn watch(jobs: &Weak<Jobs>) {
     let (mut seen, mut looked) = (Seen::default(), Instant::now());
     loop {

@@ -1,8 +1,8 @@
-//! Commands of a PLC, done with the one client of the line that all of its connections share.
+//! Execution of a PLC's commands, with one client of the line that all PLC connections share.
 use std::sync::Arc;
 
 use agent_kit::api::Problem;
-use jtc_host::session::Flow;
+use jtc_host::session::{Flow, RecoverParameters};
 use jtc_host::{Error, Session};
 use serde_json::json;
 
@@ -11,17 +11,17 @@ use super::handshake::Order;
 use super::map::View;
 use super::plc::Plc;
 use crate::jobs::{
-    Commander, Course, Job, Numbers, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
+    Commander, Course, Job, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
 };
 use crate::line::Denied;
 use crate::owner::ClientPort;
 
-/// Why a command was not done.
+/// Reason why a command was not executed.
 pub(super) struct Refusal {
     pub outcome: Outcome,
-    /// Number of the error, where it is one.
+    /// Number of the error; 0 without one.
     pub error: u16,
-    /// In words.
+    /// Reason in words.
     pub why: String,
 }
 
@@ -66,7 +66,7 @@ impl From<Denied> for Refusal {
 }
 
 impl Plc {
-    /// Does what was commanded; or nothing of it. `halt`: the last Stop or Pause that it was commanded after, by number.
+    /// Executes a command completely or not at all. `halt` is the number of the last Stop or Pause before the command.
     pub(super) async fn act(self: &Arc<Self>, order: &Order, halt: u64) -> Result<(), Refusal> {
         if let Some(lost) = self.line.lost() {
             return Err(Refusal { why: lost, ..Refusal::new(Outcome::NoController) });
@@ -96,17 +96,17 @@ impl Plc {
             Command::GripperOn => self.call(&commander, |session| session.gripper(true)).await,
             Command::GripperOff => self.call(&commander, |session| session.gripper(false)).await,
             Command::Clear => self.call(&commander, Session::clear_all).await,
-            // Those are done where they come in.
+            // These commands are executed when they arrive.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
     }
 
-    /// No coil demands that the arm stands.
+    /// Returns an error if a coil of a connection holds the arm.
     fn free_to_move(&self) -> Result<(), Refusal> {
         if self.is_held_by_a_coil() { Err(Refusal::new(Outcome::Coil)) } else { Ok(()) }
     }
 
-    /// Takes or renews the lease, for as long as the watchdog allows.
+    /// Takes or renews the lease; it lasts for the time of the watchdog.
     fn take_lease(&self, commander: &Commander) -> Result<(), Refusal> {
         let (policy, lasts) = self.watchdog();
         let taken = self.line.with(|line, now| {
@@ -116,12 +116,12 @@ impl Plc {
         Ok(taken?)
     }
 
-    /// Nobody has stopped the arm since it was commanded, and nobody else just before.
+    /// Returns an error if the arm was stopped after the command, or by another client shortly before it.
     fn ask_to_move(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
         Ok(self.line.with(|line, now| line.ask_to_move(commander.client, halt, now))?)
     }
 
-    /// What the controller reports now.
+    /// Returns the last status of the controller.
     fn reported(&self) -> View {
         let status =
             self.line.with(|line, now| line.status().map(|(at, status)| (now.saturating_sub(*at), *status)));
@@ -132,7 +132,7 @@ impl Plc {
         let number = order.trajectory;
         let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
         self.free_to_move()?;
-        // One that goes on is reported before what it does with the arm.
+        // A running job is reported as busy before any consequence of it for the arm.
         let turn = commander.turn()?;
         self.take_lease(commander)?;
         let reported = self.reported();
@@ -146,7 +146,7 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
-            // The register always has a number: its default is no speed that was named.
+            // The register always has a value; its default 100 means that no speed was chosen.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,
@@ -163,13 +163,17 @@ impl Plc {
         command: Command,
         halt: u64,
     ) -> Result<(), Refusal> {
-        let numbers = if command == Command::RecoverWithDefaults { Numbers::Defaults } else { Numbers::None };
+        let parameters = if command == Command::RecoverWithDefaults {
+            RecoverParameters::ControllerDefaults
+        } else {
+            RecoverParameters::None
+        };
         self.free_to_move()?;
         let turn = commander.turn()?;
         self.take_lease(commander)?;
         self.ask_to_move(commander, halt)?;
         let recover =
-            move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &numbers);
+            move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &parameters);
         let job = self.jobs.begin(commander, turn, "recover".into(), recover)?;
         self.begun(commander, &job);
         Ok(())
@@ -220,14 +224,14 @@ impl Plc {
         if let Some(job) = commander.job() {
             return Err(Unable::Busy(Some(job)).into());
         }
-        // One who has none has none to give.
+        // A client that does not hold the lease has none to release.
         let _ = self.line.with(|line, now| line.release_lease(commander.client, now));
         self.line.wake();
         self.resign();
         Ok(())
     }
 
-    /// Something that is soon over, with the lease.
+    /// Runs a short function with the lease.
     async fn call<E: Into<Error> + Send + 'static>(
         &self,
         commander: &Commander,

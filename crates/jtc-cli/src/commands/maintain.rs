@@ -1,12 +1,13 @@
 //! `jtc clear`, `gripper`, `recover`: short commands that change the controller's state.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Output, Stop};
 use host_kit::{Action, FrontEnd};
 use jtc_host::arm::Arm;
-use jtc_host::session::ParameterSource;
-use jtc_host::{Error, ParametersError, words};
+use jtc_host::session::{RecoverParameters, RecoverStep};
+use jtc_host::{CheckError, Error, ParametersError, words};
 use jtc_wire::ALL_NODES;
 use serde_json::json;
 
@@ -16,16 +17,16 @@ use crate::limits;
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
 
-/// A clear takes effect within some statuses.
+/// Time within which a clear takes effect.
 const EFFECT: Duration = Duration::from_millis(300);
 
-/// Clears errors, and reports what is left of them.
+/// Clears errors, and reports the remaining ones.
 pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     if args.occurred {
         session.clear_occurred()?;
     }
-    // What is left is reported below.
+    // The remaining errors are reported below.
     session.clear_if_possible(true, ALL_NODES)?;
     let end = session.now() + EFFECT;
     let mut s = session.next_status()?;
@@ -59,14 +60,15 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         return Err(Failure::usage("--arm and --defaults name two sets of numbers")
             .next("name one: nothing was sent"));
     }
-    let given = arm.as_ref().map(|arm| (arm.name.as_str(), arm.parameter_set()));
-    let source = match &given {
-        Some((name, set)) => ParameterSource::Arm { name, set },
-        None if args.defaults => ParameterSource::ControllerDefaults,
-        None => ParameterSource::None,
+    let parameters = match arm {
+        Some(arm) => RecoverParameters::Arm {
+            arm: Arc::new(arm),
+            accept_device_limits: args.accept.accept_device_limits,
+        },
+        None if args.defaults => RecoverParameters::ControllerDefaults,
+        None => RecoverParameters::None,
     };
-    source.check()?;
-    arm.as_ref().map_or(Ok(()), Arm::check_gains)?;
+    parameters.check()?;
     let its_out = *out;
     let stop = Stop::listen_with(move || {
         ended_at_once(
@@ -77,21 +79,24 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     })?;
     let mut session = args.link.session()?;
     progress.watch(&mut session);
-    let differences = match &arm {
-        Some(arm) => limits::accept(arm, &session.device_config()?, args.accept.accept_device_limits, out)?,
-        None => Vec::new(),
-    };
-    let mut steps = Vec::new();
-    let done = session.recover_until(
-        source,
+    let (mut steps, mut differences) = (Vec::new(), Vec::new());
+    let done = session.recover_with(
+        &parameters,
         || stop.asked(),
         |step| {
             out.note(step);
+            if let RecoverStep::Differs(difference) = step {
+                differences.push(difference.clone());
+                return;
+            }
             progress.event("step", json!({ "text": step.to_string() }));
             steps.push(step.to_string());
         },
     );
-    let s = done.map_err(|e| match &e {
+    let s = done.map_err(|e| match e {
+        Error::Check(CheckError::DeviceLimits { arm, differences }) => {
+            limits::refused(&arm, &differences, out)
+        }
         Error::Cancelled => {
             let during = steps.last().map_or("its start", String::as_str);
             Failure { message: format!("cancelled, after: {during}"), ..Failure::of(&e) }
@@ -104,11 +109,11 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A recovery that failed is not mended by the same command: what keeps the error is to be looked at.
+/// Builds the failure of a recovery. Repeating the command does not help: the cause of the error must be found.
 fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     let recovers = [Action::Recover, Action::RecoverWithArm, Action::RecoverWithDefaults];
-    // Without numbers for the arm it is the same command with an option that helps.
+    // Without parameters for the arm the command with an option helps.
     if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
         || !recovers.iter().any(|action| failure.next.names(*action))
     {

@@ -1,7 +1,7 @@
-//! A conversation with the controller: one writer, the stream of its statuses, each request confirmed.
+//! A session with the controller: a single writer, the stream of its statuses, each request confirmed.
 //!
-//! Records of the controller are one-shot (J-04): each received frame is answered in exactly one status, in order. The session
-//! queues them and gives each to the request that waits for it.
+//! Records of the controller are one-shot (J-04): exactly one status answers each received frame, in order. The session
+//! queues the records and passes each to the request that waits for it.
 
 mod bench;
 mod clock;
@@ -44,7 +44,7 @@ pub use params::PushReport;
 use presence::Presence;
 pub use presence::host_timeout_ms;
 pub use ready::BRING_UP;
-pub use recover::{ParameterSource, RecoverStep};
+pub use recover::{ParameterSource, RecoverParameters, RecoverStep};
 pub use reset::reset_takes_torque;
 pub use run::Run;
 pub use statistics::LinkStatistics;
@@ -56,17 +56,17 @@ use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, StateError, accepted};
 use crate::port::{Port, line_time};
 
-/// Called with each status and the port's time.
+/// Callback that receives each status and the port's time.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
 
-/// Time limits of a session, and how often it tries.
+/// Timeouts of a session, and number of attempts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeouts {
-    /// Longest silence of the controller before the link counts as lost.
+    /// Maximum silence of the controller before the link counts as lost.
     pub status: Duration,
-    /// Time for a confirmation beyond what the line needs for the bytes.
+    /// Time for a confirmation, in addition to the transmission time.
     pub confirmation: Duration,
-    /// How often a frame is sent before it counts as not confirmed.
+    /// Number of times that a frame is sent before it counts as not confirmed.
     pub tries: u32,
 }
 
@@ -76,13 +76,13 @@ impl Default for Timeouts {
     }
 }
 
-/// A conversation over a port.
+/// A session over a port.
 pub struct Session<P> {
     port: P,
     receiver: StatusReceiver,
     arrived: VecDeque<Status>,
     records: VecDeque<Response>,
-    /// What extension requests returned, as it arrived.
+    /// Answers to extension requests, as received.
     answers: VecDeque<Vec<u8>>,
     extensions: Extensions,
     presence: Presence,
@@ -91,14 +91,14 @@ pub struct Session<P> {
     start: Duration,
     last_received: Duration,
     observer: Option<Observer>,
-    /// The trajectory that the controller holds from this session.
+    /// Trajectory from this session that the controller holds.
     uploaded: Option<CheckedTrajectory>,
     /// Time limits.
     pub timeouts: Timeouts,
 }
 
 impl<P: Port> Session<P> {
-    /// Over an open port; nothing is sent or awaited yet.
+    /// Creates a session over an open port, without sending or waiting.
     pub fn new(port: P) -> Self {
         let start = port.now();
         Self {
@@ -119,37 +119,37 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Calls `observer` with each status that arrives from now on, whatever the session does then.
+    /// Calls `observer` with each status that arrives from now on, independent of the session's activity.
     pub fn observe(&mut self, observer: impl FnMut(Duration, &Status) + 'static) {
         self.observer = Some(Box::new(observer));
     }
 
-    /// No observer any more.
+    /// Removes the observer.
     pub fn stop_observing(&mut self) {
         self.observer = None;
     }
 
-    /// The port.
+    /// Returns the port.
     pub fn port(&self) -> &P {
         &self.port
     }
 
-    /// The port, for what only it can do. Bytes written past the session confuse it.
+    /// Returns the port for functions that only the port has. Bytes written past the session disturb it.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// Ends the conversation.
+    /// Ends the session and returns the port.
     pub fn into_port(self) -> P {
         self.port
     }
 
-    /// Time of the port.
+    /// Returns the time of the port.
     pub fn now(&self) -> Duration {
         self.port.now()
     }
 
-    /// What passed so far.
+    /// Returns the statistics of the link so far.
     pub fn statistics(&self) -> LinkStatistics {
         LinkStatistics {
             bad_bytes: self.receiver.counters().skipped_bytes,
@@ -158,16 +158,16 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The last status that arrived, however old.
+    /// Returns the last status that arrived, at any age.
     pub fn last(&self) -> Option<&Status> {
         self.last.as_ref()
     }
 
-    /// The next status; `None` when none comes in this time.
+    /// Returns the next status; `None` if none arrives in this time.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`] when the port is gone.
+    /// [`LinkError::Port`] if the port is lost.
     pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, LinkError> {
         let end = self.port.now() + timeout;
         loop {
@@ -181,11 +181,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The next status; an error when the controller is silent.
+    /// Returns the next status; an error if the controller is silent.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoLink`] when none comes within [`Timeouts::status`], [`LinkError::Port`] when the port is gone.
+    /// [`LinkError::NoLink`] if none arrives within [`Timeouts::status`], [`LinkError::Port`] if the port is lost.
     pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
         let mut limit = Limit::new(self.timeouts.status);
@@ -204,19 +204,19 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// A status that was made after this call: what had arrived before is passed over.
+    /// Returns a status that arrives after this call; discards the statuses that arrived before.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::next_status`].
+    /// Returns the errors of [`Session::next_status`].
     pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
         self.catch_up()?;
         self.next_status()
     }
 
-    /// Takes in what has arrived, without waiting.
+    /// Reads all received bytes without waiting.
     fn catch_up(&mut self) -> Result<(), LinkError> {
-        // Bounded, so that a line that never stops talking cannot hold us.
+        // Bounded, so that a line with continuous data cannot block this loop.
         for _ in 0..64 {
             if self.read(Duration::ZERO)? == 0 {
                 break;
@@ -226,7 +226,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Takes in what has arrived, and forgets what was recorded and denied of earlier frames, of which some may have arrived only now.
+    /// Reads all received bytes, and discards records and denials of earlier frames; some of them may have arrived just now.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -248,14 +248,14 @@ impl<P: Port> Session<P> {
                         self.extensions = Extensions::Asked(at);
                     }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
-                    // What was read is as short.
+                    // The emitted answer has the length of the received one.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
                     bytes.truncate(n);
                     self.answers.push_back(bytes);
                 }
             }
         }
-        // Whoever does not look at them does not pile them up.
+        // Limits the queue if no caller reads the answers.
         while self.answers.len() > 64 {
             self.answers.pop_front();
         }
@@ -276,7 +276,7 @@ impl<P: Port> Session<P> {
             self.last = Some(*status);
             self.last_received = now;
         }
-        // Whoever does not look at statuses does not pile them up.
+        // Limits the queue if no caller reads the statuses.
         while self.arrived.len() > 256 {
             self.arrived.pop_front();
         }
@@ -290,15 +290,16 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Longest time until the confirmation of a frame of `len` bytes must have come.
+    /// Returns the maximum time until the confirmation of a frame of `len` bytes must arrive.
     fn confirmation_time(&self, len: usize) -> Duration {
-        // The frame, a status that is just being sent, and the one with the record.
+        // The frame, a status that is being sent, and the status with the record.
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record. A frame that arrived damaged, or whose record does not come, is sent again. Execute and
-    /// TeachingModeEnable are sent again only if they arrived damaged: without a record they may have been executed, and the arm may have
-    /// been stopped on another line since. Not public: a frame can start a motion.
+    /// Sends a frame and waits for its record. A frame that arrived damaged, or whose record does not arrive, is
+    /// repeated. Execute and TeachingModeEnable are repeated only if they arrived damaged: without a record they may
+    /// have been executed, and the arm may have been stopped on another line since. Not public, because a frame can
+    /// start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
@@ -313,12 +314,12 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // Once may be a damaged frame; twice it is a type that the device does not know.
+                // The first time the frame may be damaged; the second time the device does not know the type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // No status came either: a device that is late has lost nothing. A Stop is sent again all the same.
+                // No status arrived either: the device is late and has lost no frame. A Stop is repeated nevertheless.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -332,12 +333,12 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
-    /// The record of the frame just sent; `None` when none came in time.
+    /// Returns the record of the frame just sent; `None` if none arrived in time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
-                // A good record of another type belongs to a request whose time was over.
+                // A good record of another type belongs to a request that has timed out.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }
@@ -348,7 +349,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Reads what comes in the next wait of a limit; false when no time is left.
+    /// Reads the bytes of the next wait of a limit; returns `false` if no time is left.
     fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
         let Some(wait) = limit.next_wait() else { return Ok(false) };
         let begun = self.port.now();
@@ -357,14 +358,14 @@ impl<P: Port> Session<P> {
         Ok(true)
     }
 
-    /// Sends a command; an error when it is refused.
+    /// Sends a command; returns an error if it is rejected.
     fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         self.introduce()?;
         let record = self.request(frame)?;
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    /// Why the request with this record was refused: by the device, or by who shares the line with us.
+    /// Returns the error for the rejected request with this record: rejected by the device, or by an agent that shares the line.
     fn refused(&mut self, record: Response) -> LinkError {
         if let Some(reason) = self.port.take_denial() {
             return LinkError::Denied { request: frame_type(record.frame_type), reason };
@@ -378,11 +379,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Waits until `reached` returns true; `what` names it in the error.
+    /// Waits until `reached` returns `true`; `what` names the condition in the error.
     ///
     /// # Errors
     ///
-    /// [`StateError::Timeout`] with the last status, and those of [`Session::next_status`].
+    /// [`StateError::Timeout`] with the last status, and the errors of [`Session::next_status`].
     pub fn wait_for(
         &mut self,
         what: &'static str,
@@ -404,17 +405,17 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// The type of a frame as the wire has it; 0, which is none, for bytes that are no frame.
+/// Returns the type byte of a frame as on the wire; 0, an invalid type, if the bytes are too short for a frame.
 fn type_byte(frame: &[u8]) -> u8 {
     frame.get(1).copied().unwrap_or(0)
 }
 
-/// The type of a request that this library sent itself.
+/// Returns the type of a request that this library sent itself.
 fn frame_type(kind: u8) -> FrameType {
     FrameType::from_byte(kind).unwrap_or(FrameType::JtcStatus)
 }
 
-/// The record refuses the request because of the state.
+/// Returns `true` if the record rejects the request because of the state.
 fn not_allowed(record: &Response) -> bool {
     record.status == FrameStatus::NoError && record.data == DataStatus::NotAllowed
 }

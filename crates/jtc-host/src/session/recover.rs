@@ -1,5 +1,6 @@
-//! The whole way back to HoldPos, whatever the state is, with each step reported.
+//! Recovery to HoldPos from every state, with each step reported.
 
+mod parameters;
 mod source;
 mod step;
 
@@ -8,6 +9,7 @@ use std::time::Duration;
 use jtc_bus::NODES;
 use jtc_wire::{ControllerState, Status, error};
 
+pub use parameters::RecoverParameters;
 pub use source::ParameterSource;
 pub use step::RecoverStep;
 
@@ -16,36 +18,38 @@ use crate::error::{Error, LinkError, StateError};
 use crate::port::Port;
 use crate::words;
 
-/// First enable of a drive takes 4 s, after a reset some more.
+/// Maximum time until a node is ready: the first enable of a drive takes 4 s, after a reset longer.
 const NODE_TIME: Duration = Duration::from_secs(15);
-/// From reset to Init.
+/// Maximum time from reset to Init.
 const START_TIME: Duration = Duration::from_secs(3);
-/// From a stop to standstill, with time to spare.
+/// Maximum time from a stop to standstill, with reserve.
 const STOP_TIME: Duration = Duration::from_secs(5);
-/// From the reset of a node until it answers.
+/// Time from the reset of a node until it answers.
 const BOOT: Duration = Duration::from_secs(1);
-/// From a parameter's confirmation to the status that shows it.
+/// Time from a parameter's confirmation to the status that shows it.
 const TAKEN_IN: Duration = Duration::from_millis(60);
-/// Acts after which a controller that is still not in HoldPos is given up, and how often errors are cleared.
+/// Maximum number of steps before the recovery fails, and maximum number of error clears.
 const ACTS_MAX: u8 = 24;
-/// Times that a held stop is cleared: a joint that yields comes to rest meanwhile, or somebody has to free it.
+/// Maximum number of clears of a held stop: meanwhile a compliant joint comes to rest, or an operator frees the joint.
 const HELD_CLEARS: u8 = 6;
 const CLEARS_MAX: u8 = 6;
-/// Effect of a command.
+/// Time until a command takes effect.
 const EFFECT: Duration = Duration::from_millis(500);
-/// How often it is looked whether a person wants it to end.
+/// Interval of the check whether the user cancels.
 const LOOK: Duration = Duration::from_millis(100);
-/// How long a person may take to release the emergency stop.
+/// Time for the operator to release the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Leads the controller to HoldPos without errors. Where it misses friction, gains or arm model, `parameters` decides whose it is
-    /// given; no source, or one that lacks a part, is an error before anything is sent. No trajectory is resumed.
+    /// Brings the controller to HoldPos without errors. If friction, gains or arm model are missing, `parameters`
+    /// selects their source; without a source, or if the source lacks a part, an error is returned before anything is
+    /// sent. No trajectory is resumed.
     ///
     /// # Errors
     ///
-    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm), before anything is
-    /// sent, when there is nothing to give the controller; [`StateError::Device`] and [`StateError::Timeout`] when an error does not go away; those of the line.
+    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm),
+    /// before anything is sent, if no parameters are available; [`StateError::Device`] and [`StateError::Timeout`] if
+    /// an error persists; the errors of the line.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -54,12 +58,12 @@ impl<P: Port> Session<P> {
         self.recover_until(parameters, || false, report)
     }
 
-    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then and the error is
-    /// [`Error::Cancelled`], but a motion is stopped and followed to its standstill first.
+    /// Like [`Session::recover`], until `ended` returns `true` because the user cancels: then sends nothing more and
+    /// returns [`Error::Cancelled`]; a motion is first stopped and followed to standstill.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::recover`], and [`Error::Cancelled`] once `ended` returns true.
+    /// Returns the errors of [`Session::recover`], and [`Error::Cancelled`] once `ended` returns `true`.
     pub fn recover_until(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -84,7 +88,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Lets time pass while statuses are taken in; not longer than until it is `ended`.
+    /// Receives statuses for this time, or until `ended` returns `true`.
     fn pause_for(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.port.now() + time;
         loop {
@@ -97,27 +101,27 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// A recovery on its way, with what it has done so far.
+/// A recovery in progress, with its actions so far.
 struct Recovery<'a, P, Ended, Report> {
     session: &'a mut Session<P>,
     parameters: ParameterSource<'a>,
     ended: Ended,
     report: Report,
-    /// Parameters were given.
+    /// `true` if parameters were sent.
     given: bool,
     /// Nodes that were reset because they were silent.
     reset: u8,
-    /// How often errors were cleared.
+    /// Number of times that errors were cleared.
     clears: u8,
-    /// Times that a held stop was cleared.
+    /// Number of times that a held stop was cleared.
     held_clears: u8,
-    /// Nodes were reset because they did not come up.
+    /// `true` if nodes were reset because they did not start up.
     reset_slow: bool,
-    /// Since when a person is asked to release the emergency stop.
+    /// Time since which the operator is asked to release the emergency stop.
     asked: Option<Duration>,
-    /// Acts that are left before it is given up.
+    /// Number of steps left before the recovery fails.
     acts_left: u8,
-    /// Stops of other programs before it began: one that comes later ends it.
+    /// Number of Stops of other programs before the start: a later Stop ends the recovery.
     stops: u64,
 }
 
@@ -146,7 +150,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         }
     }
 
-    /// From what `status` reports to HoldPos without errors: one act for each state on the way.
+    /// Proceeds from the state in `status` to HoldPos without errors: one step for each state on the way.
     fn from(&mut self, mut status: Status) -> Result<Status, Error> {
         while self.acts_left > 0 {
             self.acts_left -= 1;
@@ -177,7 +181,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // A state that this version does not know is not to be acted upon.
+                // No step is known for an unknown state.
                 None => break,
             }
             status = self.session.fresh_status()?;
@@ -233,7 +237,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
 
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
-        // Errors latch: only clearing shows whether the safety input is high again.
+        // Errors latch: only clearing shows if the safety input is high again.
         let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
@@ -253,7 +257,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         Ok(())
     }
 
-    /// Clears until the safety input is high again, for as long as a person may take.
+    /// Clears errors until the safety input is high again, for at most 60 s.
     fn wait_for_a_person(&mut self, status: &Status) -> Result<(), Error> {
         let since = *self.asked.get_or_insert_with(|| {
             (self.report)(&RecoverStep::SafetyInput);
@@ -267,7 +271,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        // A fault that is still there is looked at again.
+        // The caller evaluates a persistent fault again.
         self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }
@@ -279,7 +283,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 }
 
-/// Nodes that report a fault of their own.
+/// Returns the nodes that report a fault of their own.
 fn faulty(s: &Status) -> u8 {
     let joints = s
         .joints

@@ -1,16 +1,20 @@
-//! The way back to HoldPos: what it reports from each state, and how a person ends it.
+//! Recovery to HoldPos: its reports from each state, and its cancellation by the user.
 
-use jtc_wire::{ControllerState, TrajectoryState};
+use std::sync::Arc;
 use std::time::Duration;
 
+use jtc_wire::{ControllerState, TrajectoryState};
+
 use jtc_bus::Joint;
-use jtc_host::session::{Flow, ParameterSource, RecoverStep};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError};
+use jtc_host::session::{Flow, ParameterSource, RecoverParameters, RecoverStep};
+use jtc_host::{
+    Arm, CheckError, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError,
+};
 use jtc_sim::FaultKind;
 
 use super::{Sim, fail, motion, ready, session};
 
-/// On a path of some seconds, from HoldPos.
+/// Starts a motion of some seconds from HoldPos.
 fn move_arm(s: &mut Sim) {
     let t = CheckedTrajectory::check(&motion(1.0, 50.0), &Arm::avena(), &[0.0; 6], &CheckOptions::default())
         .unwrap();
@@ -20,7 +24,7 @@ fn move_arm(s: &mut Sim) {
         .unwrap();
 }
 
-/// What a person reads on the way back, from each state.
+/// Steps that the user reads during a recovery, from each state.
 #[test]
 fn recover_says_each_step_of_each_state() {
     fn words(s: &mut Sim, source: ParameterSource<'_>) -> Vec<String> {
@@ -74,7 +78,7 @@ fn recover_says_each_step_of_each_state() {
     assert!(faulty.iter().any(|s| s == "clearing the errors of the controller and of joint 3"), "{faulty:?}");
 }
 
-/// A person who wants it to end ends it; what moves is brought to a stand first, and nothing else is sent.
+/// A cancelled recovery first stops a motion, and sends nothing else.
 #[test]
 fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
     let mut s = session(None);
@@ -87,7 +91,7 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
         (status.state, status.trajectory),
         (ControllerState::HoldPos.into(), TrajectoryState::Stop.into())
     );
-    // In teaching the arm is somebody's: it is left as it is.
+    // In teaching the operator guides the arm, so it is left unchanged.
     s.teach(true).unwrap();
     s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     let sent = s.statistics().frames_sent;
@@ -111,7 +115,7 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
-/// J-55: a controller without parameters is not given a stranger's, and no part of an arm is filled in.
+/// J-55: a controller without parameters gets no parameters of an unnamed arm, and no part of an arm is filled in.
 #[test]
 fn j55_recover_gives_no_numbers_that_nobody_named() {
     let mut s = session(Some(921_600));
@@ -131,7 +135,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
-    // One part is there, of another arm: the file's are sent whole.
+    // A single part of another arm is present: all parameters of the file are sent.
     s.use_default(jtc_host::session::Parameter::Pid).unwrap();
     let set = Arm::avena().parameter_set();
     let before = s.statistics().frames_sent;
@@ -145,7 +149,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // Held: nothing is sent under the arm's weight, and that is reported.
+    // Held: no parameters are sent under the weight of the arm, and the step reports it.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -153,7 +157,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(steps.iter().any(|s| s.contains("not with those of avena.toml")), "{steps:?}");
 }
 
-/// After an error, an arm that is named is the one that is powered again.
+/// After an error, the named arm is the one that gets power.
 #[test]
 fn j55_after_an_error_the_named_arm_is_powered() {
     let mut s = ready(Some(921_600));
@@ -165,9 +169,35 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // Without one the controller keeps what it has, and the step reports it.
+    // Without a named arm the controller keeps its parameters, and the step reports it.
     fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
+}
+
+/// J-55: gains that do not keep the arm stable, and limits that the controller has otherwise, are refused before anything is sent.
+#[test]
+fn j55_recover_checks_the_arm_before_anything_is_sent() {
+    let mut s = session(Some(921_600));
+    let mut refused = |arm: Arm| {
+        let parameters = RecoverParameters::Arm { arm: Arc::new(arm), accept_device_limits: false };
+        s.recover_with(&parameters, || false, |step| panic!("{step}")).unwrap_err()
+    };
+    let mut shaky = Arm::avena();
+    shaky.pid.as_mut().expect("gains")[1].kd *= 1_000.0;
+    let error = refused(shaky);
+    assert!(matches!(error, Error::Parameters(ParametersError::Unstable { .. })), "{error}");
+    let mut slow = Arm::avena();
+    slow.joints[2].velocity_max *= 0.5;
+    let error = refused(slow.clone());
+    assert!(matches!(error, Error::Check(CheckError::DeviceLimits { .. })), "{error}");
+    // The controller still needs all parameters.
+    assert_eq!(s.fresh_status().unwrap().jtc_init.count_ones(), 3);
+
+    let parameters = RecoverParameters::Arm { arm: Arc::new(slow), accept_device_limits: true };
+    let mut steps = Vec::new();
+    let status = s.recover_with(&parameters, || false, |step| steps.push(step.clone())).unwrap();
+    assert_eq!(status.state, ControllerState::HoldPos);
+    assert!(matches!(&steps[0], RecoverStep::Differs(_)), "{steps:?}");
 }

@@ -1,4 +1,4 @@
-"""A connection to one controller: what it reports, what it has, what is wrong with it."""
+"""Connection to one controller: status, parameters, diagnosis."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ Self = TypeVar("Self", bound="Connected")
 
 
 class Connected:
-    """What `openjtc.Robot` has besides motions."""
+    """Base class of `openjtc.Robot`: everything except motions."""
 
     def __init__(self, link: _native.Link) -> None:
         self._link = link
-        #: By thread: how many Stops there were after the last one that it asked for.
+        #: By thread: number of Stops after the last Stop that the thread requested.
         self._stops: dict[int, int] = {}
 
     # The connection
@@ -49,7 +49,7 @@ class Connected:
         try:
             self.close()
         except Error as second:
-            # What ended the block is what is raised; that the arm may be moving is to be seen all the same.
+            # The error that ended the block is raised. The second error is added as a note, because the arm may be moving.
             text = f"and at the end of the connection: {second}"
             if hasattr(error, "add_note"):
                 error.add_note(text)
@@ -57,7 +57,7 @@ class Connected:
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def close(self) -> None:
-        """Stops what moves here, switches off the teaching that was switched on here, and ends the connection. The controller holds the arm."""
+        """Stops the motion of this connection, ends its teaching, and closes the connection. The controller holds the arm."""
         try:
             self._link.close()
         finally:
@@ -67,22 +67,21 @@ class Connected:
         self._stops[threading.get_ident()] = self._link.asked()
 
     def _stopped_since(self, asked: int) -> bool:
-        """This thread has stopped the arm after so many Stops."""
+        """Returns true if this thread has stopped the arm since the count of Stops was `asked`."""
         return self._stops.get(threading.get_ident(), 0) > asked
 
     @property
     def is_closed(self) -> bool:
-        """Nothing can be asked any more."""
+        """True after the connection was closed; every request then fails."""
         return self._link.is_closed
 
     def __repr__(self) -> str:
         return "Robot(closed)" if self.is_closed else f"Robot({self._link.port!r})"
 
-    # What is
-
+    # Status and identity
     @property
     def status(self) -> Status:
-        """A fresh status of the controller."""
+        """New status of the controller."""
         status = self._link.status()
         stop = status.pop("held_stop")
         return Status(**status, held_stop=HeldStop(**stop) if stop else None)
@@ -94,52 +93,51 @@ class Connected:
 
     @property
     def arm(self) -> Arm:
-        """The arm in the controller where it can be asked; else the one given to `connect`, or the built-in one.
+        """Arm of the controller. If the controller cannot report it: the arm given to `connect`, or the built-in one.
 
-        Where `connect` was given another arm than the controller has, motions, jogging and teaching are refused; this is the controller's.
+        If `connect` was given another arm, this is still the controller's arm, and motions, jogging and teaching are refused.
         """
         return self._link.arm()
 
     @property
     def info(self) -> dict[str, Any] | None:
-        """Who the controller is: board, firmware, arm, hash of its arm, boots, uptime (s); None for one without extensions.
+        """Identity of the controller: board, firmware, arm, hash of its arm, boots, uptime (s); None for a controller without extensions.
 
-        Under ``reactions``, None where it does not report them: ``last_held_stop``, joints that yield (``yields``) or whose encoder has
-        jumped (``encoder_jumped``), ``path_rate``, and for how long this run was held back (``held_back_s``).
+        ``reactions`` has ``last_held_stop``, joints that yield (``yields``) or whose encoder has jumped (``encoder_jumped``),
+        ``path_rate``, and the time for which this run was held back (``held_back_s``). It is None if the controller does not report it.
         """
         return self._link.info()
 
     def doctor(self) -> list[Finding]:
-        """Looks at link, bus and set-up for 1.5 s; what it found, the worst first."""
+        """Checks link, bus and set-up for 1.5 s. Returns the findings, the worst first."""
         return [Finding(**found) for found in self._link.doctor()]
 
     def wait_ready(self, timeout: float = 15.0) -> None:
-        """Waits until the controller holds the arm with all drives enabled; not longer than `timeout` (s).
+        """Waits until the controller holds the arm with all drives enabled, at most `timeout` (s).
 
         Raises:
-            DeviceError: It reports an error.
-            Error: It does not hold the arm in this time (s); it may lack parameters (`use_defaults`, `push_arm`).
+            DeviceError: The controller reports an error.
+            Error: The controller does not hold the arm within `timeout`; it may lack parameters (`use_defaults`, `push_arm`).
         """
         self._link.wait_ready(timeout)
 
-    # What the controller has
-
+    # Parameters and settings
     def push_arm(self, arm: Arm, *, store: bool = False) -> None:
-        """Gives the controller an arm: friction, gains, model; with extensions also its limits and settings, which need Init or Error.
+        """Sends an arm to the controller: friction, gains, model. With extensions also its limits and settings, which need Init or Error.
 
         Args:
             arm: The arm.
-            store: Whether the controller keeps it over a loss of power.
+            store: Stores the arm in the controller's non-volatile memory.
         """
         self._link.push_arm(arm, store)
 
     def use_defaults(self) -> None:
-        """The controller uses the friction, gains and arm model that are built into it, or that it has stored."""
+        """Lets the controller use its built-in or stored friction, gains and arm model."""
         self._link.use_defaults()
 
     @property
     def payload(self) -> Payload:
-        """What the controller reckons that the flange carries. Setting it takes half a second to come into the torques; None: nothing."""
+        """Payload at the flange that the controller computes with; None: no payload. A new payload changes the torques over 0.5 s."""
         mass, com, inertia = self._link.payload()
         return Payload(mass, tuple(com), tuple(inertia))
 
@@ -149,17 +147,17 @@ class Connected:
 
     @property
     def settings(self) -> dict[str, float | list[float]]:
-        """All settings of a controller with extensions, by their names; those of joints are lists of six."""
+        """All settings of a controller with extensions, by name; a setting of joints is a list of six."""
         return self._link.settings()
 
     def set_settings(self, values: Mapping[str, float | Sequence[float] | Array]) -> None:
-        """Changes settings by their names, all or none.
+        """Changes settings by name, all or none.
 
         Args:
-            values: A number each, or six where it is a setting of joints, base to wrist.
+            values: One number for each setting, or six for a setting of joints, base to wrist.
 
         Raises:
-            UsageError: There is no such setting, or a value is out of its range: joint, value and limit are in the error; nothing was changed.
+            UsageError: A setting is unknown, or a value is out of range: the error has joint, value and limit. No setting was changed.
         """
         flat: list[tuple[str, int, float]] = []
         for name, value in values.items():
@@ -172,23 +170,25 @@ class Connected:
                 flat.append((name, 0, float(numbers)))
         self._link.set_settings(flat)
 
-    # What is wrong
-
-    def recover(self, *, arm: Arm | None = None, defaults: bool = False) -> list[str]:
-        """The whole way back to an arm that is held; the steps that were gone, in words.
+    # Errors and diagnosis
+    def recover(
+        self, *, arm: Arm | None = None, defaults: bool = False, accept_device_limits: bool = False
+    ) -> list[str]:
+        """Brings the controller back to a held arm, and returns the steps in words.
 
         Args:
-            arm: Whose parameters a controller is given that has lost them.
-            defaults: Whether it is given those that are built into it.
+            arm: Arm with the parameters for a controller that has lost its own. Its gains are checked before anything is sent.
+            defaults: Uses the parameters that are built into the controller.
+            accept_device_limits: Accepts that the controller uses other limits than ``arm`` has.
         """
-        return self._link.recover(arm, defaults)
+        return self._link.recover(arm, defaults, accept_device_limits)
 
     def clear(self) -> None:
         """Clears the errors of the controller and of all drives."""
         self._link.clear()
 
     def disable(self) -> None:
-        """Takes the torque off at rest. **An arm without brakes falls.**"""
+        """Switches the drive torque off at rest. **An arm without brakes falls.**"""
         self._link.disable()
 
     def flight_log(self) -> FlightLog:
@@ -196,19 +196,21 @@ class Connected:
         return FlightLog(self._link.fetch_log())
 
     def clear_flight_log(self) -> None:
-        """Forgets the log; the recorder begins anew."""
+        """Erases the log and restarts the recorder."""
         self._link.clear_log()
 
-    # What is done to a simulated arm
-
+    # Disturbances of a simulated arm
     def push(self, joint: int, torque: float, seconds: float) -> None:
-        """Somebody pushes a joint (from 1) of the simulated arm: N·m, for so many s."""
+        """Pushes a joint (from 1) of the simulated arm with `torque` (N·m) for `seconds` (s)."""
         self._link.simulate(f"push {joint} {torque} {seconds}")
 
     def lead(self, path: Trajectory | Plan) -> None:
-        """A hand leads the simulated arm along these positions while it is taught."""
+        """Leads the simulated arm by hand along these positions while it is taught."""
         self._link.lead(path.trajectory if isinstance(path, Plan) else path)
 
     def inject(self, faults: str) -> None:
-        """Faults of a fault file (TOML, ``jtc help faults``) happen to the simulated arm; times are those since its start, `info["uptime"]`."""
+        """Injects the faults of a fault file (TOML, ``jtc help faults``) into the simulated arm.
+
+        Times in the file count from the start of the simulator, like `info["uptime"]`.
+        """
         self._link.inject(faults)

@@ -1,5 +1,4 @@
-//! What a controller is asked and given besides motions: its arm, settings, payload, errors, flight recorder; and what is done to a
-//! simulated one.
+//! Queries and writes besides motions: arm, settings, payload, errors, flight recorder; and disturbances of a simulated arm.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +7,7 @@ use jtc_core::{JOINTS, settings};
 use jtc_host::held_stop::{self, HeldStop, Reacting};
 use jtc_host::log::Account;
 use jtc_host::sample::is_measured;
-use jtc_host::session::ParameterSource;
+use jtc_host::session::RecoverParameters;
 use jtc_host::{StateError, doctor, words};
 use jtc_sim::{HandPath, TypedEvent};
 use jtc_wire::{Joint, SettingValue, Status, StopCause};
@@ -25,10 +24,10 @@ use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
 
-/// How long a doctor looks.
+/// Duration of the doctor's observation.
 const LOOK: Duration = Duration::from_millis(1500);
 
-/// Where every joint is measured (rad).
+/// Returns the measured joint positions (rad), or an error for a joint that is not measured.
 fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     match Joint::ALL.into_iter().find(|joint| !is_measured(status, joint.index())) {
         Some(joint) => Err(StateError::NotMeasured { joint }),
@@ -36,8 +35,8 @@ fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     }
 }
 
-/// A status as plain values; NaN where a joint does not report what it measures. `stop` is the held stop that the arm is in, where the
-/// controller has told it.
+/// Converts a status to plain values; values that a joint does not report are NaN. `stop` is the present held stop, if the controller
+/// has reported it.
 pub fn status<'py>(
     py: Python<'py>,
     status: &Status,
@@ -68,12 +67,12 @@ pub fn status<'py>(
 
 #[pymethods]
 impl Link {
-    /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.
+    /// Returns the controller's arm. If the controller cannot report it: the arm of the caller, or the built-in one.
     fn arm(&self, py: Python<'_>) -> PyResult<Arm> {
         Ok(Arm::of(self.call(py, |machine, _| machine.device_arm())?))
     }
 
-    /// Gives the controller a whole arm, and lets it keep it over a loss of power where that is asked for.
+    /// Sends a whole arm to the controller, and stores it in non-volatile memory if `store` is set.
     fn push_arm(&self, py: Python<'_>, arm: &Arm, store: bool) -> PyResult<()> {
         let arm = Arc::clone(&arm.inner);
         self.call(py, move |machine, asked| {
@@ -83,7 +82,7 @@ impl Link {
             } else if session.info()?.is_some() {
                 session.push_arm_until(&arm, || asked.is_halted(), |_| {})?;
             } else {
-                // Such a controller has no more of an arm than friction, gains and model.
+                // A controller without extensions takes only friction, gains and model of an arm.
                 let device = session.device_config()?;
                 let differences = arm.device_differences(&device);
                 if !differences.is_empty() {
@@ -97,12 +96,12 @@ impl Link {
         })
     }
 
-    /// The controller uses the friction, gains and arm model that are built into it, or that it has stored.
+    /// Lets the controller use its built-in or stored friction, gains and arm model.
     fn use_defaults(&self, py: Python<'_>) -> PyResult<()> {
         self.call(py, |machine, _| Ok(machine.session.use_defaults()?))
     }
 
-    /// Mass (kg), centre of mass (m), inertia (kg·m²).
+    /// Returns the payload: mass (kg), centre of mass (m), inertia (kg·m²).
     fn payload(&self, py: Python<'_>) -> PyResult<PayloadNumbers> {
         let payload = self.call(py, |machine, _| Ok(machine.session.payload()?))?;
         Ok((payload.mass, payload.com, payload.inertia))
@@ -113,20 +112,25 @@ impl Link {
         self.call(py, move |machine, _| Ok(machine.session.set_payload(&payload)?))
     }
 
-    /// The whole way back to HoldPos; returns its steps in words.
-    #[pyo3(signature = (arm=None, defaults=false))]
-    fn recover(&self, py: Python<'_>, arm: Option<&Arm>, defaults: bool) -> PyResult<Vec<String>> {
-        let arm = arm.map(|arm| Arc::clone(&arm.inner));
+    /// Recovers to HoldPos; returns the steps in words.
+    #[pyo3(signature = (arm=None, defaults=false, accept_device_limits=false))]
+    fn recover(
+        &self,
+        py: Python<'_>,
+        arm: Option<&Arm>,
+        defaults: bool,
+        accept_device_limits: bool,
+    ) -> PyResult<Vec<String>> {
+        let parameters = match arm.map(|arm| Arc::clone(&arm.inner)) {
+            Some(arm) => RecoverParameters::Arm { arm, accept_device_limits },
+            None if defaults => RecoverParameters::ControllerDefaults,
+            None => RecoverParameters::None,
+        };
+        parameters.check().map_err(Failure::from)?;
         self.call(py, move |machine, asked| {
-            let set = arm.as_ref().map(|arm| arm.parameter_set());
-            let source = match (&arm, &set) {
-                (Some(arm), Some(set)) => ParameterSource::Arm { name: &arm.name, set },
-                _ if defaults => ParameterSource::ControllerDefaults,
-                _ => ParameterSource::None,
-            };
             let mut steps = Vec::new();
-            machine.session.recover_until(
-                source,
+            machine.session.recover_with(
+                &parameters,
                 || asked.is_halted(),
                 |step| steps.push(step.to_string()),
             )?;
@@ -146,7 +150,7 @@ impl Link {
         self.call(py, move |machine, _| Ok(machine.session.gripper(pump)?))
     }
 
-    /// Who the controller is; `None` for one without extensions.
+    /// Returns the controller's identity; `None` without extensions.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(info) = self.call(py, |machine, _| Ok(machine.session.info()?))? else { return Ok(None) };
         let all = PyDict::new(py);
@@ -162,7 +166,7 @@ impl Link {
         Ok(Some(all))
     }
 
-    /// Settings by their names; those of joints are lists of six.
+    /// Returns settings by name; a setting of joints is a list of six.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = self.call(py, |machine, _| Ok(machine.session.settings()?))?;
         let all = PyDict::new(py);
@@ -179,7 +183,7 @@ impl Link {
         Ok(all)
     }
 
-    /// Settings as (name, joint from 1, or 0, value), all or none.
+    /// Writes settings as (name, joint from 1, or 0, value), all or none.
     fn set_settings(&self, py: Python<'_>, values: Vec<(String, u8, f64)>) -> PyResult<()> {
         let mut given = Vec::new();
         for (name, joint, value) in values {
@@ -188,25 +192,31 @@ impl Link {
             })?;
             given.push(SettingValue { setting: setting.number, joint, value });
         }
-        // Checked whole before anything is sent.
+        // All settings are checked before the first one is sent.
         self.call(py, move |machine, _| Ok(machine.session.change_settings(&given)?))
     }
 
-    /// What `jtc doctor` finds, the worst first.
+    /// Returns the findings of `jtc doctor`, the worst first.
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.call(py, |machine, asked| {
             let mut seen = machine.session.examine_until(LOOK, || asked.is_halted())?;
             asked.check()?;
-            // A stop and a jump of an encoder are under torque only.
+            // Held stops and encoder jumps only occur while drives have torque.
             if seen.status.as_ref().is_some_and(words::has_torque) {
                 seen.reactions = machine.session.reactions();
             }
             Ok(doctor::findings(&seen))
         })?;
-        Ok(json::plain(py, &found)?)
+        let all = PyList::empty(py);
+        for finding in &found {
+            let values = json::plain(py, finding)?;
+            values.set_item("next", in_python(&finding.next))?;
+            all.append(values)?;
+        }
+        Ok(all.into_any())
     }
 
-    /// The flight recorder, run again.
+    /// Reads the flight recorder and replays it.
     fn fetch_log(&self, py: Python<'_>) -> PyResult<FlightLog> {
         let account = self.call(py, |machine, asked| {
             let log = machine.session.fetch_log_until(|| asked.is_halted(), |_, _| {})?;
@@ -220,7 +230,7 @@ impl Link {
         self.call(py, |machine, _| Ok(machine.session.clear_log()?))
     }
 
-    /// Checks a trajectory as a run would, from where the arm stands or from `start`.
+    /// Checks a trajectory as a run would, from the present position or from `start`.
     #[pyo3(signature = (trajectory, start=None, accept_device_limits=false))]
     fn check<'py>(
         &self,
@@ -249,7 +259,7 @@ impl Link {
         crate::planner::verdict(py, &verdict)
     }
 
-    /// An event as `jtc sim` takes it: `push 3 12 0.5`.
+    /// Applies an event in the form of `jtc sim`: `push 3 12 0.5`.
     fn simulate(&self, event: &str) -> Result<(), Failure> {
         let event = TypedEvent::parse(event).map_err(|error| Failure::usage(error.to_string()))?;
         if let Some(TypedEvent::Push { joint, torque, seconds }) = event {
@@ -258,7 +268,7 @@ impl Link {
         Ok(())
     }
 
-    /// A hand leads the simulated arm along a trajectory while it is taught.
+    /// Leads the simulated arm by hand along a trajectory while it is taught.
     fn lead(&self, trajectory: &Trajectory) -> Result<(), Failure> {
         let trajectory = &trajectory.inner;
         let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -267,7 +277,7 @@ impl Link {
         self.worker.touch(move |world| world.lead(path))
     }
 
-    /// Faults of a fault file; their times are those since the start of the simulation.
+    /// Injects the faults of a fault file; their times count from the start of the simulation.
     fn inject(&self, faults: &str) -> Result<(), Failure> {
         let plan =
             jtc_sim::FaultPlan::from_toml(faults).map_err(|error| Failure::usage(error.to_string()))?;
@@ -275,7 +285,7 @@ impl Link {
     }
 }
 
-/// What is recorded at each tick, with what broke first.
+/// Returns the samples of each tick, with the first failure.
 pub fn samples(account: &Account) -> Samples {
     Samples::of_log(account.info.clone(), account.replayed.samples(), account.failure.clone())
 }

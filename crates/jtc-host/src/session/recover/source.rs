@@ -1,4 +1,4 @@
-//! Whose parameters a controller is given on its way back.
+//! Source of the parameters that a controller gets during recovery.
 
 use jtc_wire::{ControllerState, Status};
 
@@ -7,29 +7,29 @@ use crate::arm::ParameterSet;
 use crate::error::ParametersError;
 use crate::words;
 
-/// Whose friction, gains and arm model a controller is given that misses some (J-55).
+/// Source of friction, gains and arm model for a controller that lacks some (J-55).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ParameterSource<'a> {
-    /// Nobody's: a controller that misses some is refused.
+    /// No source: a controller that lacks parameters is rejected.
     #[default]
     None,
-    /// The defaults that are built into the controller, by name.
+    /// Defaults that are built into the controller.
     ControllerDefaults,
-    /// Those of an arm, all of them: a controller without torque is given them whatever it has.
+    /// All parameters of an arm: a controller without torque always gets them.
     Arm {
         /// Name of the arm or its file.
         name: &'a str,
-        /// All three parts.
+        /// Friction, gains and arm model.
         set: &'a ParameterSet,
     },
 }
 
 impl ParameterSource<'_> {
-    /// An arm must be whole: friction, gains and arm model.
+    /// Checks that an arm is complete: friction, gains and arm model.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::IncompleteArm`] for a set that cannot be given whole.
+    /// [`ParametersError::IncompleteArm`] if the set is not complete.
     pub fn check(&self) -> Result<(), ParametersError> {
         match self {
             ParameterSource::Arm { name, set } if !set.missing().is_empty() => {
@@ -39,7 +39,7 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// A controller that misses parameters needs a source.
+    /// Checks that a controller that lacks parameters has a source.
     pub(super) fn enough_for(&self, status: &Status) -> Result<(), ParametersError> {
         match self {
             ParameterSource::None if status.jtc_init != 0 => {
@@ -49,8 +49,8 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// An arm's parameters are given once to any controller, the defaults to one that misses some; always all three, so that those
-    /// of two arms are never mixed.
+    /// Returns `true` if parameters must be sent: an arm's parameters once to every controller, the defaults to a
+    /// controller that lacks some. Always all three are sent, so that parameters of two arms are never mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,
@@ -59,7 +59,7 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// The step to report when nothing will be given.
+    /// Returns the step to report if no parameters will be sent.
     pub(super) fn kept(&self, status: &Status) -> Option<RecoverStep> {
         match self {
             _ if status.jtc_init != 0 => None,

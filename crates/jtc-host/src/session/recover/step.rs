@@ -1,28 +1,32 @@
-//! The steps of the way back, in words.
+//! Steps of a recovery as text.
 
-/// One step of the way back.
+use crate::arm::Difference;
+
+/// A step of a recovery.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RecoverStep {
-    /// Where the controller is.
+    /// The controller has another value than the arm, which is accepted.
+    Differs(Difference),
+    /// State of the controller.
     Found(String),
-    /// A person has to act: the safety input is low.
+    /// The operator must act: the safety input is low.
     SafetyInput,
     /// The motion is stopped.
     Stop,
     /// Teaching is switched off.
     TeachOff,
-    /// Errors are cleared: the controller's, and those of these nodes.
+    /// Current errors are cleared: the controller's and those of these nodes.
     Clear(Vec<String>),
     /// Nodes are reset.
     Reset(Vec<String>),
-    /// Friction, gains and arm model are given, all three: those of the controller's own defaults, or of the arm of this name.
+    /// Friction, gains and arm model are sent: the controller's own defaults, or the parameters of the named arm.
     Give(Option<String>),
-    /// Nothing is given: the controller goes on with the parameters that it has.
+    /// No parameters are sent: the controller keeps its parameters.
     Keep,
-    /// Nothing is given although an arm is named: the controller holds an arm with the parameters that it has.
+    /// No parameters are sent although an arm is named: the controller holds an arm with its current parameters.
     KeepHolding(String),
-    /// Nodes come up.
+    /// Nodes start up.
     WaitNodes(Vec<String>),
     /// Done: HoldPos without errors.
     HoldPos,
@@ -31,6 +35,7 @@ pub enum RecoverStep {
 impl std::fmt::Display for RecoverStep {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            RecoverStep::Differs(difference) => write!(f, "warning: {difference}"),
             RecoverStep::Found(line) => write!(f, "found: {line}"),
             RecoverStep::SafetyInput => {
                 write!(f, "the safety input is low: release the emergency stop (waiting)")

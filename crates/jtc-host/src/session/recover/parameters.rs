@@ -1,0 +1,74 @@
+//! The checks of an arm before recover gives its parameters to a controller.
+
+use std::sync::Arc;
+
+use jtc_wire::Status;
+
+use super::{ParameterSource, RecoverStep};
+use crate::arm::Arm;
+use crate::error::{CheckError, Error, ParametersError};
+use crate::port::Port;
+use crate::session::Session;
+
+/// Parameters that recover gives to a controller that has lost its own (J-55).
+#[derive(Clone, Debug, Default)]
+pub enum RecoverParameters {
+    /// None: recover refuses a controller that needs some.
+    #[default]
+    None,
+    /// Parameters that are built into the controller, or stored there.
+    ControllerDefaults,
+    /// Parameters of an arm.
+    Arm {
+        /// Arm with friction, gains and model.
+        arm: Arc<Arm>,
+        /// Accepts values of the arm that no frame carries and that the controller has otherwise.
+        accept_device_limits: bool,
+    },
+}
+
+impl RecoverParameters {
+    /// Checks that an arm has all parameters and that its gains keep it stable.
+    ///
+    /// # Errors
+    ///
+    /// [`ParametersError::IncompleteArm`], [`ParametersError::Unstable`].
+    pub fn check(&self) -> Result<(), ParametersError> {
+        let Self::Arm { arm, .. } = self else { return Ok(()) };
+        ParameterSource::Arm { name: &arm.name, set: &arm.parameter_set() }.check()?;
+        arm.check_gains()
+    }
+}
+
+impl<P: Port> Session<P> {
+    /// Like [`Session::recover_until`], after a check of the parameters and a comparison of the arm's limits with those of the controller.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
+    /// limits than the arm and they are not accepted. Nothing is sent in these cases.
+    pub fn recover_with(
+        &mut self,
+        parameters: &RecoverParameters,
+        ended: impl Fn() -> bool,
+        mut report: impl FnMut(&RecoverStep),
+    ) -> Result<Status, Error> {
+        parameters.check()?;
+        let RecoverParameters::Arm { arm, accept_device_limits } = parameters else {
+            let source = match parameters {
+                RecoverParameters::ControllerDefaults => ParameterSource::ControllerDefaults,
+                _ => ParameterSource::None,
+            };
+            return self.recover_until(source, ended, report);
+        };
+        let differences = arm.device_differences(&self.device_config()?);
+        if !differences.is_empty() && !accept_device_limits {
+            return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences }.into());
+        }
+        for difference in differences {
+            report(&RecoverStep::Differs(difference));
+        }
+        let set = arm.parameter_set();
+        self.recover_until(ParameterSource::Arm { name: &arm.name, set: &set }, ended, report)
+    }
+}

@@ -18,7 +18,7 @@ pub enum FrontEnd {
 /// Defines [`Action`] and its names in each front end.
 macro_rules! actions {
     ($($(#[$doc:meta])* $action:ident: $command:literal, $agent:literal, $python:literal;)*) => {
-        /// Something that a user of an arm can do next.
+        /// Action or option that a next step names.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Action {
             $($(#[$doc])* $action,)*
@@ -58,7 +58,7 @@ actions! {
     /// Use the arm that is built into the controller.
     UseDefaults: "jtc params use-defaults", "POST /api/arm/defaults", "robot.use_defaults()";
     /// Give the controller friction and gains.
-    ParamsPush: "jtc params push FILE", "PUT /api/arm", "robot.push_arm(arm)";
+    ParamsPush: "jtc params push FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
     /// List the joints that are set absent.
     BenchShow: "jtc bench show", "GET /api/absent", "jtc bench show";
     /// Set all joints present.
@@ -70,7 +70,7 @@ actions! {
     /// Look for what is wrong.
     Doctor: "jtc doctor", "Look for what is wrong (GET /api/doctor)", "robot.doctor()";
     /// Look for what is wrong, at the rate of the controller.
-    DoctorAtRate: "jtc doctor --baud RATE", "jtc doctor --baud RATE", "openjtc.connect(…, baud=…)";
+    DoctorAtRate: "jtc doctor --baud RATE", "jtc serve --baud RATE", "openjtc.connect(…, baud=…)";
     /// Explain states and errors.
     Explain: "jtc explain", "Explain (GET /api/explain)", "jtc explain";
     /// Explain one code.
@@ -79,34 +79,35 @@ actions! {
     Info: "jtc info", "GET /api/info", "robot.info";
     /// Move one joint while it is asked for.
     Jog: "jtc jog", "Jog (POST /api/jog)", "robot.jog(…)";
-    /// Fetch the log of the flight recorder.
-    LogFetch: "jtc log fetch", "GET /api/log", "robot.flight_log()";
     /// Give positions in degrees.
     Degrees: "--deg", "degrees: true", "degrees=True";
     /// Choose the rate of the serial line.
-    Baud: "--baud", "--baud", "baud=";
-    /// Watch the state.
-    Monitor: "jtc monitor", "GET /api/status", "robot.status";
+    Baud: "--baud", "jtc serve --baud", "baud=";
+    /// Watch state and link.
+    Monitor: "jtc monitor", "GET /metrics", "robot.doctor()";
     /// Show the payload.
     PayloadShow: "jtc payload show", "GET /api/payload", "robot.payload";
     /// Set the payload.
     PayloadSet: "jtc payload set", "Payload (PUT /api/payload)", "robot.payload = …";
     /// Remove the payload.
-    PayloadClear: "jtc payload clear", "Payload (PUT /api/payload)", "robot.payload = None";
+    PayloadClear: "jtc payload clear", "Payload (PUT /api/payload with mass_kg: 0)", "robot.payload = None";
     /// Return to a held arm from any state.
-    Recover: "jtc recover", "Recover (POST /api/recover)", "robot.recover()";
+    Recover: "jtc recover", "Recover (POST /api/recover with {})", "robot.recover()";
     /// Return to a held arm and give the controller this arm.
     RecoverWithArm: "jtc recover --arm FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
     /// Return to a held arm and use the arm that is built into the controller.
     RecoverWithDefaults:
         "jtc recover --defaults", "Recover (POST /api/recover with defaults: true)", "robot.recover(defaults=True)";
     /// Restart a drive.
-    ResetJoint: "jtc reset --joints JOINT", "POST /api/reset with joints: [JOINT]", "jtc reset --joints JOINT";
+    ResetJoint:
+        "jtc reset --joints JOINT", "POST /api/reset with joints: [JOINT]", "`jtc reset --joints JOINT` after `robot.close()`";
+    /// Restart drives although the arm may fall.
+    ResetMayFall: "jtc reset --yes", "POST /api/reset with arm_may_fall: true", "jtc reset --yes";
     /// Show the state.
     Status: "jtc status", "GET /api/status", "robot.status";
     /// End Teaching.
     TeachOff:
-        "jtc teach off", "End teaching (POST /api/teach with on: false)", "the end of the block `with robot.teach():`";
+        "jtc teach off", "End teaching (POST /api/teach with on: false)", "end the block `with robot.teach():`";
     /// Check a trajectory.
     TrajCheck: "jtc traj check FILE", "GET /api/trajectories/{number}/check", "robot.check(…)";
     /// Run a trajectory.
@@ -114,6 +115,8 @@ actions! {
     /// Move to the first point and run a trajectory.
     TrajRunWithApproach:
         "jtc traj run FILE --approach", "Run (POST /api/runs with approach: true)", "robot.run(…, approach=True)";
+    /// Run a trajectory at a lower speed.
+    TrajRunSlower: "jtc traj run FILE --speed PCT", "Run (POST /api/runs with speed_percent)", "robot.run(…, speed=…)";
     /// Pause the motion.
     Pause: "jtc traj pause", "Pause (POST /api/pause)", "robot.pause()";
     /// Resume the motion.
@@ -125,11 +128,11 @@ actions! {
 /// Part of a next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Part {
-    /// Words that are the same in each front end. What a user types stands between backticks.
+    /// Words for all front ends. Commands stand between backticks.
     Words(Cow<'static, str>),
     /// Action, which each front end names itself.
     Action(Action),
-    /// The same with the arguments of its command.
+    /// Action with the whole command as a user types it.
     Typed(Action, String),
 }
 
@@ -142,7 +145,7 @@ pub struct Next(Vec<Part>);
 impl Next {
     /// Returns `true` if no step helps.
     pub fn is_empty(&self) -> bool {
-        self.0.iter().all(|part| matches!(part, Part::Words(words) if words.is_empty()))
+        self.0.is_empty()
     }
 
     /// Counts the places `{}` in a sentence.
@@ -176,7 +179,7 @@ impl Next {
     #[must_use]
     pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
         for part in &mut self.0 {
-            if *part == Part::Action(wanted) {
+            if matches!(part, Part::Action(action) | Part::Typed(action, _) if *action == wanted) {
                 *part = Part::Typed(wanted, command.to_owned());
             }
         }
@@ -195,16 +198,18 @@ impl Next {
         Self(vec![Part::Typed(action, command.into())])
     }
 
-    /// Returns the sentence of a front end. What a user types stands between backticks.
+    /// Returns the sentence of a front end, with commands, requests and expressions between backticks.
     pub fn sentence(&self, front_end: FrontEnd) -> String {
         let parts = self.0.iter().map(|part| {
             let name = match part {
                 Part::Words(words) => return words.clone(),
-                Part::Typed(_, command) if front_end == FrontEnd::Command => command,
+                Part::Typed(_, command) if front_end == FrontEnd::Command => {
+                    return format!("`{command}`").into();
+                }
                 Part::Action(action) | Part::Typed(action, _) => action.name(front_end),
             };
             // Some names are words with an expression among them.
-            if name.contains('`') { name.to_owned().into() } else { format!("`{name}`").into() }
+            if name.contains('`') { name.into() } else { format!("`{name}`").into() }
         });
         parts.collect()
     }
@@ -235,13 +240,19 @@ impl From<Action> for Next {
 
 impl From<&'static str> for Next {
     fn from(words: &'static str) -> Self {
-        Self(vec![Part::Words(words.into())])
+        Cow::Borrowed(words).into()
     }
 }
 
 impl From<String> for Next {
     fn from(words: String) -> Self {
-        Self(vec![Part::Words(words.into())])
+        Cow::<'static, str>::Owned(words).into()
+    }
+}
+
+impl From<Cow<'static, str>> for Next {
+    fn from(words: Cow<'static, str>) -> Self {
+        if words.is_empty() { Self::default() } else { Self(vec![Part::Words(words)]) }
     }
 }
 
@@ -272,10 +283,9 @@ mod tests {
         let run = next!("then {}", TrajRun).with_command(Action::TrajRun, "jtc traj run 'my motion.csv'");
         assert_eq!(run.to_string(), "then `jtc traj run 'my motion.csv'`");
         let block = Next::from(Action::TeachOff).sentence(FrontEnd::Python);
-        assert_eq!(block, "the end of the block `with robot.teach():`");
+        assert_eq!(block, "end the block `with robot.teach():`");
     }
 
-    /// The methods and properties that the Python package has, and the words of its expressions.
     #[test]
     fn each_expression_of_python_exists() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../openjtc-py/python/openjtc");

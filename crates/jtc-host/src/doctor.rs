@@ -1,4 +1,4 @@
-//! What is wrong with link, bus and set-up, in words with the next command.
+//! Diagnosis of link, bus and set-up, in words with the next command.
 
 use std::time::Duration;
 
@@ -11,52 +11,52 @@ use crate::held_stop::{self, HeldStop};
 use crate::port::Port;
 use crate::{Error, Session, words};
 
-/// Rates that are tried when bytes come and no frame is in them.
+/// Rates that are tried if bytes are received that contain no frame.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
-/// How often is looked whether an examination is to end.
+/// Interval at which an examination checks if it must end.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What was received on the link.
+/// Data received on the link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Rate of the port, Bd.
     pub baud: Option<u32>,
-    /// How long was listened, s.
+    /// Duration of the examination, s.
     pub time_s: f64,
-    /// Bytes that came.
+    /// Number of bytes received.
     pub bytes: u64,
-    /// Bytes that belong to no status.
+    /// Number of bytes that belong to no status.
     pub bad_bytes: u64,
-    /// Statuses.
+    /// Number of statuses received.
     pub statuses: u64,
-    /// The last one.
+    /// Last status.
     pub status: Option<Status>,
-    /// A request was confirmed; `None`: none was tried.
+    /// `true` if a request was confirmed; `None`: no request was sent.
     pub confirmed: Option<bool>,
     /// Another rate at which statuses were found.
     pub other_baud: Option<u32>,
     /// Joints that are set absent (J-53).
     pub absent: Vec<Joint>,
-    /// What the controller tells of held stops and encoders (J-69); `None`: it was not asked, or does not tell.
+    /// Report of the controller about held stops and encoders (J-69); `None`: not requested, or not supported.
     pub reactions: Option<Reactions>,
 }
 
 impl<P: Port> Session<P> {
-    /// Listens for `time`; silence is an observation, no error.
+    /// Listens for `time`. Silence is an observation, not an error.
     ///
     /// # Errors
     ///
-    /// The port is gone. That nothing is received is an observation, no error.
+    /// Returns an error if the port is lost. Silence is an observation, not an error.
     pub fn examine(&mut self, time: Duration) -> Result<Observation, Error> {
         self.examine_until(time, || false)
     }
 
-    /// The same, for less time once `ended` returns true.
+    /// Like [`Session::examine`], but ends early once `ended` returns `true`.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::examine`].
+    /// Returns the errors of [`Session::examine`].
     pub fn examine_until(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<Observation, Error> {
         let (start, before) = (self.now(), self.statistics());
         let end = start + time;
@@ -84,7 +84,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Findings, worst first.
+/// Returns the findings, worst first.
 pub fn findings(seen: &Observation) -> Vec<Finding> {
     let mut all = Findings::default();
     link(seen, &mut all);
@@ -129,7 +129,7 @@ fn link(seen: &Observation, all: &mut Findings) {
         return;
     }
     let bad = seen.bad_bytes as f64 / seen.bytes as f64;
-    // The first status may have been cut by our coming in the middle of it.
+    // The first status may be incomplete, because listening can begin in the middle of it.
     if seen.bad_bytes > 175 && bad > 0.001 {
         all.add(
             Warning,
@@ -159,7 +159,7 @@ fn link(seen: &Observation, all: &mut Findings) {
     }
 }
 
-/// A drive that answers although its joint is set absent is an error without a bit of its own (J-53).
+/// Finds drives that answer although their joint is set absent: an error without its own bit (J-53).
 fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     for joint in joints {
         let state = s.joints[joint.index()].state;
@@ -182,7 +182,7 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     }
 }
 
-/// A held stop with its cause, and joints whose encoder has jumped.
+/// Finds a held stop with its cause, and joints whose encoder has jumped.
 fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactions>, all: &mut Findings) {
     if let Some((cause, ago_ms)) = cause {
         all.add(
@@ -192,7 +192,7 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             held_stop::next_step(s, Some(cause)),
         );
     }
-    // The cause has said it of its joint.
+    // The finding of the cause already names its joint.
     let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
     let said = said.and_then(|(cause, _)| held_stop::joint(cause));
     let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
@@ -206,13 +206,14 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
     }
 }
 
-/// The cause of the held stop that the arm is in, and its age, ms.
+/// Returns the cause of the present held stop, and its age, ms.
 fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCause, u32)> {
     let (cause, ago_ms) = reactions?.stop.as_ref()?;
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// `told`: the cause of a held stop has its own finding, which says more than the joints' errors.
+/// Finds errors in the status. `told`: the cause of a held stop already has its own finding, which says more than the errors of
+/// the joints.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {
@@ -280,7 +281,11 @@ fn set_up(s: &Status, all: &mut Findings) {
             Problem,
             format!("not given yet: {}", missing.join(", ")),
             "the controller waits for it in Init",
-            next!("{} or {}", ParamsPush, UseDefaults),
+            next!(
+                "{}, or {} if the arm is the one that is built into the controller",
+                ParamsPush,
+                UseDefaults
+            ),
         );
     }
     for n in words::nodes_in(s.node_init) {
@@ -312,12 +317,12 @@ fn set_up(s: &Status, all: &mut Findings) {
     }
 }
 
-/// Bearing temperature above which friction and life suffer, °C.
+/// Bearing temperature above which friction and service life get worse, °C.
 const HOT: u8 = 70;
 
 fn temperatures(s: &Status, all: &mut Findings) {
     for (j, joint) in s.joints.iter().enumerate() {
-        // Above 200 the byte is a negative temperature.
+        // A byte of 200 or more is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
             let what = format!("{}: bearing at {} °C", words::node(j), joint.temperature);
             all.add(Severity::Warning, what, "long motion at high torque", next!("let it cool; {}", Monitor));
@@ -374,7 +379,7 @@ mod tests {
         );
     }
 
-    /// Each kind of a held stop says what to do about it.
+    /// Each kind of held stop has its own advice.
     #[test]
     fn j69_a_held_stop_is_found_with_its_cause_and_what_to_do() {
         let mut status = Status {

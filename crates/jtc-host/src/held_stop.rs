@@ -1,4 +1,4 @@
-//! A held stop (J-69) as every front end shows it: cause, values, and what helps.
+//! Held stop (J-69) as every front end shows it: cause, values and remedy.
 
 use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
@@ -14,37 +14,37 @@ pub fn after_encoder_jump() -> Next {
          `velocity_full_scale_rad_s` is wrong",
         Disable,
         ResetJoint,
-        Recover
+        RecoverWithArm
     )
 }
 
-/// The last held stop of a controller.
+/// Last held stop of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldStop {
     /// Kind of the cause: its name with hyphens.
     pub kind: String,
     /// Number of the kind on the wire.
     pub number: u8,
-    /// Name of its page: `jtc explain CODE`.
+    /// Name of the explain page: `jtc explain CODE`.
     pub code: &'static str,
-    /// Joint from 1 that the cause was found at first; `None`: at none in particular.
+    /// First joint with the cause, from 1; `None`: no particular joint.
     pub joint: Option<u8>,
-    /// Value that was found; `None` where the kind has none.
+    /// Measured value; `None` if the kind has no value.
     pub value: Option<f32>,
-    /// Limit of the value; `None` where there is none.
+    /// Limit of the value; `None` if the kind has no limit.
     pub limit: Option<f32>,
-    /// Unit of value and limit; empty where they have none.
+    /// Unit of value and limit; empty if they have no unit.
     pub unit: &'static str,
     /// Cause in a sentence without a full stop.
     pub text: String,
-    /// What removes the cause, without commands.
+    /// Remedy for the cause, without commands.
     pub remedy: String,
     /// Time since the held stop began, s.
     pub ago_s: f64,
 }
 
 impl HeldStop {
-    /// That of a cause that was found `ago_ms` ago.
+    /// Creates the held stop of a cause that was found `ago_ms` ago.
     pub fn new(cause: &StopCause, ago_ms: u32) -> Self {
         let (value, limit) = figures(cause);
         Self {
@@ -61,27 +61,27 @@ impl HeldStop {
         }
     }
 
-    /// The last one that a controller tells of.
+    /// Returns the last held stop that a controller reports.
     pub fn last(reactions: &Reactions) -> Option<Self> {
         reactions.stop.as_ref().map(|(cause, ago_ms)| Self::new(cause, *ago_ms))
     }
 
-    /// The cause and its age in one line: `joint 2 was pushed: …; 12 s ago`.
+    /// Returns the cause and its age in one line: `joint 2 was pushed: …; 12 s ago`.
     pub fn line(&self) -> String {
         format!("{}; {} ago", self.text, age(self.ago_s))
     }
 }
 
-/// What a controller does about what it has found.
+/// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// The last held stop; `None`: there was none since the start, or since the occurred errors were cleared.
+    /// Last held stop; `None`: no held stop since the start, or since the occurred errors were cleared.
     pub last_held_stop: Option<HeldStop>,
-    /// Joints from 1 that yield or lower their loads.
+    /// Joints, from 1, that yield or lower their loads.
     pub yields: Vec<u8>,
-    /// Joints from 1 whose encoder has jumped since their drives were configured.
+    /// Joints, from 1, whose encoder has jumped since their drives were configured.
     pub encoder_jumped: Vec<u8>,
-    /// Rate of path time, path seconds per second; 0 where no trajectory is executed.
+    /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
     pub path_rate: f32,
     /// Time for which this run has been held back because a torque was at its limit, s.
     pub held_back_s: f64,
@@ -101,23 +101,23 @@ impl From<&Reactions> for Reacting {
 }
 
 impl Reacting {
-    /// What a controller tells of itself; `None` where it does not report it.
+    /// Returns the reactions that a controller reports; `None` if the controller does not report them.
     pub fn of(info: &Info) -> Option<Self> {
         info.reactions.as_ref().map(Self::from)
     }
 }
 
-/// The joints of a mask with a bit for each.
+/// Returns the joints of a mask with one bit for each joint.
 pub fn joints(mask: u8) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| mask & 1 << joint.index() != 0).collect()
 }
 
-/// The joint that a cause was found at first.
+/// Returns the first joint with the cause.
 pub fn joint(cause: &StopCause) -> Option<Joint> {
     Joint::from_number(cause.joint.into())
 }
 
-/// Value and limit of a cause, as far as its kind has them.
+/// Returns value and limit of a cause, if its kind has them.
 pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     let known = match cause.kind {
         StopKind::Approach | StopKind::Gains => (false, false),
@@ -135,22 +135,22 @@ pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     (known.0.then_some(cause.value), (known.1 && cause.limit != 0.0).then_some(cause.limit))
 }
 
-/// The page about a kind.
+/// Returns the page about a kind.
 pub fn page(kind: StopKind) -> Option<&'static Page> {
     explain::pages().find(|page| page.family == explain::Family::Stop && page.code == u32::from(kind as u8))
 }
 
-/// What removes a cause, without commands and without a full stop: part of a sentence.
+/// Returns the remedy for a cause as part of a sentence, without commands and without a full stop.
 pub fn remedy(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.remedy))
 }
 
-/// What usually is behind a cause, without a full stop: part of a sentence.
+/// Returns the usual reason for a cause as part of a sentence, without a full stop.
 pub fn usual_cause(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.cause))
 }
 
-/// A sentence as part of another one.
+/// Turns a sentence into a part of another sentence.
 fn clause(sentence: &str) -> String {
     let mut letters = sentence.trim_end_matches('.').chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
@@ -167,7 +167,7 @@ pub fn next_step(status: &Status, cause: Option<&StopCause>) -> Next {
     }
 }
 
-/// A time in the unit that fits.
+/// Formats a time in a suitable unit.
 pub fn age(s: f64) -> String {
     match s.max(0.0) as u64 {
         s @ 0..120 => format!("{s} s"),
@@ -201,7 +201,7 @@ mod tests {
         assert_eq!(figures(&scale), (Some(2.0), None));
     }
 
-    /// Each kind says something of its own, and every one has a page.
+    /// Each kind has its own remedy and a page.
     #[test]
     fn j69_each_kind_has_its_own_remedy() {
         let remedies = StopKind::ALL.map(remedy);

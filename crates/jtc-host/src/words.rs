@@ -1,4 +1,4 @@
-//! The controller's numbers in words.
+//! Text for the controller's codes and bits.
 
 use host_kit::{Action, Next, next};
 pub use jtc_bus::GRIPPER;
@@ -7,15 +7,15 @@ use jtc_wire::{
     ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, StopCause, can_flag, error,
 };
 
-/// Velocities of a joint that is at rest, rad/s (J-36).
+/// Velocity range of a joint at rest, rad/s (J-36).
 const AT_REST_RAD_S: std::ops::RangeInclusive<f64> = -0.02..=0.02;
 
-/// Name of a node on the joint bus.
+/// Returns the name of a node on the joint bus.
 pub fn node(n: usize) -> String {
     Joint::from_index(n).map_or_else(|| "gripper".into(), |joint| joint.to_string())
 }
 
-/// A request, as people name it.
+/// Returns the name of a request for the user.
 pub fn request(request: FrameType) -> &'static str {
     match request {
         FrameType::ClearCurrentErrors => "clearing the current errors",
@@ -49,7 +49,7 @@ pub fn request(request: FrameType) -> &'static str {
     }
 }
 
-/// What became of a frame's data.
+/// Returns the text for the data status of a frame.
 pub fn data_status(code: DataStatus) -> &'static str {
     match code {
         DataStatus::Idle => "nothing",
@@ -59,7 +59,7 @@ pub fn data_status(code: DataStatus) -> &'static str {
     }
 }
 
-/// How a frame arrived.
+/// Returns the text for the reception status of a frame.
 pub fn frame_status(code: FrameStatus) -> &'static str {
     match code {
         FrameStatus::Idle => "nothing",
@@ -72,32 +72,32 @@ fn list(bits: u32, names: &[&'static str]) -> Vec<&'static str> {
     names.iter().enumerate().filter(|(i, n)| bits >> i & 1 == 1 && !n.is_empty()).map(|(_, n)| *n).collect()
 }
 
-/// Error word of the controller.
+/// Returns the texts for an error word of the controller.
 pub fn errors(word: u16) -> Vec<&'static str> {
     list(u32::from(word), &jtc_wire::words::JTC_ERRORS)
 }
 
-/// Internal error word of a joint.
+/// Returns the texts for an internal error word of a joint.
 pub fn joint_errors(word: u16) -> Vec<&'static str> {
     list(u32::from(word), &jtc_wire::words::JOINT_INTERNAL)
 }
 
-/// Fault byte of a drive's motor control.
+/// Returns the texts for a fault byte of a drive's motor control.
 pub fn motor_faults(byte: u8) -> Vec<&'static str> {
     list(u32::from(byte), &jtc_wire::words::MC_FAULTS)
 }
 
-/// Error byte of a drive.
+/// Returns the texts for an error byte of a drive.
 pub fn node_errors(byte: u8) -> Vec<&'static str> {
     list(u32::from(byte), &jtc_wire::words::NODE_ERRORS)
 }
 
-/// Warning byte of a node.
+/// Returns the texts for a warning byte of a node.
 pub fn node_warnings(byte: u8) -> Vec<&'static str> {
     list(u32::from(byte), &jtc_wire::words::NODE_WARNINGS)
 }
 
-/// CAN flags.
+/// Returns the texts for CAN flags.
 pub fn can_flags(word: u32) -> Vec<String> {
     let mut all = Vec::new();
     if word & can_flag::TRANSMIT_TIMEOUT != 0 {
@@ -108,70 +108,70 @@ pub fn can_flags(word: u32) -> Vec<String> {
     all
 }
 
-/// Whether a node does not answer; joints are nodes 0..5, the gripper is node 6.
+/// Returns `true` if a node does not answer; joints are nodes 0..5, the gripper is node 6.
 pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
 }
 
-/// Whether the arm is under torque.
+/// Returns `true` if the arm is under torque.
 pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }
 
-/// Whether joint `j` (from 0) is set absent: under torque no other is in Start (J-20, J-53).
+/// Returns `true` if joint `j` (from 0) is set absent: under torque no other joint is in Start (J-20, J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
     has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
 
-/// The joints that are set absent, where torque is on.
+/// Returns the joints that are set absent, if torque is on.
 pub fn absent(s: &Status) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| is_absent(s, joint.index())).collect()
 }
 
-/// Joints by their names, with commas.
+/// Returns the names of joints, separated by commas.
 pub fn joints(joints: &[Joint]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Every joint that is there has its drive enabled.
+/// Returns `true` if every joint except absent ones has its drive enabled.
 pub fn is_held(s: &Status) -> bool {
     let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;
     Joint::ALL.iter().all(|joint| enabled(joint) || is_absent(s, joint.index()))
 }
 
-/// The joint that moves fastest, where one moves faster than an arm at rest does, with its velocity, rad/s.
+/// Returns the fastest joint and its velocity, rad/s, if the joint is faster than an arm at rest.
 pub fn moving_joint(s: &Status) -> Option<(Joint, f64)> {
     let fastest = Joint::ALL.into_iter().map(|joint| (joint, f64::from(s.joints[joint.index()].velocity)));
     fastest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|(_, speed)| !AT_REST_RAD_S.contains(speed))
 }
 
-/// Whether the controller still waits for a node to be ready.
+/// Returns `true` if the controller still waits for a node to be ready.
 pub fn is_awaited(s: &Status, node: usize) -> bool {
     nodes_in(s.node_init).any(|n| n == node)
 }
 
-/// What the controller still waits for in Init: friction, PID, arm model.
+/// Returns the parameters for which the controller waits in Init: friction, PID, arm model.
 pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
     list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
 
-/// The nodes of a mask with a bit for each, node 0 first.
+/// Returns the nodes of a mask with a bit for each, node 0 first.
 pub fn nodes_in(mask: u8) -> impl Iterator<Item = usize> {
     (0..NODES).filter(move |n| mask >> n & 1 == 1)
 }
 
-/// Their names.
+/// Returns the names of the nodes of a mask.
 pub fn node_names(mask: u8) -> Vec<String> {
     nodes_in(mask).map(node).collect()
 }
 
-/// All current errors of a status, the most particular ones first: nodes that do not answer, the safety input, what each joint and
-/// the gripper report. The controller's other error bits follow from these.
+/// Returns all current errors of a status, the most specific ones first: nodes that do not answer, the safety input,
+/// errors of each joint and the gripper. The controller's other error bits follow from these.
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // The drive holds its torque off. Before it is configured it sets the bit, too, which means nothing then.
+        // The drive switches its torque off. An unconfigured drive also sets this bit; ignore it until the drive is configured.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
@@ -184,23 +184,23 @@ pub fn causes(s: &Status) -> Vec<String> {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    // The bit of a held stop says no more than its joints do.
+    // In a held stop the bit adds no information to the errors of the joints.
     let own = if s.is_held_stop() { 0 } else { s.errors & !error::EMERGENCY_INPUT };
     all.extend(errors(own).into_iter().map(String::from));
     all
 }
 
-/// Causes of a held stop, in one line.
+/// Returns the causes of a held stop in one line.
 pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
 }
 
-/// Why the arm is held: what the device has found, or else the causes that its status has.
+/// Returns the reason why the arm is held: the cause that the device found, else the causes in its status.
 pub fn why_held(s: &Status, cause: Option<&StopCause>) -> String {
     cause.map_or_else(|| held_stop(s), ToString::to_string)
 }
 
-/// What nodes warn of and is no error.
+/// Returns the warnings of nodes that are not errors.
 pub fn warnings(s: &Status) -> Vec<String> {
     let joints = s.joints.iter().map(|joint| joint.warnings).chain(s.gripper.map(|g| g.warnings)).enumerate();
     let words = joints.flat_map(|(n, byte)| {
@@ -210,7 +210,7 @@ pub fn warnings(s: &Status) -> Vec<String> {
     words.collect()
 }
 
-/// All current errors of a status in one line.
+/// Returns all current errors of a status in one line.
 pub fn errors_line(s: &Status) -> String {
     let all = causes(s);
     if all.is_empty() {
@@ -222,7 +222,7 @@ pub fn errors_line(s: &Status) -> String {
     }
 }
 
-/// Errors of the joints that have occurred since those of `before`, in one line.
+/// Returns the joint errors that have occurred since `before`, in one line.
 pub fn occurred_since(before: &[u16; 6], s: &Status) -> String {
     let joints = Joint::ALL.into_iter().zip(s.joints.iter().zip(before));
     let words = joints.flat_map(|(number, (joint, before))| {
@@ -232,7 +232,7 @@ pub fn occurred_since(before: &[u16; 6], s: &Status) -> String {
     words.collect::<Vec<_>>().join(", ")
 }
 
-/// Why the controller is not further than it is.
+/// Returns the reason why the controller does not advance to the next state.
 pub fn waiting_for(s: &Status) -> String {
     let head = format!("state {}, trajectory {}", s.state, s.trajectory);
     let mut missing: Vec<String> =
@@ -260,11 +260,13 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        next!("{}, or `--defaults` for the arm that is built into the controller", RecoverWithArm)
+        next!("{}, or ", RecoverWithArm)
+            .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
+            .then(" for the arm that is built into the controller")
     } else if s.errors != 0 || s.state == ControllerState::Error {
         Action::Recover.into()
     } else if s.jtc_init != 0 {
-        next!("{} or {}", ParamsPush, UseDefaults)
+        next!("{}, or {} if the arm is the one that is built into the controller", ParamsPush, UseDefaults)
     } else if s.is_coming_up() && s.node_init != 0 {
         next!("{} looks at the nodes that are not ready", Doctor)
     } else if s.state == ControllerState::Teaching {
@@ -285,7 +287,7 @@ pub fn next_step(s: &Status) -> Next {
 mod tests {
     use super::*;
 
-    /// What broke stands before what follows from it, and a drive that is not configured yet has no safety line to be active.
+    /// The cause precedes its consequences, and the safety line of an unconfigured drive does not count as active.
     #[test]
     fn the_most_particular_cause_stands_first() {
         let mut s = Status {

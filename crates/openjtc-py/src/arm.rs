@@ -1,4 +1,4 @@
-//! An arm: kinematics, masses, limits, gains, friction, named poses.
+//! Arm: kinematics, masses, limits, gains, friction, named poses.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,16 +10,16 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::array;
-use crate::error::Failure;
+use crate::error::{Failure, in_python};
 
-/// An arm, as a file describes it. It does not change.
+/// An arm as described by a file. The object does not change.
 #[pyclass(frozen, module = "openjtc")]
 pub struct Arm {
     pub inner: Arc<HostArm>,
 }
 
 impl Arm {
-    /// As Python has it.
+    /// Wraps an arm for Python.
     pub fn of(arm: HostArm) -> Self {
         Self { inner: Arc::new(arm) }
     }
@@ -27,26 +27,26 @@ impl Arm {
 
 #[pymethods]
 impl Arm {
-    /// From a TOML or URDF file, recognised by its content.
+    /// Loads a TOML or URDF file, recognised by its content.
     #[staticmethod]
     fn load(path: PathBuf) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::load(&path)?))
     }
 
-    /// From the text of such a file.
+    /// Parses the text of a TOML or URDF file.
     #[staticmethod]
     fn parse(text: &str) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::parse(text)?))
     }
 
-    /// From a robot description; what it lacks is proposed and marked.
+    /// Imports a robot description. Missing data is proposed and marked.
     #[staticmethod]
     #[pyo3(signature = (path, joints=None, tip=None))]
     fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::import(&path, &ArmChoice { joints, tip })?))
     }
 
-    /// The arm that is built in.
+    /// Returns the built-in arm.
     #[staticmethod]
     fn avena() -> Self {
         Self::of(HostArm::avena())
@@ -77,7 +77,7 @@ impl Arm {
         Ok(PyArray1::from_slice(py, &position))
     }
 
-    /// The limits that count, by their names, each (6,): `position_min` and `position_max` (rad), `velocity_max` (rad/s), `acceleration_max` (rad/s²),
+    /// Effective limits by name, each (6,): `position_min` and `position_max` (rad), `velocity_max` (rad/s), `acceleration_max` (rad/s²),
     /// `torque_max` (N·m).
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -97,15 +97,15 @@ impl Arm {
         Ok(limits)
     }
 
-    /// Gains (6, 3): Kp (N·m/rad), Ki (N·m/(rad·s)), Kd (N·m·s/rad); `None` where the file does not give them.
+    /// Gains (6, 3): Kp (N·m/rad), Ki (N·m/(rad·s)), Kd (N·m·s/rad); `None` if the file has no gains.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let gains = self.inner.pid?;
         Some(array::wide(py, &gains.map(|g| [g.kp, g.ki, g.kd])))
     }
 
-    /// Friction polynomials (6, 6), one row a joint: c0 (N·m), c1 (N·m·s/rad), c2 (N·m·s²/rad²), c3 (N·m·s³/rad³), c4 (1/K), c5 (°C); `None` where the
-    /// file does not give them.
+    /// Friction polynomials (6, 6), one row per joint: c0 (N·m), c1 (N·m·s/rad), c2 (N·m·s²/rad²), c3 (N·m·s³/rad³), c4 (1/K), c5 (°C);
+    /// `None` if the file has no friction.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.inner.polynomial.as_ref().map(|all| array::wide(py, all))
@@ -129,33 +129,35 @@ impl Arm {
         PyArray1::from_slice(py, &self.inner.config().gravity)
     }
 
-    /// What was not carried over from its file, filled in or proposed.
+    /// Notes on data of the file that was not used, filled in or proposed.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.inner.warnings.iter().map(ToString::to_string).collect()
     }
 
-    /// What `jtc arm check` finds: severity, what, why, next.
+    /// Returns the findings of `jtc arm check`: severity, what, why, next.
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let list = PyList::empty(py);
         for found in self.inner.check().findings {
             let value = serde_json::to_value(&found).unwrap_or_default();
-            list.append(crate::json::to_python(py, &value)?)?;
+            let values = crate::json::to_python(py, &value)?;
+            values.set_item("next", in_python(&found.finding.next))?;
+            list.append(values)?;
         }
         Ok(list)
     }
 
-    /// The arm file.
+    /// Returns the arm as an arm file, TOML.
     fn to_toml(&self) -> String {
         self.inner.to_toml()
     }
 
-    /// A robot description of it.
+    /// Returns the arm as a robot description, URDF.
     fn to_urdf(&self) -> String {
         self.inner.to_urdf()
     }
 
-    /// A pose is saved in an arm file, whose comments and order stay.
+    /// Saves a pose in an arm file, and keeps the comments and the order of the file.
     #[staticmethod]
     #[pyo3(signature = (path, name, position, force=false))]
     fn save_pose(path: PathBuf, name: &str, position: &Bound<'_, PyAny>, force: bool) -> Result<(), Failure> {
@@ -168,7 +170,7 @@ impl Arm {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Arm>()
 }

@@ -1,4 +1,4 @@
-//! Trajectories that are made here: through waypoints, as fast as the limits allow.
+//! Planning of trajectories through waypoints, as fast as the limits allow.
 use std::path::Path;
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use axum::{Extension, Json};
 use jtc_core::Config;
 use jtc_host::check::{JointFigures, TorqueMargin};
 use jtc_host::error::Facts;
-use jtc_host::plan::{Bound, COLD, MARGIN_PCT, Planned, Planner, Way, WayOptions};
+use jtc_host::plan::{Bound, COLD, MARGIN_PCT, PlanError, Planned, Planner, Way, WayOptions};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_host::{Arm, ErrorKind, Session};
 use jtc_wire::Joint;
@@ -23,64 +23,68 @@ use super::{Agent, Caller};
 use crate::jobs::{NUMBER_MAX, StoreError};
 use crate::owner::ClientPort;
 
-/// Most waypoints: a plan through more of them takes longer than a request may.
+/// Largest number of waypoints; a plan through more takes longer than a request may.
 const WAYPOINTS_MAX: usize = 500;
-/// Bearing temperatures that there are, °C.
+/// Possible bearing temperatures, °C.
 const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
 
-/// Waypoints, and how the arm is to go through them.
+/// Waypoints, and options of the path through them.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanRequest {
-    /// Waypoints in a form that `jtc plan` takes: CSV with the columns q1 to q6, or x, y, z with an orientation, or pose; or JSON. At most 500.
+    /// Waypoints in a format that `jtc plan` accepts: CSV with the columns q1 to q6, or x, y, z with an orientation, or
+    /// pose; or JSON. At most 500.
     pub waypoints: String,
-    /// Their numbers are degrees.
+    /// `true` if the angles are in degrees.
     #[serde(default)]
     pub degrees: bool,
-    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each.
+    /// Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest; 0: the arm
+    /// stops at each waypoint.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_rad: f64,
-    /// The flange keeps to a straight line on each leg of which the waypoints do not say how the arm moves.
+    /// `true`: the flange moves on a straight line on each leg for which the waypoints do not specify the type of path.
     #[serde(default)]
     pub line: bool,
-    /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there.
+    /// Distance from a waypoint within which the corner between two lines or arcs may be rounded, m; 0: the arm stops
+    /// there.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_m: f64,
-    /// % of what the limits allow.
+    /// Speed, % of the limits.
     #[serde(default = "hundred")]
     #[schema(minimum = 1, maximum = 100)]
     pub speed_percent: f64,
-    /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load.
+    /// `true`: the acceleration may change within 20 ms instead of 100 ms, which is faster and harder on gears and
+    /// load.
     #[serde(default)]
     pub no_jerk_limit: bool,
-    /// Torque to leave for masses and friction that the model does not know, % of each limit.
+    /// Torque margin for masses and friction that the model does not know, % of each limit.
     #[serde(default = "margin")]
     #[schema(minimum = 0, maximum = 50)]
     pub margin_percent: f64,
-    /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque.
+    /// Lowest bearing temperature of a run, °C; cold bearings need more torque.
     #[serde(default = "cold")]
     #[schema(minimum = -40, maximum = 120)]
     pub temperature_c: f64,
-    /// What the arm will carry; missing: what the controller computes with now.
+    /// Payload of the motion; missing: the payload that the controller uses now.
     #[serde(default)]
     pub payload: Option<PayloadObject>,
-    /// Keep it as a trajectory, for `POST /api/runs`.
+    /// Place to keep the trajectory for `POST /api/runs`.
     #[serde(default)]
     pub keep: Option<KeepRequest>,
 }
 
-/// Where a plan is kept.
+/// Place for a planned trajectory.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeepRequest {
-    /// Its number, in place of what has it.
+    /// Number of the trajectory; it replaces a trajectory with the same number.
     #[schema(minimum = 1, maximum = 99)]
     pub number: u16,
-    /// What people are to call it: the first 64 characters.
+    /// Name for people: the first 64 characters.
     pub name: String,
-    /// In place of nothing: where the number has a trajectory already the plan is refused, and nothing is replaced.
+    /// `true`: refuse the plan if the number is taken, and replace nothing.
     #[serde(default)]
     pub new: bool,
 }
@@ -97,48 +101,49 @@ pub(super) fn margin() -> f64 {
     MARGIN_PCT
 }
 
-/// A motion that passed the check.
+/// Motion that passed the check.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PlanObject {
-    /// s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// ms between two points.
+    /// Time between two points, ms.
     pub step_ms: u16,
-    /// Waypoints.
+    /// Number of waypoints.
     pub waypoints: usize,
-    /// When the motion is nearest to each waypoint, s.
+    /// Time at which the motion is nearest to each waypoint, s.
     pub waypoint_times_s: Vec<f64>,
-    /// What binds when, in the order of time.
+    /// Limiting constraints, in the order of time.
     pub binding: Vec<BoundObject>,
-    /// Figures of each joint, from the base.
+    /// Results for each joint, from the base.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<JointPlan>,
-    /// The smallest torque margin.
+    /// Smallest torque margin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<MarginObject>,
-    /// What was changed or is to be known, in words.
+    /// Changes and hints in words.
     pub notes: Vec<String>,
-    /// What does not forbid to run it; a torque margin below 10 % is among it.
+    /// Warnings, which do not prevent a run; a torque margin below 10 % is one of them.
     pub warnings: Vec<String>,
-    /// The trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`.
+    /// Trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`.
     pub text: String,
-    /// As what it is kept.
+    /// Kept trajectory, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<TrajectoryObject>,
 }
 
-/// Which limit a motion uses up, from when to when.
+/// Limiting constraint of a motion during an interval.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct BoundObject {
-    /// s from the start.
+    /// Start of the interval, s from the start.
     pub from_s: f64,
-    /// s from the start.
+    /// End of the interval, s from the start.
     pub to_s: f64,
-    /// Which joint, 1 to 6 from the base.
+    /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
-    /// `velocity`, `acceleration`, `jerk`, `torque`, `stop` (room to stop in time), `friction` (its table) or `given time`.
+    /// Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (margin to stop in time), `friction` (its table) or
+    /// `given time`.
     pub limit: String,
 }
 
@@ -149,20 +154,20 @@ impl From<&Bound> for BoundObject {
     }
 }
 
-/// The smallest share of a torque limit that a motion leaves unused, and where.
+/// Smallest unused part of a torque limit in a motion, and its place.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct MarginObject {
-    /// What is left, % of the limit.
+    /// Margin, % of the limit.
     pub percent: f64,
-    /// Joint that has the least left, 1 to 6 from the base.
+    /// Number of the joint with the smallest margin, 1 to 6 from the base.
     pub joint: u8,
-    /// When, s from the start.
+    /// Time, s from the start.
     pub time_s: f64,
-    /// Torque by the model there, N·m.
+    /// Torque of the model at that time, N·m.
     pub torque_nm: f64,
     /// Torque limit, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature of its friction, °C.
+    /// Bearing temperature for which the friction was computed, °C.
     pub temperature_c: f64,
 }
 
@@ -173,10 +178,10 @@ impl From<TorqueMargin> for MarginObject {
     }
 }
 
-/// Figures of a joint.
+/// Results for a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JointPlan {
-    /// Which, 1 to 6 from the base.
+    /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
     /// Lowest position, rad.
     pub position_min_rad: f64,
@@ -204,7 +209,9 @@ impl JointPlan {
     }
 }
 
-/// Makes a trajectory through waypoints for the arm of the controller, as fast as its limits allow. Nothing moves. One at a time.
+/// Plans a trajectory through waypoints for the controller's arm, as fast as its limits allow.
+///
+/// The arm does not move. The agent makes a single plan at a time.
 #[utoipa::path(
     post,
     path = "/api/plans",
@@ -217,11 +224,11 @@ pub(super) async fn plan(
     Extension(caller): Extension<Caller>,
     request: Request,
 ) -> Result<Json<PlanObject>, Problem> {
-    // It takes the computer's time, and may change what others run.
+    // A plan needs computing time, and may change trajectories that other clients run.
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
-        // A plan takes its time.
+        // Checked before the plan, which takes time.
         agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
@@ -232,12 +239,12 @@ pub(super) async fn plan(
     let asked = move |session: &mut Session<ClientPort>| {
         let device = session.device_config()?;
         let mut arm = if session.has_extensions() { session.device_arm()? } else { own };
-        // No controller has them.
+        // Controllers have no named poses.
         arm.poses = poses;
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;
-    // It goes with whoever waits for the plan.
+    // Dropped when the client that waits for the plan disconnects.
     let waits = Arc::new(());
     let waited_for = Arc::downgrade(&waits);
     let plan = blocking(move || {
@@ -262,12 +269,13 @@ pub(super) async fn plan(
     Ok(Json(plan))
 }
 
-/// Nobody waits for it any more: whoever asked may have put something else under its number since.
+/// Returns the error for a plan whose client no longer waits: that client may have stored another trajectory under the
+/// number since.
 fn abandoned() -> Problem {
     Problem::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
 }
 
-/// The waypoints of a request that can be planned.
+/// Returns the waypoints of a request if they can be planned.
 fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Problem> {
     let refused = |what: &str, message: String, value: f64, limit: f64| {
         let facts = Facts::beyond(value, limit);
@@ -300,7 +308,7 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Probl
     Ok((request, file))
 }
 
-/// The motion, with what is to be known of it.
+/// Plans the motion and collects its results.
 fn planned(
     request: &PlanRequest,
     file: &WaypointFile,
@@ -311,6 +319,10 @@ fn planned(
     let way = Way::of(file, arm, options).map_err(|error| {
         let object = Problem::of(&error);
         match &error {
+            // A blend of the API is in rad or m, also if the positions are degrees.
+            WaypointError::Route(e @ PlanError::Blend { .. }) => object
+                .message(file.located(e))
+                .next("5° is 0.0873 rad in blend_rad, 20 mm is 0.02 m in blend_m"),
             WaypointError::Route(e) => object.message(file.located(e)),
             _ => object,
         }
@@ -348,7 +360,7 @@ fn planned(
     Ok(planned)
 }
 
-/// The answer, with the trajectory kept where that was asked for.
+/// Returns the answer; keeps the trajectory if that was requested.
 fn kept(
     agent: &Agent,
     request: &PlanRequest,

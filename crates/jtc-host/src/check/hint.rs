@@ -1,4 +1,4 @@
-//! What helps after a verdict: the next command, in words.
+//! Advice after a verdict: the next command, in words.
 
 use host_kit::{Action, Next};
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
@@ -7,8 +7,9 @@ use super::kind::ProblemKind;
 use super::verdict::{Suspicion, Verdict};
 
 impl Verdict {
-    /// The speed (% of the file's own) at which nothing would be too fast any more; `None` where speed is not what is wrong.
-    /// It is estimated from the worst values; [`plan::at_speed`](crate::plan::at_speed) and another check give the exact one.
+    /// Returns the speed (% of the file's own speed) at which no value is too fast; `None` if a lower speed does not help. The
+    /// speed is estimated from the worst values; [`plan::at_speed`](crate::plan::at_speed) and another check give the exact
+    /// speed.
     pub fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;
@@ -16,7 +17,7 @@ impl Verdict {
             let over = (p.value / p.limit).abs();
             speed = speed.min(match p.kind {
                 Velocity => 0.95 / over,
-                // Seen at a place between two points, which need not be the fastest one.
+                // The place was found between two points, and is not necessarily the fastest one.
                 PositionSpeed => {
                     let peak = p
                         .joint
@@ -29,22 +30,22 @@ impl Verdict {
                 _ => return None,
             });
         }
-        // Slower than 1 % is no motion any more.
+        // Speeds below 1 % do not count as motion.
         (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
-    /// The next command or act that helps, with `FILE` for the trajectory's file.
+    /// Returns the next command or action that helps, with `FILE` for the trajectory's file.
     pub fn hint(&self) -> Next {
         self.hint_for("FILE", 100.0)
     }
 
-    /// The next command or act that helps for a trajectory that was checked at `speed_pct` of its own speed. `file` is its name as it
-    /// is typed, with the options that belong to it.
+    /// Returns the next command or action that helps for a trajectory that was checked at `speed_pct` of its own speed. `file` is
+    /// the file name as typed, with its options.
     pub fn hint_for(&self, file: &str, speed_pct: f64) -> Next {
         self.hint_with(file, speed_pct, self.slower(speed_pct))
     }
 
-    /// As [`Verdict::hint_for`], where it is known which speed (% of the file's own) passes the check, if any does.
+    /// Like [`Verdict::hint_for`], with the speed (% of the file's own speed) that is known to pass the check, if there is one.
     pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> Next {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);
@@ -85,8 +86,9 @@ impl Verdict {
             } else {
                 ""
             };
-            let check = Next::typed(Action::TrajCheck, format!("jtc traj check {file} --speed {percent}"));
-            Next::from(format!("`--speed PCT` runs it slower{load}: ")).then(check)
+            let command = format!("jtc traj run {file} --speed {percent}");
+            Next::from(format!("run it at {percent} % of its speed{load}: "))
+                .then(Next::typed(Action::TrajRunSlower, command))
         } else {
             format!("correct the file; `jtc traj info {file}` shows its figures").into()
         }

@@ -7,19 +7,19 @@ use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::file::FileError;
 
-/// Why a trajectory may not be run; nothing was sent.
+/// Reason why a trajectory may not run; no frame was sent.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckError {
     /// The check found problems.
     #[error("{0}")]
     Refused(Box<Verdict>),
-    /// The arm has values that no frame carries and that the controller uses otherwise (J-55).
+    /// The arm has values that no frame carries, and the controller uses other values (J-55).
     #[error("{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
     DeviceLimits {
         /// Name of the arm.
         arm: String,
-        /// What differs.
+        /// Values that differ.
         differences: Vec<Difference>,
     },
     /// The numbers of the arm are not physical.

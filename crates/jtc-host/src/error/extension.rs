@@ -1,4 +1,4 @@
-//! Errors of reading, giving and keeping an arm as one thing.
+//! Errors of reading, sending and storing a whole arm.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_core::settings::SettingError;
@@ -7,25 +7,25 @@ use jtc_wire::{Code, ControllerState, Joint, StoreState, TrajectoryState};
 use super::facts;
 use crate::arm::Difference;
 
-/// Why an arm could not be read from a device or kept by it.
+/// Reason why an arm could not be read from a device or stored in it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtensionError {
-    /// What was read is not one arm.
+    /// The arm changed while it was read, so the parts do not belong to one arm.
     #[error("the arm of the device changed while it was read")]
     Changed,
-    /// What the device has is no arm that this program knows.
+    /// The device does not have an arm that this program can read.
     #[error("the arm of the device: {why}")]
     NoArm {
-        /// What is wrong with it.
+        /// Fault of the device's arm.
         why: String,
     },
-    /// An arm of which parts are missing.
+    /// The arm file is incomplete.
     #[error("{arm}: no {} in the file", missing.join(", no "))]
     Incomplete {
         /// Name of the arm.
         arm: String,
-        /// What a controller needs, and the file does not give.
+        /// Parts that a controller needs and the file does not give.
         missing: Vec<&'static str>,
     },
     /// The device has another arm than the file gives (J-55).
@@ -36,54 +36,54 @@ pub enum ExtensionError {
         /// Every value that differs.
         differences: Vec<Difference>,
     },
-    /// Storing changes what the arm is held by; it is for an arm without torque.
+    /// Storing needs an arm without torque, because it changes the parameters that hold the arm.
     #[error("the arm cannot be stored in {state}; nothing was sent")]
     Powered {
-        /// What the device is in.
+        /// State of the device.
         state: Code<ControllerState>,
     },
-    /// Settings that no controller takes, or not beside those that this one has (J-53).
+    /// The settings are not valid for any controller, or not in combination with the settings of this one (J-53).
     #[error("{0}")]
     Setting(#[source] SettingError),
-    /// A payload that is no body, or none that a controller takes (J-60).
+    /// The payload is not a valid body, or outside the range of the controller (J-60).
     #[error("{why}")]
     NoBody {
-        /// What is wrong with it.
+        /// Fault of the payload.
         why: String,
     },
-    /// A payload that a joint cannot hold where the arm stands (J-60).
+    /// A joint cannot hold the payload in the present pose (J-60).
     #[error(
         "a payload of {mass} kg takes {torque:.1} N·m of {joint} where the arm stands, and its limit is {limit} N·m"
     )]
     TooHeavy {
         /// Mass of the payload, kg.
         mass: f64,
-        /// The joint that lacks most.
+        /// Joint that lacks the most torque.
         joint: Joint,
-        /// What it would have to hold, N·m.
+        /// Torque to hold the payload, N·m.
         torque: f64,
-        /// Its limit, N·m.
+        /// Torque limit of the joint, N·m.
         limit: f64,
     },
-    /// A payload is not changed while a motion runs (J-60).
+    /// The payload cannot change while a motion runs (J-60).
     #[error(
         "the payload is not changed while the arm moves by command (state {state}, trajectory {trajectory})"
     )]
     PayloadInMotion {
-        /// State of the controller then.
+        /// State of the controller at that time.
         state: Code<ControllerState>,
-        /// Trajectory execution state then.
+        /// Trajectory execution state at that time.
         trajectory: Code<TrajectoryState>,
     },
-    /// The memory of the device does not have it.
+    /// The memory of the device does not contain the arm.
     #[error("the arm was not stored: {state}")]
     NotStored {
-        /// What the device reports of its memory.
+        /// State of the memory as reported by the device.
         state: StoreState,
     },
 }
 
-/// The first of them; the others are counted.
+/// Formats the first difference and the number of the others.
 fn listed(differences: &[Difference]) -> String {
     match differences {
         [] => "it reports no difference".into(),
@@ -119,7 +119,7 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "powered",
                 next!(
-                    "an arm is stored while it has no torque: {} (an arm without brakes falls), then push again",
+                    "an arm is stored while it has no torque: {}, then push again; an arm without brakes falls",
                     Disable
                 ),
             ),
@@ -138,7 +138,7 @@ impl Diagnose for ExtensionError {
                 "too-heavy",
                 next!(
                     "nothing was changed. Is the mass in kg and the centre of mass in m, along the axes of the flange? Else move the \
-                     arm to a pose that takes less ({}), or take less on",
+                     arm to a pose that takes less, by {}, or take less on",
                     Jog
                 ),
             ),
@@ -155,8 +155,7 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "not-stored",
                 next!(
-                    "the arm is in use until the device is switched off; {} shows its memory, {} tries again",
-                    Info,
+                    "the arm is in use until the device is switched off; `jtc info` shows its memory, {} tries again",
                     ArmStore
                 ),
             ),

@@ -1,4 +1,4 @@
-//! Where errors are, and by how much.
+//! Facts of errors: joint, value, limit and cause.
 
 use host_kit::{Facts, HeldStopFacts};
 use jtc_core::ConfigError;
@@ -11,22 +11,22 @@ use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
 use crate::{explain, held_stop, words};
 
-/// The cause on the page of what a screen shows.
+/// Returns the cause from the explain page for these words.
 fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
 
-/// A value of a joint beyond its limit, with the cause that its kind of problem usually has.
+/// Returns the facts of a value of a joint beyond its limit, with the usual cause for its kind of problem.
 fn problem(joint: Joint, value: f64, limit: f64, kind: ProblemKind) -> Facts {
     Facts { cause: cause(kind.words()), ..Facts::beyond(value, limit).at_joint(joint.number()) }
 }
 
-/// Facts of a joint alone.
+/// Returns facts that name only a joint.
 pub(super) fn of_joint(joint: Joint) -> Facts {
     Facts::default().at_joint(joint.number())
 }
 
-/// Facts of the worst problem that a check has found.
+/// Returns the facts of the worst problem of a check.
 pub(crate) fn of_verdict(verdict: &Verdict) -> Facts {
     let Some(worst) = verdict.refusals().next() else { return Facts::default() };
     Facts {
@@ -37,12 +37,12 @@ pub(crate) fn of_verdict(verdict: &Verdict) -> Facts {
     }
 }
 
-/// The end of a range that a value is beyond.
+/// Returns the limit of a range that a value exceeds.
 fn nearest(value: f64, low: f64, high: f64) -> f64 {
     if value < low { low } else { high }
 }
 
-/// Facts of a motion that cannot be planned.
+/// Returns the facts of a motion that cannot be planned.
 pub(crate) fn of_plan(error: &PlanError) -> Facts {
     use jtc_plan::PlanError as Of;
     match error {
@@ -68,7 +68,7 @@ pub(crate) fn of_plan(error: &PlanError) -> Facts {
     }
 }
 
-/// Facts of a pose that the flange cannot have.
+/// Returns the facts of a pose that the flange cannot reach.
 pub(crate) fn of_pose(error: &PoseError) -> Facts {
     match error {
         PoseError::Waypoint { source, .. } | PoseError::Leg { source, .. } => of_pose(source),
@@ -83,7 +83,7 @@ pub(crate) fn of_pose(error: &PoseError) -> Facts {
     }
 }
 
-/// Facts of a held stop (J-69): what the controller has found, or else what its status shows.
+/// Returns the facts of a held stop (J-69): the cause that the controller reports, else the facts in its status.
 pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts {
     let Some(cause) = cause else { return of_status(status) };
     let stop = HeldStop::new(cause, 0);
@@ -97,7 +97,7 @@ pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts 
     }
 }
 
-/// Facts of a setting that is not taken.
+/// Returns the facts of a setting that is refused.
 pub(super) fn of_setting(error: &SettingError) -> Facts {
     match *error {
         SettingError::Unknown { joint, .. } => {
@@ -124,7 +124,7 @@ pub(super) fn of_setting(error: &SettingError) -> Facts {
     }
 }
 
-/// Facts of the errors that a controller reports.
+/// Returns the facts of the errors that a controller reports.
 pub fn of_status(status: &Status) -> Facts {
     let reports = |joint: &Joint| status.joints[joint.index()].internal != 0;
     Facts {
@@ -154,13 +154,13 @@ mod tests {
         let facts = refused.expect_err("it is over its limit").facts();
         assert_eq!((facts.joint, facts.point), (Some(2), Some(0)));
         assert_eq!(facts.limit, Some(limit));
-        // As a frame carries it.
+        // The value has the resolution of a frame.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }
 
-    /// A place outside the limits, one that takes more torque than there is, and a way there from outside: what planning refuses has the same
-    /// facts as what a check refuses.
+    /// A position outside the limits, a position with too much torque, and a path from outside the limits: a refused plan has the
+    /// same facts as a refused check.
     #[test]
     fn what_planning_refuses_has_joint_value_limit_and_cause() {
         let arm = Arm::avena();

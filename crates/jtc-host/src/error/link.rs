@@ -6,33 +6,33 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Respon
 use crate::port::PortError;
 use crate::words;
 
-/// Why a request got no answer, or not the one that was asked for.
+/// Reason why a request got no answer, or not the expected answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
     /// The port cannot be used.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// No status came.
+    /// No status was received.
     #[error("{port}: no status within {waited_s:.1} s ({})", received(*bytes))]
     NoLink {
         /// Name of the port.
         port: String,
         /// Rate of the line, Bd.
         baud: Option<u32>,
-        /// How long was waited, s.
+        /// Waiting time, s.
         waited_s: f64,
-        /// Bytes that came meanwhile.
+        /// Number of bytes received in that time.
         bytes: u64,
     },
-    /// A request was not confirmed, although statuses come.
+    /// A request was not confirmed, although statuses are received.
     #[error("{}: not confirmed in {tries} tries", words::request(*request))]
     NotConfirmed {
         /// The request.
         request: FrameType,
-        /// How often it was sent.
+        /// Number of times that the request was sent.
         tries: u32,
-        /// The last bad record for it, if one came.
+        /// Last negative response to the request, if there was one.
         last: Option<Response>,
     },
     /// The device has no extensions.
@@ -41,12 +41,12 @@ pub enum LinkError {
         /// The request.
         request: FrameType,
     },
-    /// The request did not get to the controller: the line is shared with others.
+    /// The request did not reach the controller, because the line is shared.
     #[error("{}: not sent: {reason}", words::request(*request))]
     Denied {
         /// The request.
         request: FrameType,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// The controller refused a request.
@@ -54,11 +54,11 @@ pub enum LinkError {
     Refused {
         /// The request.
         request: FrameType,
-        /// Why.
+        /// Reason.
         code: DataStatus,
-        /// State of the controller then.
+        /// State of the controller at that time.
         state: Code<ControllerState>,
-        /// Trajectory execution state then.
+        /// Trajectory execution state at that time.
         trajectory: Code<TrajectoryState>,
     },
 }
@@ -77,20 +77,14 @@ impl Diagnose for LinkError {
             Self::Port(e) => e.diagnosis(),
             Self::NoLink { bytes: 0, .. } => no_link(
                 "no-link",
-                next!(
-                    "check cable and power of the controller, then {}; is it the right one of `jtc ports`?",
-                    Doctor
-                ),
+                "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into(),
             ),
             Self::NoLink { baud, .. } => {
                 let baud = baud.map_or("none".into(), |b| b.to_string());
                 no_link(
                     "no-link",
-                    Next::from(format!("the rate is probably wrong ({baud} Bd here): try ")).then(next!(
-                        "{}, {} tries them all",
-                        Baud,
-                        Doctor
-                    )),
+                    Next::from(format!("the rate is probably wrong ({baud} Bd here): try "))
+                        .then(next!("{}; `jtc doctor` tries all rates", Baud)),
                 )
             }
             Self::NotConfirmed { .. } => {
@@ -99,16 +93,13 @@ impl Diagnose for LinkError {
             Self::NoExtension { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-extension",
-                next!(
-                    "its firmware knows the protocol of existing devices only; {} shows what could be found out",
-                    Info
-                ),
+                "its firmware knows the protocol of existing devices only; `jtc info` shows what could be found out",
             ),
             Self::Denied { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "not-sent",
                 next!(
-                    "{} shows the state, and the agent's status who commands; a Stop and a Pause are taken from everyone",
+                    "{} shows the state, and the agent shows who commands; a Stop and a Pause are taken from everyone",
                     Status
                 ),
             ),
@@ -145,7 +136,7 @@ impl Diagnose for LinkError {
                     }
                     FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => {
                         Some(next!(
-                            "settings change without torque only: {} (an arm without brakes falls), then again; nothing was changed",
+                            "settings change without torque only: {}, then again; an arm without brakes falls. Nothing was changed",
                             Disable
                         ))
                     }
@@ -172,7 +163,7 @@ impl Diagnose for LinkError {
 }
 
 impl LinkError {
-    /// The line or the port failed: whether the controller received the request is not known.
+    /// Returns `true` if the line or the port failed, so that the controller may or may not have received the request.
     pub(crate) fn is_loss(&self) -> bool {
         !matches!(
             self,
@@ -184,7 +175,7 @@ impl LinkError {
     }
 }
 
-/// What helps where execute, pause or stop was refused for a reason of its own.
+/// Returns advice for a refused execute, pause or stop that has its own reason.
 fn after_refused_execution(
     code: DataStatus,
     state: Code<ControllerState>,
@@ -207,7 +198,7 @@ fn after_refused_execution(
             TrajCheck
         ));
     }
-    // Execution from there is refused for another reason, and resume is not sent.
+    // In these states execute is refused for another reason, and resume is not sent.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(
@@ -218,12 +209,13 @@ fn after_refused_execution(
     })
 }
 
-/// The arm is not where the command needs it. On a line that did not ask for more, code 6 stands for 7 and 8 (J-51).
+/// Returns `true` if the code means that the arm is in the wrong position. Without extended codes on the line, code 6 stands for
+/// 7 and 8 (J-51).
 fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
 
-/// What helps after a refusal with this code in this state.
+/// Returns advice after a refusal with this code in this state.
 pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> Next {
     match (code, state.known()) {
         (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
@@ -252,7 +244,7 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> N
     }
 }
 
-/// The record confirms its frame.
+/// Returns `true` if the response confirms its frame.
 pub(crate) fn accepted(r: &Response) -> bool {
     r.status == FrameStatus::NoError && r.data == DataStatus::NoError
 }

@@ -1,5 +1,5 @@
-//! What can go wrong, with the facts in it, the kind of failure and the command that helps: an enum for each operation, and one
-//! type for all of them.
+//! Errors of this library, with the facts, the kind of failure and the command that helps: one enum for each operation, and one
+//! type for all errors.
 
 mod check;
 mod extension;
@@ -27,29 +27,29 @@ use crate::arm::ParameterError;
 use crate::file::FileError;
 use crate::port::PortError;
 
-/// Any failure of this library, where an operation can fail in ways of several.
+/// Any error of this library, for operations that fail with errors of several enums.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Of an exchange with the controller.
+    /// Error of an exchange with the controller.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// Of waiting for a state.
+    /// Error of waiting for a state.
     #[error(transparent)]
     State(#[from] StateError),
-    /// Of an upload.
+    /// Error of an upload.
     #[error(transparent)]
     Upload(#[from] UploadError),
-    /// Of an execution.
+    /// Error of an execution.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Of giving parameters.
+    /// Error of sending parameters.
     #[error(transparent)]
     Parameters(#[from] ParametersError),
-    /// Of a check for a run.
+    /// Error of a check before a run.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// Of an arm as one thing.
+    /// Error of reading, sending or storing a whole arm.
     #[error(transparent)]
     Extension(#[from] ExtensionError),
     /// A file cannot be read or understood.
@@ -58,7 +58,7 @@ pub enum Error {
     /// A number or a count that no frame carries.
     #[error(transparent)]
     Frame(#[from] jtc_wire::EncodeError),
-    /// The caller's callback asked to end.
+    /// The caller's callback cancelled the operation.
     #[error("cancelled")]
     Cancelled,
 }

@@ -1,4 +1,4 @@
-//! Errors of an execution: before it begins, and on the way.
+//! Errors of an execution: before it begins, and during the motion.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectoryState};
@@ -7,17 +7,17 @@ use super::{LinkError, facts};
 use crate::plan::PlanError;
 use crate::{held_stop, words};
 
-/// Why a motion did not begin, or did not end as asked for.
+/// Reason why a motion did not begin, or did not end as requested.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
-    /// Execution was asked for of a trajectory that this session did not upload, or that the controller lost since; nothing was
-    /// sent.
+    /// Execution was requested for a trajectory that this session did not upload, or that the controller has lost since. No frame
+    /// was sent.
     #[error(
         "the controller does not hold this trajectory: it was not uploaded, another one was since, or an error made the controller forget it; nothing was sent"
     )]
     NotUploaded,
-    /// Resume was asked for, and nothing is paused.
+    /// Resume was requested, but no motion is paused.
     #[error("{} (state {}, trajectory {})", not_paused(*trajectory), state, trajectory)]
     NotPaused {
         /// State of the controller.
@@ -25,18 +25,18 @@ pub enum MotionError {
         /// Trajectory execution state.
         trajectory: Code<TrajectoryState>,
     },
-    /// What remains of a paused motion does not pass the check any more; nothing was sent.
+    /// The remainder of a paused motion no longer passes the check; no frame was sent.
     #[error("what remains of the motion from {:.3} s on is refused with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
     RestRefused {
-        /// Index of the 1 ms point where it is paused.
+        /// Index of the 1 ms point at which the motion is paused.
         point: u32,
-        /// What the check found.
+        /// Result of the check.
         why: Box<PlanError>,
     },
-    /// The motion did not end as asked for.
+    /// The motion did not end as requested.
     #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
     RunFault {
-        /// Index of the 1 ms point where it ended.
+        /// Index of the 1 ms point at which the motion ended.
         point: u32,
         /// The status with the errors.
         status: Box<Status>,
@@ -44,28 +44,29 @@ pub enum MotionError {
     /// The controller stopped the motion, and holds the arm (J-69).
     #[error("the controller stopped the motion at point {point} ({:.3} s) and holds the arm: {}", f64::from(*point) * 1e-3, why_held(before, status, cause.as_ref()))]
     HeldStop {
-        /// Index of the 1 ms point where it is paused.
+        /// Index of the 1 ms point at which the motion is paused.
         point: u32,
         /// Errors of each joint that had occurred before the motion.
         before: [u16; 6],
         /// The status with the errors.
         status: Box<Status>,
-        /// What was found first, with its value and limit, where the device tells it.
+        /// First cause, with its value and limit, if the device reports it.
         cause: Option<StopCause>,
     },
     /// The link was lost while the arm moves, or may move.
     #[error("{source}. {}", where_the_arm_is(last.as_deref(), *stop_sent))]
     LinkLost {
-        /// The last status that came.
+        /// Last status that was received.
         last: Option<Box<Status>>,
-        /// A stop was written to the port afterwards.
+        /// `true` if a stop was written to the port afterwards.
         stop_sent: bool,
-        /// What happened to the link.
+        /// Failure of the link.
         source: Box<LinkError>,
     },
 }
 
-/// Why the arm is held, in one line; where that is not shown any more, what has occurred since.
+/// Returns the cause of the held stop in one line; if the status no longer shows it, the errors that have occurred since the
+/// start.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         words::why_held(status, cause)
@@ -74,11 +75,11 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
     }
 }
 
-/// What leads on from a held stop in a motion.
+/// Returns the next step after a held stop in a motion.
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
         None => "remove what the arm met, or give its payload".to_owned(),
-        // No trajectory goes on before the drive was reset.
+        // No trajectory can continue before the drive is reset.
         Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),
     };
@@ -92,7 +93,7 @@ fn after_held_stop(cause: Option<&StopCause>) -> Next {
     Next::from(remedy).then(then)
 }
 
-/// What is known about the motion when the link is gone.
+/// Describes the known state of the motion after the link was lost.
 fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     match last {
         Some(s) if s.trajectory == TrajectoryState::Pause => format!(
@@ -114,7 +115,7 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     }
 }
 
-/// Right after a pause the trajectory state is still Execute, until the arm stands.
+/// Returns the reason why nothing is paused. Right after a pause the trajectory state is Execute until the arm stands.
 fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
     if trajectory == TrajectoryState::Execute {
         "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
@@ -132,7 +133,7 @@ impl Diagnose for MotionError {
             Self::NotUploaded => (
                 ErrorKind::Refused,
                 "not-uploaded",
-                next!("check it again from the pose of the arm, upload it, then execute it ({})", TrajRun),
+                next!("check it again from the pose of the arm, upload it, then execute it: {}", TrajRun),
             ),
             Self::NotPaused { trajectory, .. } => (
                 ErrorKind::Refused,
@@ -190,7 +191,7 @@ impl Diagnose for MotionError {
 mod tests {
     use super::*;
 
-    /// J-34: resume right after pause finds Execute until the arm stands.
+    /// J-34: right after a pause, resume finds the state Execute until the arm stands.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
         let early = MotionError::NotPaused {

@@ -1,4 +1,4 @@
-//! Errors of giving friction, gains and arm model to the controller.
+//! Errors of sending friction, gains and arm model to the controller.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{DataStatus, FrameType};
@@ -6,14 +6,14 @@ use jtc_wire::{DataStatus, FrameType};
 use crate::arm::{Beyond, ParameterError};
 use crate::words;
 
-/// Why the controller was not given its parameters.
+/// Reason why the controller did not receive its parameters.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParametersError {
     /// A value does not fit into its frame or is not physical.
     #[error(transparent)]
     Value(#[from] ParameterError),
-    /// The controller refused a parameter, and this is beyond the bounds of known controllers.
+    /// The controller refused a parameter, which is beyond the bounds of known controllers.
     #[error("{}: {}: {beyond}", words::request(*request), words::data_status(DataStatus::IncorrectValue))]
     BeyondBounds {
         /// The request.
@@ -26,23 +26,23 @@ pub enum ParametersError {
     Unstable {
         /// Name of the arm.
         arm: String,
-        /// Which joint, the value and its limit.
+        /// Joint, value and its limit.
         problem: String,
-        /// What to do about it.
+        /// Next step for the operator.
         next: Next,
     },
-    /// The controller needs parameters, and no source of them was named.
+    /// The controller needs parameters, but no source was named.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
     NoSource {
-        /// What it misses.
+        /// Missing parameters.
         missing: Vec<&'static str>,
     },
-    /// An arm file does not hold all that a controller needs.
+    /// An arm file lacks parameters that a controller needs.
     #[error("{arm}: {} missing; parts of another arm are not filled in, nothing was sent", missing.join(", "))]
     IncompleteArm {
         /// Name of the arm.
         arm: String,
-        /// What it lacks.
+        /// Missing parameters.
         missing: Vec<&'static str>,
     },
 }

@@ -6,7 +6,7 @@ use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
 use super::facts;
 use crate::{held_stop, words};
 
-/// Why the controller did not come to the state that was waited for.
+/// Reason why the controller did not reach the expected state.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
@@ -16,74 +16,74 @@ pub enum StateError {
         /// The status with the errors.
         status: Box<Status>,
     },
-    /// The arm is in a held stop (J-69): it is held, and nothing moves until the cause is cleared.
+    /// The arm is in a held stop (J-69): the drives hold the arm, and no motion is possible until the cause is cleared.
     #[error("the arm is in a held stop: {}", words::why_held(status, cause.as_ref()))]
     HeldStop {
         /// The status with the causes.
         status: Box<Status>,
-        /// What was found first, with its value and limit, where the device tells it.
+        /// First cause, with its value and limit, if the device reports it.
         cause: Option<StopCause>,
     },
-    /// A state was not reached.
+    /// The state was not reached in time.
     #[error("{what} not reached within {waited_s:.1} s: {}", words::waiting_for(status))]
     Timeout {
-        /// What was waited for.
+        /// Expected state.
         what: &'static str,
-        /// How long, s.
+        /// Waiting time, s.
         waited_s: f64,
         /// The last status.
         status: Box<Status>,
     },
-    /// The arm is not held, and nothing on the way to that is going on.
+    /// The arm is not held, and the controller is not on the way to that state.
     #[error("{}", words::waiting_for(status))]
     NotReady {
-        /// The status of then.
+        /// Status at that time.
         status: Box<Status>,
     },
-    /// The two encoders of joints do not fit (J-35): one has jumped, or the speed has another scale. No trajectory is executed until the
-    /// drives have been configured again.
+    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the speed has another scale. No trajectory is
+    /// executed until the drives have been configured again.
     #[error(
         "{}: the position is not to be trusted, because the encoder has jumped or its speed does not fit; no trajectory is executed until its drive was reset",
         words::joints(joints)
     )]
     EncoderJumped {
-        /// Which.
+        /// Joints with this fault.
         joints: Vec<Joint>,
     },
-    /// The arm moves, and a pose is where it stands.
+    /// The arm moves, but a pose must be saved at rest.
     #[error("{what}, and a pose is where the arm stands; nothing was saved")]
     Moving {
-        /// What moves.
+        /// Part that moves.
         what: String,
     },
-    /// It is not known where a joint is.
+    /// The position of a joint is unknown.
     #[error("{joint}: its position is not known; nothing was saved")]
     NotMeasured {
-        /// Which.
+        /// Joint with the unknown position.
         joint: Joint,
     },
     /// The arm moves, and would fall without the torque of these nodes.
     #[error("{nodes} cannot be reset in {state}: the arm would fall")]
     WouldFall {
-        /// Which, in words.
+        /// Nodes in words.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The arm has torque, which a reset of these nodes can take away.
+    /// The arm has torque, and a reset of these nodes can remove the torque.
     #[error(
         "the arm has torque ({state}), and a reset of {nodes} can take it away: the arm may fall; nothing was sent"
     )]
     MayFall {
-        /// Which, in words.
+        /// Nodes in words.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// Joints are set absent, and the controller executes no motion.
+    /// Joints are set absent, so the controller executes no motion.
     #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
     Absent {
-        /// Which.
+        /// Absent joints.
         joints: Vec<Joint>,
     },
 }
@@ -124,16 +124,14 @@ impl Diagnose for StateError {
                 };
                 Diagnosis::new(ErrorKind::Refused, "powered", next)
             }
-            Self::MayFall { .. } => Diagnosis::new(
-                ErrorKind::Refused,
-                "powered",
-                "support the arm, then `jtc reset` with --yes, or by HTTP with arm_may_fall: true",
-            ),
+            Self::MayFall { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "powered", next!("support the arm, then {}", ResetMayFall))
+            }
             Self::Absent { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "absent-joints",
                 next!(
-                    "{} shows them; {} moves the joints that are there; {}, then {} ends it",
+                    "{} shows them; {} moves the joints that are there; {}, then {} ends it: an arm without brakes falls",
                     BenchShow,
                     Jog,
                     Disable,

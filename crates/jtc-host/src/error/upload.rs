@@ -6,18 +6,18 @@ use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
 use super::link::after_refusal;
 use crate::words;
 
-/// Why the controller does not hold the whole trajectory.
+/// Reason why the controller does not hold the whole trajectory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UploadError {
-    /// The controller refused a segment for good.
+    /// The controller refused a segment permanently.
     #[error("segment {segment} of {segments}: {}", words::data_status(*code))]
     SegmentRefused {
-        /// Number from 0.
+        /// Number of the segment, from 0.
         segment: usize,
-        /// How many there are.
+        /// Number of segments.
         segments: usize,
-        /// Why.
+        /// Reason.
         code: DataStatus,
     },
     /// The upload did not end with a complete trajectory.
@@ -26,11 +26,11 @@ pub enum UploadError {
         trajectory
     )]
     Incomplete {
-        /// Segments known to have arrived.
+        /// Number of segments that are known to have arrived.
         confirmed: usize,
-        /// How many there are.
+        /// Number of segments.
         segments: usize,
-        /// Times the whole was begun again.
+        /// Number of times the upload was restarted.
         restarts: u32,
         /// Trajectory execution state at the end.
         trajectory: Code<TrajectoryState>,

@@ -1,4 +1,4 @@
-//! Why there is no plan.
+//! Errors of planning.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_core::POINTS_MAX;
@@ -8,64 +8,64 @@ use super::margin::{MARGIN_PCT, MARGIN_PCT_MAX};
 use crate::check::Verdict;
 use crate::error::facts;
 
-/// Why there is no plan.
+/// Reason why no plan exists.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// There is no such motion; waypoint, joint, value and limit are in it.
+    /// The motion is not possible; the error contains waypoint, joint, value and limit.
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
-    /// Waypoints that are all the same.
+    /// All waypoints are equal.
     #[error("all {count} waypoints are at the same place: that is no motion")]
     Nowhere {
-        /// Waypoints given.
+        /// Number of waypoints.
         count: usize,
     },
-    /// The check refuses the motion, however slow it is.
+    /// The check rejects the motion at every speed.
     #[error("{0}")]
     Refused(Box<Verdict>),
-    /// Not a share of the speed.
+    /// The speed is out of range.
     #[error("speed {percent} % is not within 1..{most} %")]
     Speed {
-        /// As it was asked for, %.
+        /// Requested value, %.
         percent: f64,
-        /// The most, %.
+        /// Maximum, %.
         most: f64,
     },
-    /// A torque margin that is out of range.
+    /// The torque margin is out of range.
     #[error(
         "torque margin {percent} % is out of range, expected 0 to {MARGIN_PCT_MAX} % of each limit, by default {MARGIN_PCT}"
     )]
     Margin {
-        /// As it was asked for, %.
+        /// Requested value, %.
         percent: f64,
     },
-    /// A blend that is meant in another unit.
+    /// The blend is too large, probably given in another unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
-        /// As it was given.
+        /// Requested value.
         value: f64,
-        /// The most.
+        /// Maximum.
         most: f64,
-        /// rad, or m of the flange.
+        /// Unit: rad, or m of the flange.
         unit: &'static str,
     },
-    /// More corners than a trajectory has points for.
+    /// More corners than the points of a trajectory can represent.
     #[error(
         "{corners} sharp corners are more than the {POINTS_MAX} points of a trajectory can follow: it has room for {most}"
     )]
     TooManyCorners {
-        /// Found.
+        /// Number of corners found.
         corners: usize,
-        /// At most.
+        /// Maximum number.
         most: usize,
     },
-    /// So long that its points are too far apart for its corners.
+    /// The motion is too long: its points are too far apart for its corners.
     #[error(
         "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
     )]
     TooFine {
-        /// s.
+        /// Duration, s.
         seconds: f64,
         /// Step of the points, ms.
         step_ms: u16,
@@ -73,13 +73,13 @@ pub enum PlanError {
     /// Longer than a trajectory can be.
     #[error("the motion takes {seconds:.0} s or more: {POINTS_MAX} points cannot hold it")]
     TooLong {
-        /// At least, s.
+        /// Minimum duration, s.
         seconds: f64,
     },
 }
 
 impl PlanError {
-    /// The waypoint that it is about, counted from 1, where its message names one.
+    /// Returns the waypoint of the error, counted from 1, if its message names one.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Plan(error) => error.waypoint(),
@@ -87,22 +87,21 @@ impl PlanError {
         }
     }
 
-    /// What helps a move whose end, or where the arm stands, is outside the limits; `None` where [`Diagnose`] has it.
+    /// Returns the remedy for a move whose goal or start is outside the limits; `None` if [`Diagnose`] supplies it.
     pub fn next_of_move(&self) -> Option<Next> {
         match self {
             Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
                 Some(next!("{} brings the joint back inside its limits", Jog))
             }
             Self::Plan(jtc_plan::PlanError::Position { .. }) => Some(next!(
-                "choose a place inside the limits, which {} lists; positions are in rad, and in degrees with {}",
-                ArmShow,
-                Degrees
+                "choose a place inside the limits, which {} lists; positions are in rad, and in degrees with --deg",
+                ArmShow
             )),
             _ => None,
         }
     }
 
-    /// The message of a move, whose first waypoint is where the arm stands, and whose second one is what was asked for.
+    /// Returns the message for a move: its first waypoint is the arm's position, its second one the goal.
     pub fn of_move(&self) -> String {
         use jtc_plan::PlanError as Of;
         use kinematics::PoseError as Pose;
@@ -196,7 +195,7 @@ mod tests {
 
     use super::*;
 
-    /// The words of a move are those of its waypoints, with the places that people know.
+    /// A move uses the messages of its waypoints, with "where the arm stands" and the goal as names.
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];

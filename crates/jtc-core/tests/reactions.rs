@@ -1,9 +1,9 @@
-//! Which error does what (J-21, J-66, J-68, J-69): the arm yields or stops where the controller can still act, else its torque goes. The
-//! table in docs/safety.md is what these runs show; `UPDATE_DOCS=1` writes it again.
+//! Reaction to each error (J-21, J-66, J-68, J-69): the arm yields or stops if the controller can still act, otherwise
+//! its torque goes. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};
-use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, StopKind};
 use rig::{Rig, floats, point, rad};
 
 /// Joint 5 leads from 0 to 0.4 rad and back, at rest at both ends.
@@ -19,7 +19,7 @@ fn path() -> Vec<RawPoint> {
         .collect()
 }
 
-/// Held, or moving along the path; the torque of joint 4 has room for a position error.
+/// Returns a rig that is held, or moves along the path; the torque limit of joint 4 has margin for a position error.
 fn bench(moving: bool) -> Rig {
     bench_with(Config::avena(), moving)
 }
@@ -35,7 +35,7 @@ fn bench_with(mut config: Config, moving: bool) -> Rig {
     rig
 }
 
-/// Somebody pushes joint 4 until its position error is over the limit; not faster than is plausible (J-35).
+/// Pushes joint 4 until its position error is over the limit, not faster than is plausible (J-35).
 fn push(rig: &mut Rig, to: f64) {
     const TICKS: u32 = 50;
     rig.apart[3] = true;
@@ -46,7 +46,7 @@ fn push(rig: &mut Rig, to: f64) {
     }
 }
 
-/// Answers of the arm where it stands now, until the held stop can be cleared.
+/// Reports the present position of the arm until the held stop can be cleared.
 fn settle(rig: &mut Rig) {
     rig.run(600);
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
@@ -58,7 +58,7 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     let mut rig = bench(true);
     push(&mut rig, 0.097);
     rig.run(2);
-    // What still yields cannot be cleared; the other joints stop on the path.
+    // While a joint yields, the stop cannot be cleared; the other joints stop on the path.
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
     rig.run(400);
     let t = rig.controller.telemetry();
@@ -73,11 +73,11 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(status.joints[3].internal_occurred, joint_error::POSITION_ERROR);
     assert_eq!(status.occurred & error::EMERGENCY_OUTPUT, 0);
 
-    // Nothing moves until the host has cleared it.
+    // The arm does not move until the host has cleared the stop.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::Jog, &floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])), DataStatus::NotAllowed);
     settle(&mut rig);
-    // Beside the paused point it does not go on; back there it does, and approaches the path.
+    // Off the paused point the path does not continue; back at the point it does, and the arm approaches the path.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     settle(&mut rig);
@@ -118,7 +118,8 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
-/// A joint that is let go of is held where it is, without a step of its torque; after the third time it yields until the host clears that.
+/// A joint that is calm again after a push is held at its present position, without a step of its torque; after the
+/// third time it yields until the host clears the stop.
 #[test]
 fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides() {
     let mut rig = bench(false);
@@ -133,7 +134,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             assert!((torque - last).abs() < 250.0, "a step from {last} to {torque}");
             last = torque;
         }
-        // Held, it pulls to where it is; while it yields the spring pulls back.
+        // A held joint pulls towards its hold position; while it yields, the spring pulls back.
         let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
@@ -143,7 +144,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
     assert!(torque > -5.0 && rig.errors() == 0, "{torque} N·m");
 }
 
-/// What a held stop leaves to the host, and what ends it.
+/// Commands that a held stop still accepts, and the events that end it.
 #[test]
 fn j69_a_latched_stop_outlasts_teaching_and_not_a_release() {
     for latches in [true, false] {
@@ -171,7 +172,30 @@ fn j69_a_latched_stop_outlasts_teaching_and_not_a_release() {
     }
 }
 
-/// Who acknowledges a held stop does not know that somebody else's key is still down.
+/// A cause contains the measured value, with its sign, and the limit of the joint.
+#[test]
+fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
+    let config = Config::avena();
+    let mut pulled = bench(false);
+    push(&mut pulled, 0.097);
+    pulled.run(20);
+    let cause = pulled.controller.reactions().stop.expect("a held stop").0;
+    assert_eq!((cause.kind, cause.joint), (StopKind::PositionError, 4));
+    assert_eq!(cause.limit, config.joints[3].position_error_max as f32);
+    // The joint was 2 mrad further in each millisecond.
+    assert!((cause.limit..cause.limit + 0.01).contains(&-cause.value), "{cause:?}");
+
+    let mut pushed = bench(false);
+    (ROWS[4].cause)(&mut pushed);
+    let cause = pushed.controller.reactions().stop.expect("a held stop").0;
+    assert_eq!((cause.kind, cause.joint), (StopKind::Push, 6));
+    let torque_max = config.joints[5].torque_max;
+    assert_eq!(cause.limit, (config.yield_torque_share * torque_max) as f32);
+    // The controller pulls against the push.
+    assert!((cause.limit..=torque_max as f32).contains(&-cause.value), "{cause:?}");
+}
+
+/// The client that acknowledges a held stop does not know that a jog key of another client is still pressed.
 #[test]
 fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_cleared() {
     let mut rig = bench(false);
@@ -191,12 +215,13 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
 }
 
-/// What braking excuses is for the arm that cannot follow its path, not for one that is pushed away from where the path stands.
+/// Braking excuses an arm that cannot follow its path, but not an arm that is pushed away from the present point of the
+/// path.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {
     let mut rig = bench(true);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
-    // It moves all the time, so braking goes on.
+    // The joint moves all the time, so braking continues.
     rig.nodes[3].report.velocity = 0.5;
     rig.until(500, |r| r.trajectory() == TrajectoryState::Pause);
     push(&mut rig, 0.097);
@@ -207,8 +232,8 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_bra
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
 
-/// A joint that is stuck had not followed what was commanded: where the arm is held because of it, and the next answers are missing, it
-/// is not predicted to move back.
+/// A joint that is stuck did not follow its command. If the arm is held because of it, and the next answers are
+/// missing, the prediction must not move the joint back.
 #[test]
 fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     let mut config = Config::avena();
@@ -220,7 +245,7 @@ fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     rig.until(1_500, |rig| rig.errors() != 0);
     let stuck = rig.nodes[4].report.position;
     for k in 1..=4 {
-        // The answer to the Move of that tick was lost, too.
+        // The answer to the Move of that tick was also lost.
         rig.drop_answers(4);
         rig.tick();
         let t = rig.controller.telemetry().joints[4];
@@ -264,7 +289,7 @@ const ROWS: [Row; 8] = [
     Row { error: "gripper silent or reset (J-23)", cause: |rig| rig.nodes[6].silent = true },
 ];
 
-/// What the controller did, in words.
+/// Returns the reaction of the controller, in words.
 fn reaction(rig: &Rig) -> String {
     let t = rig.controller.telemetry();
     let torque = if t.joints.iter().all(|j| j.torque == 0.0) { "torque zero" } else { "torque stays" };

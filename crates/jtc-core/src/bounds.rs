@@ -11,7 +11,7 @@ const MEASURED: f64 = 0.5;
 /// Speeds at which a friction polynomial is checked: a cubic does not get far between them.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction: what lies beyond is no arm of these drives, and would throw or drop one (J-06).
+/// Bounds of gains, masses and friction: values beyond them do not belong to an arm of these drives, and would throw or drop one (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
     /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
@@ -27,15 +27,15 @@ pub struct ParameterBounds {
     pub integral_bias_max: f64,
     /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
     pub link_mass_max: f64,
-    /// Largest moment or product of inertia of a link, kg·m²: what those 50 kg have at 1.4 m.
+    /// Largest moment or product of inertia of a link, kg·m²: the value of those 50 kg at 1.4 m.
     pub link_inertia_max: f64,
     /// Largest friction torque of a joint at a speed, as a share of its torque limit; of a polynomial without the factor of
     /// its temperature. Up to 1.19 is in use.
     pub friction_max: f64,
-    /// The same up to half of the velocity limit. Up to 0.82 is in use.
+    /// Like `friction_max`, up to half of the velocity limit. Up to 0.82 is in use.
     pub slow_friction_max: f64,
-    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of
-    /// the torque limit: what noise of a measurement may be.
+    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of the torque
+    /// limit: possible noise of a measurement.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,
@@ -44,7 +44,7 @@ pub struct ParameterBounds {
 /// A parameter beyond its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfBounds {
-    /// What it is, with its unit.
+    /// Name of the parameter, with its unit.
     pub what: &'static str,
     /// Velocity that it belongs to, rad/s: friction only.
     pub velocity: Option<f64>,
@@ -57,7 +57,7 @@ pub struct OutOfBounds {
 }
 
 impl OutOfBounds {
-    /// Written so that a NaN is refused.
+    /// Checks that `value` is within `low..=high`; written so that a NaN is refused.
     fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
         if value >= low && value <= high {
             Ok(())
@@ -74,7 +74,7 @@ impl From<OutOfBounds> for DataStatus {
 }
 
 impl ParameterBounds {
-    /// For the known drives.
+    /// Returns the bounds for the known drives.
     pub const fn known_drives() -> Self {
         Self {
             kp_max: 50_000.0,
@@ -91,7 +91,7 @@ impl ParameterBounds {
         }
     }
 
-    /// Gains of a joint.
+    /// Checks the gains of a joint.
     pub fn check_gains(&self, gains: &PidGains, joint: &JointConfig) -> Result<(), OutOfBounds> {
         let PidGains { kp, ki, kd, int_min, int_max } = *gains;
         let within = OutOfBounds::unless_within;
@@ -110,7 +110,7 @@ impl ParameterBounds {
         )
     }
 
-    /// Masses and inertias of a model that is physical.
+    /// Checks the masses and inertias of a model that is physical.
     pub fn check_masses(&self, model: &ArmModel) -> Result<(), OutOfBounds> {
         for link in &model.links {
             OutOfBounds::unless_within("mass of a link (kg)", link.mass, 0.0, self.link_mass_max)?;
@@ -122,7 +122,7 @@ impl ParameterBounds {
         Ok(())
     }
 
-    /// Mass and inertia of a payload, which are those of a link.
+    /// Checks the mass and inertia of a payload, with the bounds of a link.
     pub fn check_payload(&self, payload: &Payload) -> Result<(), OutOfBounds> {
         OutOfBounds::unless_within("mass of the payload (kg)", payload.mass, 0.0, self.link_mass_max)?;
         let most = self.link_inertia_max;
@@ -132,7 +132,7 @@ impl ParameterBounds {
             .try_for_each(|&i| OutOfBounds::unless_within("inertia of the payload (kg·m²)", i, -most, most))
     }
 
-    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s).
+    /// Checks the torque (N·m) that compensates friction of a joint at a velocity (rad/s).
     fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), OutOfBounds> {
         let speed = velocity.abs();
         let (low, high) = if speed == 0.0 {
@@ -153,7 +153,7 @@ impl ParameterBounds {
         .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
     }
 
-    /// A polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
+    /// Checks a polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
     pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
@@ -161,16 +161,16 @@ impl ParameterBounds {
         // Arms often move slowly: as many speeds again within the first step.
         let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
         slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
-            // The sign is smoothed around standstill, where there is no torque.
+            // The sign is smoothed around standstill: the torque there is zero.
             self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
         })
     }
 
-    /// A table at its own velocities, and at standstill.
+    /// Checks a table at its own velocities, and at standstill.
     pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
         for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
             for &torque in row {
-                // Standstill is checked below, where most tables have no row.
+                // Standstill is checked below, because most tables have no row for it.
                 if velocity != 0.0 {
                     self.check_friction(torque.into(), velocity.into(), joint)?;
                 }

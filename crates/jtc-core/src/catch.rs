@@ -1,32 +1,31 @@
 //! Catching a load that the model lacks, when the joints are enabled (J-43).
 //!
-//! Such a load begins to fall when its joint is enabled. The joint then swings around where it will be held, and at the end of the
-//! first swing the control law needs up to 1.7 times what the model lacks. Where that is beyond the torque limit, the limit is
-//! commanded, which stops every load that it can hold, and the set position *sags* behind the joint: by as much as the computed
-//! torque exceeds the limit. So the joint comes to rest where the limit has stopped it. Held at its old position instead, it
-//! would be thrown upwards and fall again, for ever when there is little friction.
+//! Such a load begins to fall when its joint is enabled. The joint then swings around the position at which it will be held, and at the end
+//! of the first swing the control law needs up to 1.7 times the torque that the model lacks. If that is beyond the torque limit, the limit
+//! is commanded, which stops every load that it can hold, and the set position *sags* towards the joint: by as much as the computed torque
+//! exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. Held at its old position instead, the
+//! joint would be thrown upwards and fall again, for ever when there is little friction.
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
-/// swing.
+/// Time for which a joint must be at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a swing.
 const CALM_MS: u16 = 100;
 
 /// Speed below which a swing that grows is noise, rad/s.
 const FAST_SWING: f64 = 0.1;
 
-/// A joint whose load may have to be caught.
+/// State of a joint whose load may need to be caught.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
-    /// Time left for it, ms; 0: it is over, or the joint was not enabled.
+    /// Time left for the catch, ms; 0: the catch is over, or the joint was not enabled.
     left_ms: u16,
     /// Time left until the joint counts as caught, ms.
     busy_ms: u16,
     /// The joint has been calm for that long since it was enabled.
     settled: bool,
-    /// How far the set position has sagged, rad: in one direction only.
+    /// Sag of the set position, rad: in one direction only.
     sag: f64,
     /// Highest speed of this half of a swing, with its sign, and of the half before, rad/s.
     peak: f64,
@@ -38,23 +37,23 @@ pub(crate) struct Catch {
 remembered!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before, grew });
 
 impl Catch {
-    /// The joint was just enabled.
+    /// Begins the catch of a joint that was just enabled.
     pub fn begin(config: &Config) -> Self {
         Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, ..Self::default() }
     }
 
-    /// The joint is not at rest yet.
+    /// Returns `true` if the joint is not at rest yet.
     pub fn busy(&self) -> bool {
         self.left_ms > 0 && self.busy_ms > 0
     }
 
-    /// The joint has been at rest, within its torque limit, since it was enabled.
+    /// Returns `true` if the joint has been at rest, within its torque limit, since it was enabled.
     pub fn settled(&self) -> bool {
         self.settled
     }
 
-    /// One tick, with the measured velocity (rad/s): whether a load may still be caught. A swing that grows is no load that comes to
-    /// rest but a loop that is unstable, and the catch is over.
+    /// Runs one tick, with the measured velocity (rad/s). Returns `true` if a load may still be caught. A swing that grows is not a load
+    /// that comes to rest but an unstable loop, and the catch is over.
     pub fn step(&mut self, velocity: f64) -> bool {
         if self.settled && self.left_ms == 0 {
             return false;
@@ -64,7 +63,7 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill is no half of a swing: the fall that follows it has not grown out of it.
+            // Noise around standstill is not a half of a swing: the fall that follows it has not grown out of it.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -74,7 +73,7 @@ impl Catch {
         self.left_ms > 0
     }
 
-    /// A tick of a swing.
+    /// Runs a tick of a swing.
     fn swing(&mut self, velocity: f64) {
         if velocity * self.peak < 0.0 {
             let peak = self.peak.abs();
@@ -85,12 +84,12 @@ impl Catch {
         }
     }
 
-    /// Swings from now on count, and not those before.
+    /// Forgets earlier swings: only swings from now on count.
     pub fn watch_anew(&mut self) {
         (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
     }
 
-    /// One tick of a joint that has settled: whether it swings, each of three halves faster than the one before it.
+    /// Runs one tick of a joint that has settled. Returns `true` if the joint swings, each of three halves faster than the one before it.
     pub fn watch(&mut self, velocity: f64) -> bool {
         if !self.settled || self.left_ms > 0 {
             return false;
@@ -101,27 +100,27 @@ impl Catch {
         self.grew && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// The joint has come to rest in another way.
+    /// Ends the catch, because the joint has come to rest in another way.
     pub fn calm_down(&mut self) {
         *self = Self { settled: true, ..Self::default() };
     }
 
-    /// The swing of a joint that has not settled yet has grown from one half to the next: its loop is unstable.
+    /// Returns `true` if the swing of a joint that has not settled yet has grown from one half to the next: its loop is unstable.
     pub fn swing_grows(&self) -> bool {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// The computed torque exceeds the limit by `excess` (N·m) at a position error of `error` (rad): returns by how much the set
-    /// position moves, rad. When it would have sagged by more than the position error may be, or a load pulls the other way, as
-    /// in a swing from limit to limit, this is no catch, and it is over.
+    /// Returns the step of the set position, rad, if the computed torque exceeds the limit by `excess` (N·m) at a position error of `error`
+    /// (rad). If the sag would exceed the highest position error, or a load pulls the other way, as in a swing from limit to limit, this is
+    /// not a catch, and the catch is over.
     pub fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
-        // At most to where the joint is.
+        // At most to the position of the joint.
         let wanted = excess / kp;
         let step = if error > 0.0 { -wanted.max(0.0).min(error) } else { -wanted.min(0.0).max(error) };
         let sag = self.sag + step;
         let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
         if !good {
-            // It is over, and the joint has not settled.
+            // The catch is over, and the joint has not settled.
             (self.left_ms, self.busy_ms) = (0, CALM_MS);
             return 0.0;
         }
@@ -150,7 +149,7 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // What the derivative asks for alone is no sag; nor is that of a controller without gain.
+            // Torque that the derivative alone asks for causes no sag. Without gain the set position sags to the joint, not further.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -188,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Whether the catch goes on after velocities (rad/s) of one tick each.
+    /// Returns `true` if the catch goes on after velocities (rad/s) of one tick each.
     fn goes_on(velocities: &[f64]) -> bool {
         let mut catch = begun();
         velocities.iter().all(|&velocity| catch.step(velocity))
@@ -203,7 +202,7 @@ mod tests {
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 
-    /// A load that begins to fall after noise of the other sign has to be caught like any other.
+    /// A load that begins to fall after noise of the other sign must be caught like any other.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
         for noise in [0.001, 0.01, 0.02] {

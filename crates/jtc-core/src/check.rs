@@ -5,9 +5,9 @@
 //! points. An interval whose hulls, roughly taken, are within the limits passes at once (`screen`); for any other the curves
 //! are halved until the hull is within or the curve itself is seen outside (`curve`).
 //!
-//! Positions come in steps of 96 µrad, and what that rounding does to the derivative is no fault of the path: the way of
-//! each interval is judged less one such step. What it does to the positions themselves, and the way of a joint that begins outside its
-//! limits, is in `range`.
+//! Positions come in steps of 96 µrad, and the effect of that rounding on the derivative is not a fault of the path: the way of each
+//! interval is judged less one such step. The effect on the positions themselves, and the way of a joint that begins outside its limits,
+//! are in `range`.
 mod curve;
 mod range;
 mod screen;
@@ -33,11 +33,11 @@ pub const REST_SPEED: f64 = 0.02;
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Halvings of curves in one interval, all joints together. A curve is followed until its hull is within about a thousandth of
-/// its own height; six joints at their limits in the same interval share them, and then the hull decides.
+/// Highest number of halvings of curves in one interval, all joints together. A curve is followed until its hull is within about a
+/// thousandth of its own height; six joints at their limits in the same interval share them, and then the hull decides.
 const HALVINGS: u8 = 16;
 
-/// What of a trajectory can be outside its bounds.
+/// Quantity of a trajectory that can be outside its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// The position, rad: at a point, or of the quintic between two.
@@ -48,7 +48,7 @@ pub enum Quantity {
     Acceleration,
     /// The speed of the position itself between two points, less one int16 step, rad/s.
     PositionSpeed,
-    /// The speed of the first or the last point, which has to be at rest, rad/s.
+    /// The speed of the first or the last point, which must be at rest, rad/s.
     Rest,
     /// A velocity outside the friction table in use, rad/s.
     FrictionVelocity,
@@ -57,7 +57,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them, in the order of their numbers in a snapshot.
+    /// All quantities, in the order of their numbers in a snapshot.
     const ALL: [Self; 7] = [
         Self::Position,
         Self::Velocity,
@@ -82,16 +82,16 @@ impl Remembered for Quantity {
     }
 }
 
-/// Where a trajectory is outside its bounds first (J-36).
+/// First place at which a trajectory is outside its bounds (J-36).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
     /// Point from 0.
     pub point: u32,
-    /// How far on the way to the next point, 0..1.
+    /// Fraction of the way to the next point, 0..1.
     pub fraction: f64,
     /// Index of the joint, base to wrist.
     pub joint: usize,
-    /// What it is of.
+    /// Quantity that is outside its bounds.
     pub quantity: Quantity,
     /// Its value, in the unit of the quantity.
     pub value: f64,
@@ -101,17 +101,17 @@ pub struct Violation {
 
 remembered!(Violation { point, fraction, joint, quantity, value, limit });
 
-/// What one joint has to keep to.
+/// Bounds of one joint.
 #[derive(Clone, Copy, Debug)]
 struct JointBounds {
     position: PathRange,
     speed: f64,
     acceleration: f64,
-    /// Velocities inside the friction table; without end where none is used.
+    /// Velocities inside the friction table; unbounded if no table is used.
     friction: (f64, f64),
 }
 
-/// The state of one check: what it checks against, and the point before.
+/// The state of one check: its bounds, and the point before.
 #[derive(Clone, Debug)]
 pub struct TrajectoryCheck {
     bounds: [JointBounds; JOINTS],
@@ -124,7 +124,7 @@ pub struct TrajectoryCheck {
     passed: Passed,
 }
 
-/// What is known of the points that were checked.
+/// State of the check after the points that were checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Passed {
     /// Velocities.
@@ -136,7 +136,7 @@ pub(crate) struct Passed {
 remembered!(Passed { speeds, coming_in });
 
 impl Violation {
-    /// The error of the joint that it would be in motion (J-43), as a bit of [`crate::joint_error`].
+    /// Returns the error that the joint would have in motion (J-43), as a bit of [`crate::joint_error`].
     pub fn joint_error(&self) -> u16 {
         match self.quantity {
             Quantity::Position => joint_error::POSITION,
@@ -168,13 +168,13 @@ impl TrajectoryCheck {
         }
     }
 
-    /// Goes on behind `points` points that have passed: the last of them, and what is known of them.
+    /// Continues after `points` points that have passed, with the last of them and the state after them.
     pub(crate) fn behind(mut self, points: u32, last: RawPoint, passed: Passed) -> Self {
         (self.points, self.last, self.last_steps, self.passed) = (points, last, (&last).into(), passed);
         self
     }
 
-    /// Checks the next point and what lies between it and the one before. The point is taken in any case.
+    /// Checks the next point, and the interval between it and the point before. The point is taken in any case.
     pub fn take(&mut self, point: &RawPoint) -> Result<(), Violation> {
         let steps = Steps::from(point);
         let verdict = if self.points == 0 {
@@ -203,24 +203,24 @@ impl TrajectoryCheck {
         at_rest(&self.last, self.points.saturating_sub(1))
     }
 
-    /// What is known of the points taken so far.
+    /// Returns the state after the points taken so far.
     pub(crate) fn passed(&self) -> Passed {
         self.passed
     }
 
-    /// Joints that are outside their position limits at a point, tolerance or not.
+    /// Returns the joints that are outside their position limits at a point, without the tolerance.
     fn outside(&self, point: &RawPoint) -> [bool; JOINTS] {
         let positions = point.position_rad();
         core::array::from_fn(|j| !self.bounds[j].position.limits_contain(positions[j]))
     }
 
-    /// The first point.
+    /// Checks the first point.
     fn begins(&self, point: &RawPoint) -> Result<(), Violation> {
         self.stands(point)?;
         at_rest(point, 0)
     }
 
-    /// A point by itself.
+    /// Checks a point by itself.
     fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
         let (at, before) = (SetPoint::from(point), self.last.position_rad());
         for (j, bounds) in self.bounds.iter().enumerate() {
@@ -251,7 +251,7 @@ impl TrajectoryCheck {
         Ok(())
     }
 
-    /// A point, and what lies between it and the last one.
+    /// Checks a point, and the interval between it and the last one.
     fn judge(&self, point: &RawPoint) -> Result<(), Violation> {
         self.stands(point)?;
         let (a, b, h) = (SetPoint::from(&self.last), SetPoint::from(point), self.step);
@@ -300,7 +300,7 @@ impl TrajectoryCheck {
             if coming_in && !range.contains(p0) {
                 let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
                 let found = leaves(speed, low, high, &mut halvings);
-                // The place where it turns outwards, or the point before where it is inside there.
+                // The place at which the curve turns outwards, or the point before if the curve is inside there.
                 let place = |Leaves { at, .. }: Leaves| {
                     let value = interpolate(&a, &b, h, at).position[j];
                     let value = if range.contains(value) { p0 } else { value };
@@ -313,7 +313,7 @@ impl TrajectoryCheck {
     }
 }
 
-/// Every joint stands.
+/// Checks that every joint stands.
 fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     for (j, value) in point.velocity_rad_s().into_iter().enumerate() {
         if let Some(limit) = bound_crossed(value, -REST_SPEED, REST_SPEED) {
@@ -324,7 +324,7 @@ fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     Ok(())
 }
 
-/// Whether a trajectory with these `speeds`, loaded under other friction, is inside the `tables` now in use.
+/// Checks that a trajectory with these `speeds`, loaded under other friction, is inside the `tables` now in use.
 pub(crate) fn inside_tables(
     speeds: &[SpeedRange; JOINTS],
     tables: &[TableOf<f32>; JOINTS],
@@ -341,7 +341,7 @@ pub(crate) fn inside_tables(
     Ok(())
 }
 
-/// Whether these bearing `temperatures` (°C) are inside the `tables`.
+/// Checks that these bearing `temperatures` (°C) are inside the `tables`.
 pub(crate) fn temperatures_inside(
     temperatures: &[f64; JOINTS],
     tables: &[TableOf<f32>; JOINTS],

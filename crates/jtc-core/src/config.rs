@@ -9,7 +9,7 @@ use crate::limits::JointConfig;
 /// Half of the drives' working area, rad either way from zero (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
 
-/// Settings of the device. [`crate::settings`] has the table by which a host reads and changes them (J-53).
+/// Settings of the device. A host reads and changes them by the table in [`crate::settings`] (J-53).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Per joint, base to wrist.
@@ -18,26 +18,27 @@ pub struct Config {
     pub gravity: [f64; 3],
     /// A gripper is on the bus (J-20).
     pub gripper: bool,
-    /// What the gripper does when the arm loses its torque, in Error and in Init. `true`: the pump is switched off until
-    /// the host switches it on again, and the gripper is in ReadyToOperate; a part drops. `false`: an enabled gripper is
-    /// left as it is, with its pump as it was commanded last; it keeps its part.
+    /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. `true`: the pump is switched off until the host
+    /// switches it on again, and the gripper is in ReadyToOperate; a part drops. `false`: an enabled gripper is left as it is, with its
+    /// pump as it was commanded last; it keeps its part.
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
     /// Speed at which the drives trip by themselves while configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
-    /// Time that the drives' speed is the mean over, ms: over it their position and their speed are compared (J-35); 0: they are not.
+    /// Time over which the drives average their speed, ms: over it their position and their speed are compared (J-35); 0: they are not.
     pub drive_speed_window_ms: u8,
-    /// How far torque twists a gear, N·m/rad: by as much the position at its one end may differ from the speed at the other (J-35).
+    /// Torque that twists a gear by 1 rad, N·m/rad: the position at one end of the gear may differ from the speed at the other by the twist
+    /// (J-35).
     pub gear_stiffness: f64,
     /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
     /// held within one such step (J-41).
     pub encoder_step: f64,
-    /// Age of a measurement when what is commanded because of it begins to act, ticks (J-62); 7 at most. The drives read their
-    /// encoder and apply the torque in the same millisecond loop of their own. A Move that they receive between two loops is
-    /// answered with what the first has read and acts in the second; its answer is used in the next tick, whose Move acts in the
-    /// third: two loops after the reading, wherever in the controller's millisecond they fall. An arm behind a slower bus, or
-    /// with drives that filter their positions, has a longer delay; 0 compares with what is commanded now.
+    /// Age of a measurement when the command that follows from it begins to act, ticks (J-62); 7 at most. The drives read their encoder and
+    /// apply the torque in the same millisecond loop of their own. A Move that they receive between two loops is answered with the reading
+    /// of the first and acts in the second; its answer is used in the next tick, whose Move acts in the third: two loops after the reading,
+    /// for any phase of the loops in the controller's millisecond. An arm with a slower bus, or with drives that filter their positions,
+    /// has a longer delay; 0 compares with the present command.
     pub delay_ticks: u8,
     /// Configuration bits sent to every joint (J-11).
     pub joint_config_bits: u8,
@@ -48,43 +49,43 @@ pub struct Config {
     /// Consecutive Moves that stay unanswered or unacknowledged until that is an error (J-14), and that stay without a
     /// usable answer of a joint (J-35). Until then the joint's motion is predicted (J-63).
     pub missed_moves_max: u8,
-    /// Silence of a node after its reset that is no error yet, ms.
+    /// Silence of a node after its reset that is not an error yet, ms.
     pub node_boot_ms: u32,
     /// Longest READY→ENABLE, ms (J-16); counted while enabling is requested.
     pub enable_timeout_ms: u32,
     /// Joints are enabled only while every one has moved slower than this for `enable_still_ms`, rad/s (J-16): an arm that
     /// falls is not caught with a jolt.
     pub enable_speed_max: f64,
-    /// How long the arm has to have been that slow, ms.
+    /// Time for which the arm must have been that slow, ms.
     pub enable_still_ms: u16,
     /// Time for which joints are not enabled after torque was taken away, ms: as long as the motor control of the drives
     /// rests after a stop. Asked earlier, they would answer only then, when the arm may have begun to fall.
     pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
-    /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.
+    /// Time scale ramp for pause, stop and resume, ms (J-33); longer if the acceleration or torque limits require it.
     pub ramp_ms: u16,
     /// Measured speed that is an error while torque is on, as a multiple of the joint's limit (J-35).
     pub overspeed_factor: f64,
-    /// How long a joint may be that fast before it is an error, ms.
+    /// Time for which a joint may be that fast before that is an error, ms.
     pub overspeed_ms: u16,
-    /// Longest pause or stop, ms, wherever the torque limits allow it (J-33).
+    /// Longest pause or stop, ms, if the torque limits allow it (J-33).
     pub stop_ms: u16,
-    /// How long a pause or stop may brake with all the torque there is, ms; an arm that still moves then is an error (J-33).
+    /// Time for which a pause or stop may brake with all available torque, ms; an arm that still moves then is an error (J-33).
     pub braking_ms_max: u16,
-    /// Torque with which a joint that yields answers a slow push, as a share of its torque limit (J-68); a feedback torque beyond it is
-    /// a push (J-66).
+    /// Torque of a joint that yields against a slow push, as a share of its torque limit (J-68); a feedback torque beyond it is a push
+    /// (J-66).
     pub yield_torque_share: f64,
-    /// In how many of any 100 ms a computed torque may ask for more than its limit before the joint is overloaded (J-43). Meanwhile
-    /// the limit is commanded and the integral held; 0: in the tick that finds it. A single point missing in a recorded trajectory
-    /// makes a peak of a few milliseconds.
+    /// Time out of any 100 ms, ms, in which a computed torque may exceed its limit before the joint is overloaded (J-43). Meanwhile the
+    /// limit is commanded and the integral held; 0: in the tick that finds it. A single point missing in a recorded trajectory makes a peak
+    /// of a few milliseconds.
     pub torque_over_ms: u16,
-    /// An overloaded joint releases the arm, as the manual has it, rather than that the controller reacts to it (J-43, J-66).
+    /// An overloaded joint releases the arm, as in the manual, instead of a reaction of the controller (J-43, J-66).
     pub torque_release: bool,
     /// A held stop is over only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// How long after a joint was enabled at most its torque may stay at the limit without an error, ms (J-43): what it carries
-    /// need not be known before, and has to be caught.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43): the load that the
+    /// joint carries need not be known before, and must be caught.
     pub catch_ms_max: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
     pub blend_ms: u16,
@@ -92,7 +93,8 @@ pub struct Config {
     pub teach_stiction: f64,
     /// Share of the joints' Coulomb friction that Teaching takes away (J-25).
     pub teach_friction: f64,
-    /// Highest speed of the flange in a jog (J-58), and from which on Teaching brakes harder, at twice that fully (J-25), m/s; 0: any.
+    /// Highest speed of the flange in a jog (J-58), and speed from which on Teaching brakes harder, fully at twice that (J-25), m/s; 0:
+    /// any.
     pub tool_speed_max: f64,
     /// Time that a motion has for its stop when the safety input becomes 0, before the torque is taken away, ms (J-22); 0: none.
     pub safety_input_ramp_ms: u16,
@@ -100,22 +102,22 @@ pub struct Config {
     pub friction_sign_width: f64,
     /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.
     pub host_timeout_ms: u16,
-    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is no part of an arm.
+    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is not part of an arm.
     pub speed: f64,
-    /// Joints that are not there, for work on a bench (J-53): no node is expected for them, and no motion is executed. They are no
-    /// part of an arm, and all there at the start of the device.
+    /// Joints that are not there, for work on a bench (J-53): no node is expected for them, and no motion is executed. They are not part of
+    /// an arm, and all joints are there at the start of the device.
     pub absent: [bool; JOINTS],
-    /// Where the model has each of them, rad.
+    /// Position of each of them in the model, rad.
     pub absent_position: [f64; JOINTS],
-    /// What the arm carries at its flange (J-60). It is no part of an arm, and none at the start of the device.
+    /// Payload at the flange of the arm (J-60). It is not part of an arm, and the device starts without a payload.
     pub payload: Payload,
     /// Bounds of the gains and masses that a host may give (J-06).
     pub parameter_bounds: ParameterBounds,
 }
 
 impl Config {
-    /// Lowest and highest position (rad) that the joint with index `joint` may be commanded: its limits, inside the working
-    /// area of the drives while these are configured to keep to it (J-43). Nothing for an index that no joint has.
+    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded: its limits, inside the working
+    /// area of the drives while these are configured to keep to it (J-43). The range is empty for an index that no joint has.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
@@ -126,7 +128,7 @@ impl Config {
         }
     }
 
-    /// The drives are configured to keep to their working area.
+    /// Returns `true` if the drives are configured to keep to their working area.
     pub(crate) const fn keeps_to_working_area(&self) -> bool {
         self.joint_config_bits & config::WORKING_AREA != 0
     }
@@ -191,7 +193,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// The joint that it is about, from 1; 0: the whole arm.
+    /// Returns the joint that the error is about, from 1; 0: the whole arm.
     pub const fn joint(&self) -> usize {
         match *self {
             Self::Braking { .. } => 0,
@@ -244,11 +246,11 @@ impl core::fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl Config {
-    /// Whether the drives can do what the joints' limits allow (J-35, J-43): position limits inside the working area, and a
-    /// threshold of over-speed that the drives can report and do not trip below.
+    /// Checks that the drives can do what the joints' limits allow (J-35, J-43): position limits inside the working area, and a threshold
+    /// of over-speed that the drives can report and do not trip below.
     ///
     /// # Errors
-    /// The first joint whose limits the drives cannot do; a limit that is NaN is one.
+    /// Returns the first joint whose limits the drives cannot do; a limit that is NaN is one.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
         let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);

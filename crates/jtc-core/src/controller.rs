@@ -97,8 +97,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// The device failed, and was reset because of it (J-12): an internal error that no other bit explains. It
-    /// latches like any other (J-21). For the board to call before the first tick.
+    /// Raises an internal error that no other bit explains: the device failed and was reset because of that (J-12). The error latches like
+    /// any other (J-21). The board calls this before the first tick.
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }
@@ -123,12 +123,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.nodes.ignored
     }
 
-    /// In a state that commands torque.
+    /// Returns `true` in a state that commands torque.
     pub(crate) fn powered(&self) -> bool {
         self.state.has_torque()
     }
 
-    /// Where the nodes are wanted in the present state.
+    /// Returns the goal of the nodes in the present state.
     pub(crate) fn goal(&self) -> Goal {
         match self.state {
             ControllerState::Start | ControllerState::Init => Goal::Ready,
@@ -143,7 +143,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.enter(next_state(self.state, &conditions));
     }
 
-    /// What the state of this tick depends on.
+    /// Evaluates the conditions that choose the state of this tick.
     fn conditions(&mut self) -> Conditions {
         let clearing = self.nodes.clearing();
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
@@ -151,7 +151,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.parameters.holdable(self.nodes.positions(), &self.config) {
-            // Received before the positions were known: the host has to send it again.
+            // The model was received before the positions were known: the host must send it again.
             self.parameters.withdraw_model();
             initialised = false;
         }
@@ -160,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: what HoldPos finds missing is known when the payload is in the model.
+            // J-60: the load that HoldPos finds missing is known only when the payload is in the model.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -174,7 +174,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return;
         }
         if matches!(next, ControllerState::Error | ControllerState::Init | ControllerState::Teaching) {
-            // J-24: a trajectory is never resumed after these; it has to be sent again.
+            // J-24: a trajectory is never resumed after these states; the host must send it again.
             self.store.clear();
             self.set_trajectory(TrajectoryState::Null);
         }
@@ -199,7 +199,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
         if last == ControllerState::Teaching {
-            // What decelerates the arm goes on doing so, with all of its torque.
+            // The torque that decelerates the arm continues in full.
             self.motion.law.change_whole_torque();
         } else {
             self.motion.law.change_mode();
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::POINTS_MAX;
 
-    /// What the board's fast memory has to hold: all but the trajectory.
+    /// Checks the size of the part that the board's fast memory must hold: all but the trajectory.
     #[test]
     fn memory_beside_the_trajectory_fits_40_kib() {
         let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();

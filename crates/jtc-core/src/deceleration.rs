@@ -12,54 +12,55 @@ const STANDING: f64 = 0.02;
 const CATCH_DECELERATION: f64 = 3.0;
 /// Highest deceleration of a falling joint, in the middle of its way, as a multiple of the mean.
 const STEEPEST: f64 = 1.5;
-/// The same of a joint that was led, at the begin: there the damping of Teaching decelerates it already.
+/// Highest deceleration of a joint that was led, at the begin, as a multiple of the mean: there the damping of Teaching decelerates it
+/// already.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
-/// A joint with this velocity (rad/s) moves.
+/// Returns `true` if a joint with this velocity (rad/s) moves.
 pub(crate) fn moves(velocity: f64) -> bool {
     velocity.abs() > STANDING
 }
 
-/// A joint that decelerates from where it was, along a smooth ramp of the velocity.
+/// Deceleration of a joint from its start, along a smooth ramp of the velocity.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// 0 in the first tick, which commands what was measured: the error begins at 0, and so does its derivative.
+    /// 0 in the first tick, which commands the measured values: the error begins at 0, and so does its derivative.
     elapsed_ms: f64,
     length_ms: f64,
-    /// It falls: no torque decelerates it at the begin.
+    /// The joint falls: no torque decelerates it at the begin.
     falls: bool,
 }
 
 remembered!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// A joint that a hand leads: from a measured position (rad) and velocity (rad/s), of which the velocity limit is used at
-    /// most, within `length_ms`.
+    /// Creates the deceleration of a joint that a hand leads: from a measured position (rad) and velocity (rad/s), at most the velocity
+    /// limit, within `length_ms`.
     pub fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
-    /// A joint that falls: the faster it is, the longer it takes.
+    /// Creates the deceleration of a joint that falls: the faster the joint is, the longer it takes.
     pub fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
         let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
         let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
         Self { length_ms, falls: true, ..led }
     }
 
-    /// Where it begins, rad, and at which velocity, rad/s.
+    /// Returns the start position, rad, and the start velocity, rad/s.
     pub fn start(&self) -> (f64, f64) {
         (self.from, self.velocity)
     }
 
-    /// The whole way moves by `way` (rad).
+    /// Shifts the whole way by `way` (rad).
     pub fn shift(&mut self, way: f64) {
         self.from += way;
     }
 
-    /// Position, velocity and acceleration of the next tick, and whether the joint rests then.
+    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint rests then.
     pub fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
@@ -70,7 +71,7 @@ impl Deceleration {
         } else {
             (left * left, (1.0 - left * left * left) * (1.0 / 3.0), -2.0 * left)
         };
-        // Never out of the limits; where the arm already is outside, it stays.
+        // Never out of the limits; an arm that is already outside does not go further out.
         let position = (self.from + self.velocity * way * seconds)
             .max(limits.position_min.min(self.from))
             .min(limits.position_max.max(self.from));

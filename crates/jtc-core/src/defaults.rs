@@ -1,4 +1,4 @@
-//! What the device starts with (rules, section 7): made from `arms/avena.toml` at build time.
+//! Defaults at the start of the device (rules, section 7): made from `arms/avena.toml` at build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
 use crate::bounds::ParameterBounds;
@@ -15,14 +15,14 @@ mod arm {
 
 pub(crate) use arm::{MODEL, NAME, PID, POLYNOMIAL};
 
-/// The default friction table of joint `j`.
+/// Returns the default friction table of joint `j`.
 pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
-    // One table may stand for all joints.
+    // A single table may stand for all joints.
     arm::TABLES.get(j).unwrap_or(&arm::TABLES[0])
 }
 
 impl Config {
-    /// The default arm's settings.
+    /// Returns the default arm's settings.
     pub const fn avena() -> Self {
         Self {
             joints: arm::JOINT_CONFIG,
@@ -81,12 +81,12 @@ impl Default for Config {
 }
 
 impl Parameters {
-    /// The default arm's parameters, with the friction polynomial.
+    /// Returns the default arm's parameters, with the friction polynomial.
     pub const fn avena() -> Self {
         Self { model: MODEL, pid: PID, friction: Friction::Polynomial(POLYNOMIAL) }
     }
 
-    /// The default friction tables.
+    /// Returns the default friction tables.
     pub fn avena_friction_table() -> Friction {
         Friction::Table(core::array::from_fn(|j| *friction_table(j)))
     }

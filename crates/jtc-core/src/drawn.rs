@@ -3,7 +3,7 @@ extern crate std;
 use std::format;
 use std::path::Path;
 
-/// What docs/protocol-jtc.md has between the marks of a part is what the code does.
+/// Checks that a part of docs/protocol-jtc.md, between its marks, is what the code draws.
 pub(crate) fn is_in_the_protocol(part: &str, drawn: &str) {
     std::println!("{drawn}");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol-jtc.md");

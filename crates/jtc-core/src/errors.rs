@@ -1,4 +1,4 @@
-//! Errors latch (J-21): what has occurred, and what holds the controller in Error.
+//! Errors latch (J-21): errors that have occurred, and errors that hold the controller in Error.
 use crate::remembered::remembered;
 use crate::{JOINTS, error};
 
@@ -53,7 +53,7 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Internal errors per joint; 0 where there is none.
+    /// Raises internal errors per joint; 0 for a joint without an error.
     pub fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
         if !any(bits) {
             return;
@@ -65,8 +65,8 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Causes of a held stop (J-69): they have occurred. Where it `latches` they are shown until the host clears them; the safety
-    /// output stays 1.
+    /// Takes the causes of a held stop (J-69): they have occurred. If the stop `latches` they are shown until the host clears them; the
+    /// safety output stays 1.
     pub fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
         for j in 0..JOINTS {
             self.joints_occurred[j] |= causes[j];
@@ -75,17 +75,17 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
-    /// Errors of joints that a refused trajectory would have in motion (J-36): they have occurred, and nothing is latched.
+    /// Takes the errors of joints that a refused trajectory would have in motion (J-36): they have occurred, and nothing is latched.
     pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
 
-    /// A held stop is latched: nothing moves until the host clears it.
+    /// Returns `true` if a held stop is latched: nothing moves until the host clears it.
     pub fn held_stop(&self) -> bool {
         any(&self.held)
     }
 
-    /// Without torque there is nothing to hold.
+    /// Ends a held stop: without torque the arm is not held.
     pub fn end_held_stop(&mut self) {
         self.held = [0; JOINTS];
     }
@@ -99,13 +99,13 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// CAN flags of this tick that are no error: those of the gripper (J-14). They are gone when their cause is.
+    /// Shows the CAN flags of this tick that are not errors: those of the gripper (J-14). They are gone when their cause is.
     pub fn show_can(&mut self, flags: u32) {
         self.can_shown = flags;
         self.can_occurred |= flags;
     }
 
-    /// ClearCurrentErrors: what still persists is raised again in the same tick.
+    /// Clears the current errors (ClearCurrentErrors): errors that still persist are raised again in the same tick.
     pub fn clear_current(&mut self) {
         self.emergency_input = false;
         self.device = false;
@@ -115,12 +115,12 @@ impl Errors {
         self.can = 0;
     }
 
-    /// ClearOccurredErrors clears both.
+    /// Clears current and occurred errors (ClearOccurredErrors).
     pub fn clear_occurred(&mut self) {
         *self = Self::default();
     }
 
-    /// An internal error is latched: it holds the safety output at 0 (J-22).
+    /// Returns `true` if an internal error is latched: it holds the safety output at 0 (J-22).
     pub fn internal(&self) -> bool {
         self.device || self.can != 0 || any(&self.joints)
     }
@@ -129,7 +129,7 @@ impl Errors {
         self.internal() || self.emergency_input || self.external_joints
     }
 
-    /// Current error word.
+    /// Returns the current error word.
     pub fn word(&self) -> u16 {
         let bit = |on: bool, bit: u16| if on { bit } else { 0 };
         bit(self.emergency_input, error::EMERGENCY_INPUT)
@@ -144,24 +144,24 @@ impl Errors {
         self.occurred
     }
 
-    /// Current and occurred word of a joint.
+    /// Returns the current and the occurred word of a joint.
     pub fn joint(&self, joint: usize) -> (u16, u16) {
         let of = |words: &[u16; JOINTS]| words.get(joint).copied().unwrap_or(0);
         (of(&self.joints) | of(&self.held), of(&self.joints_occurred))
     }
 
-    /// Current and occurred CAN flags.
+    /// Returns the current and the occurred CAN flags.
     pub fn can(&self) -> (u32, u32) {
         (self.can | self.can_shown, self.can_occurred)
     }
 
-    /// A CAN flag is an error.
+    /// Returns `true` if a CAN flag is an error.
     pub fn can_error(&self) -> bool {
         self.can != 0
     }
 }
 
-/// A joint has an error.
+/// Returns `true` if a joint has an error.
 fn any(joints: &[u16; JOINTS]) -> bool {
     joints.iter().fold(0, |all, bits| all | bits) != 0
 }
@@ -172,7 +172,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// An error is in both words from when it is raised; in that of what has occurred until the host clears that, too.
+    /// An error is in both words from the tick in which it is raised; it stays in the word of occurred errors until the host clears that,
+    /// too.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [
@@ -194,7 +195,8 @@ mod tests {
         }
     }
 
-    /// The cause of a held stop has occurred, and is shown as current where it latches; it is no error, and the safety output stays 1.
+    /// The cause of a held stop has occurred, and is shown as current if the stop latches; it is not an error, and the safety output stays
+    /// 1.
     #[test]
     fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
         for latches in [false, true] {

@@ -1,4 +1,4 @@
-//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, wherever that comes about.
+//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, at any place.
 pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, StopCause, StopKind};
@@ -12,7 +12,7 @@ use crate::{ControllerState, JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Execute from Stop or Finish.
+    /// Starts the path: Execute from Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
         // Joints that are enabled later are looked at again then.
@@ -27,13 +27,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Every measured position is within the start tolerance of `position`.
+    /// Returns `true` if every measured position is within the start tolerance of `position`.
     fn near(&self, position: &[f64; JOINTS]) -> bool {
         let tolerance = self.config.start_tolerance_rad;
         (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
     }
 
-    /// Execute from Pause: at the paused point only.
+    /// Resumes the path: Execute from Pause, at the paused point only.
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
         let paused = self.path_point();
         let there = self.motion.set.point.position == paused;
@@ -57,8 +57,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// The phase that takes the arm from where it is held to `point` of the path; `None` if a joint would leave its range on the way, or if the
-    /// torque limits leave too little for an approach. An arm that stands exactly at the first point needs no approach.
+    /// Returns the phase that takes the arm from the held position to `point` of the path; `None` if a joint would leave its range on the
+    /// way, or if the torque limits leave too little for an approach. An arm that stands exactly at the first point needs no approach.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {
@@ -78,13 +78,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Some(Phase::approach(from, self.motion.approach_ms(point, &inputs)?))
     }
 
-    /// From standstill on the path to the speed that is set.
+    /// Goes from standstill on the path to the speed that is set.
     fn go_on(&mut self) {
         self.clock.go(self.config.speed);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Another speed on the path (J-57): path time gets there along the ramp of J-33.
+    /// Sets another speed on the path (J-57): path time gets there along the ramp of J-33.
     pub(crate) fn set_speed(&mut self, speed: f64) {
         self.config.speed = speed;
         if self.clock.set_pace(speed) {
@@ -92,8 +92,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A joint is overloaded by the motion along the path or on the approach: its time is held back (J-75). Returns false where the arm is in
-    /// no such motion, or stops already. In the tick in which it arrives nothing is to be done about it.
+    /// Holds back the time of the path or of the approach, because a joint is overloaded by that motion (J-75). Returns `false` if the arm
+    /// is not in such a motion, or stops already. In the tick in which the arm arrives, nothing needs to be done about the overload.
     pub(crate) fn hold_back(&mut self) -> bool {
         if self.state != ControllerState::Operate {
             return false;
@@ -110,7 +110,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// A tick of a motion that is held back.
+    /// Runs a tick of a motion that is held back.
     pub(crate) fn step_hold_back(&mut self) {
         if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;
@@ -134,7 +134,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
+    /// Pauses or stops the execution: TES stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
         let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
         match &mut self.phase {
@@ -157,13 +157,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// From now on all the torque there is may brake.
+    /// Allows all available torque to brake from now on.
     pub(crate) fn begin_braking(&mut self) {
         self.braking_ms = Some(0);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Set values of Operate.
+    /// Computes the set values of Operate.
     pub(crate) fn walk(&mut self) {
         match self.phase {
             Phase::Waiting { elapsed_ms } => {
@@ -175,7 +175,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.parameters.blend_payload();
                 // On the path the model does not change (J-60).
                 if !self.motion.set.all_holding() || self.parameters.blend_left_ms() > 0 {
-                    // The wait ends: the operator no longer expects a motion then (J-16).
+                    // The wait ends: by then the operator no longer expects a motion (J-16).
                     self.phase = Phase::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
@@ -227,7 +227,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
-                    // The last point is at rest: the arm stands there whatever the rate is.
+                    // The last point is at rest: the arm stands there, whether the rate is zero or not.
                     Some(trajectory) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
                         self.set_trajectory(trajectory);
@@ -239,7 +239,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Set values at the present path time.
+    /// Computes the set values at the present path time.
     fn follow(&mut self) {
         if self.clock.at_full_speed() && !self.motion.hold_back.is_active() {
             self.clock.slope = 0.0;
@@ -250,12 +250,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.follow(&at, &mut self.clock, &self.config);
     }
 
-    /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
+    /// Returns the positions at the present path time; without a trajectory (which Execute refuses), the held position.
     fn path_point(&self) -> [f64; JOINTS] {
         self.store.at(self.clock.time).map_or(self.motion.set.point.position, |at| at.position)
     }
 
-    /// The last point was commanded in this tick (J-31).
+    /// Returns `true` if the last point was commanded in this tick (J-31).
     fn at_end(&self) -> bool {
         self.clock.time >= f64::from(self.store.duration_ms())
     }
@@ -266,10 +266,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
-    /// brake. Once it has taken its time, what is left may be too slow to be a motion. Path time that still runs when all its
-    /// time is over cannot be stopped by torque: an error of the joints that move. An arm that is held by then and moved by
-    /// something else is a matter of the ordinary limits.
+    /// Runs one more tick of a pause or stop, until the arm stands. Returns `true` if the stop goes on: meanwhile all available torque may
+    /// brake. After `stop_ms` the rest of a motion may be too slow to count as one. Path time that still runs when all its time is over
+    /// cannot be stopped by torque: that is an error of the joints that move. An arm that is held by then and moved by something else is a
+    /// matter of the ordinary limits.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
             // A jog that has begun since, or goes on again.
@@ -294,7 +294,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if self.config.torque_release {
                 self.errors.raise_joints(&causes);
             } else {
-                // The path stands, and what still moves is let down (J-70).
+                // The path stands, and joints that still move are let down (J-70).
                 self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
                 self.hold_stop(&causes, StopKind::Overload);
                 if jogged {

@@ -1,4 +1,4 @@
-//! The extensions of the protocol (J-50 to J-59): who the device is, its settings, the arm as one thing, jogging.
+//! The extensions of the protocol (J-50 to J-59): identity of the device, its settings, the arm as a unit, jogging.
 mod answers;
 mod arm;
 mod image;
@@ -20,16 +20,16 @@ use answers::Answers;
 use image::StoredArm;
 pub use log::firmware_hash;
 
-/// Most values of a SetSettings frame in motion.
+/// Highest number of values of a SetSettings frame in motion.
 const LIVE_MAX: usize = 4;
 
-/// Most values of a SetSettings frame under an arm that is held or taught: a payload has ten.
+/// Highest number of values of a SetSettings frame under an arm that is held or taught: a payload has ten.
 const STANDING_MAX: usize = 16;
 
 /// Highest velocity of a jog while encoders do not fit (J-35), rad/s: a host has single numbers.
 const UNTRUSTED_MAX: f32 = 0.1;
 
-/// Who the device is, as its board knows it (J-52).
+/// Identity of the device, as its board knows it (J-52).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Identity {
     /// The board.
@@ -38,35 +38,35 @@ pub struct Identity {
     pub firmware: &'static str,
     /// Its git revision.
     pub revision: &'static str,
-    /// How often it has started.
+    /// Number of its starts.
     pub boots: u32,
-    /// Why it started last.
+    /// Cause of its last start.
     pub boot_cause: BootCause,
-    /// What stands in its flash; `None` where it has none, or has not read it (J-67).
+    /// Program in its flash; `None` if the board has none, or has not read it (J-67).
     pub program: Option<Program>,
 }
 
-/// What the controller remembers for the extensions.
+/// State of the controller for the extensions.
 #[derive(Clone, Debug)]
 pub(crate) struct Extensions {
     pub answers: Answers,
     pub stored: StoredArm,
-    /// The stored arm is to be written to the memory that lasts.
+    /// The stored arm must be written to the memory that lasts.
     pub store_requested: bool,
     /// An arm is stored, and is not in use: it could not be loaded, or could not be written. The built-in arm does not stand in.
     pub unusable: bool,
-    /// Of the arm in use; `None` when it has to be computed anew.
+    /// Hash of the arm in use; `None` until it is computed again.
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
     /// Ticks in which no Jog with a velocity may come before one is taken again.
     pub jogs_refused_ms: u16,
-    /// How far the hash of the arm has been computed.
+    /// Progress of the hash of the arm.
     hashed: (usize, Hash),
     pub identity: Identity,
     /// Hash of the firmware's version and revision.
     pub firmware_hash: u64,
-    /// The flight recorder, and what a host has asked of it (J-56).
+    /// State of the flight recorder, and the request of a host to it (J-56).
     pub log: LogState,
     pub log_request: Option<LogRequest>,
     name: Name,
@@ -75,7 +75,7 @@ pub(crate) struct Extensions {
 }
 
 impl Extensions {
-    /// A jog was stopped: a key that is still held down moves nothing (J-58).
+    /// Refuses jogs after a jog was stopped: a key that is still held down moves nothing (J-58).
     pub fn refuse_jogs(&mut self) {
         self.jogs_refused_ms = crate::jog::LASTS_MS;
     }
@@ -102,23 +102,23 @@ impl Extensions {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Gives the controller its identity. For the board to call before the first tick.
+    /// Gives the controller its identity. The board calls this before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
     }
 
-    /// Gives the controller what stands in its flash, for boards that read it after the start (J-67).
+    /// Gives the controller the program in its flash, for boards that read it after the start (J-67).
     pub fn set_program(&mut self, program: Option<Program>) {
         self.extensions.identity.program = program;
     }
 
-    /// What an extension request returns, to be sent when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
+    /// Returns the answer to an extension request. Send it when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
     pub fn answer_frame(&self) -> &[u8] {
         self.extensions.answers.frame()
     }
 
-    /// One of the extension requests.
+    /// Carries out an extension request.
     pub(crate) fn carry_out_extension(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
         match command {
             command if self.asked_twice(line, &command) => SliceOutcome::Refused(DataStatus::NotAllowed),
@@ -160,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-58: joint velocities in HoldPos, and not beside a path that is paused.
+    /// Jogs at joint velocities (J-58), in HoldPos, and not while a path is paused.
     fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
         let set = &self.motion.set;
         let free = self.state == ControllerState::HoldPos
@@ -184,7 +184,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             // The wire has f32: the limit itself may come as the next number above it. Written so that NaN is refused.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
-            // J-53: there is no such joint.
+            // J-53: an absent joint does not move.
             let absent = self.config.absent.get(j) == Some(&true);
             if absent && velocity != 0.0 || untrusted && velocity.abs() > f64::from(UNTRUSTED_MAX) {
                 return Err(DataStatus::NotAllowed);
@@ -215,7 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.set.jog(&room.velocity, &room.acceleration, config);
                 Ok(())
             }
-            // It comes to rest where the limit is, and then nothing is left for it.
+            // A torque limit leaves nothing for the jog: the jog comes to rest.
             None if jogging => {
                 self.motion.set.end_jog();
                 Ok(())
@@ -224,7 +224,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A jog comes to rest, and what follows of it is refused. Returns whether there was one.
+    /// Brings a jog to rest, and refuses further jogs that follow from it. Returns `true` if there was a jog.
     pub(crate) fn stop_jog(&mut self) -> bool {
         let jogging = self.motion.set.jogging();
         if jogging {
@@ -238,17 +238,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.state == ControllerState::HoldPos && self.at_rest()
     }
 
-    /// The arm stands, and is to; whether its drives are enabled already does not matter.
+    /// Returns `true` if the arm stands, and no motion is commanded; its drives need not be enabled already.
     fn at_rest(&self) -> bool {
         !self.motion.set.coming_to_rest() && self.motion.set.moving(&self.nodes) == [false; JOINTS]
     }
 
-    /// J-53: what belongs to the arm changes only while there is no torque.
+    /// Returns `true` while the torque is off: the settings of the arm change only then (J-53).
     fn settable(&self) -> bool {
         matches!(self.state, ControllerState::Init | ControllerState::Error)
     }
 
-    /// The arm is held or taught, and no motion is commanded: live settings that bear on the torque may change.
+    /// Returns `true` if the arm is held or taught, and no motion is commanded: live settings that bear on the torque may change.
     fn stands(&self) -> bool {
         match self.state {
             ControllerState::Teaching => true,
@@ -262,7 +262,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-50: what was asked for on this line before is on its way.
+    /// Returns `true` if an answer that was requested on this line before is on its way (J-50).
     fn asked_twice(&self, line: usize, command: &Command<'_>) -> bool {
         let returns = matches!(
             command,
@@ -332,12 +332,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// All values or none (J-53). Where friction tables are in use, one is checked a tick.
+    /// Applies all values or none (J-53). If friction tables are in use, one is checked in a tick.
     fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
-        // A few only: they are taken beside the work of every state.
+        // A few values only: they are taken in addition to the work of every state.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
         let standing = self.stands()
             && values.len() <= STANDING_MAX
@@ -358,7 +358,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         if standing {
             if reloaded {
-                // Nothing at another place, or in place of nothing, is no payload that comes or goes.
+                // An empty payload that is moved, or replaces an empty payload, is not a change of payload.
                 if config.payload.is_there() || self.config.payload.is_there() {
                     let heavier = config.payload.mass - self.config.payload.mass;
                     self.parameters.change_payload(&config, heavier);
@@ -385,10 +385,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Done
     }
 
-    /// From now on these settings count, in a state without torque.
+    /// Uses these settings from now on, in a state without torque.
     fn use_settings(&mut self, config: Config) {
         if self.nodes.use_settings(&config, &self.config) {
-            // It does not start again by itself (J-23).
+            // The pump does not start again by itself (J-23).
             self.pump = false;
         }
         self.config = config;
@@ -396,7 +396,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// J-59: hosts that send nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
+    /// Handles hosts that send nothing for too long (J-59): path time comes to rest, and teaching ends. `done`: host events of this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));

@@ -2,7 +2,7 @@
 use crate::interpolation::ROUNDING;
 use crate::parameters::TableOf;
 
-/// Torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
+/// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
 /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³); the temperature factor is kept within 0.2..2, because the straight line of
 /// the measured drives changes its sign near 60 °C and compensation would become drag.
@@ -10,7 +10,8 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// The same; `sign_slope`: one over the speed at which the sign of the speed, which is a straight line around 0, is whole, s/rad.
+/// Like [`polynomial`]; `sign_slope`: one over the speed at which the sign of the speed, which is a straight line around 0, is whole,
+/// s/rad.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // A speed that is NaN makes the torque NaN by c1.
@@ -18,18 +19,18 @@ pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64
     warmth(c, t) * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
 }
 
-/// Coulomb friction of the polynomial, N·m.
+/// Returns the Coulomb friction of the polynomial, N·m.
 pub(crate) fn coulomb_of_polynomial(c: &[f64; 6], t: f64) -> f64 {
     (warmth(c, t) * c[0]).max(0.0)
 }
 
-/// Factor of the temperature `t` (°C) in the polynomial.
+/// Returns the factor of the temperature `t` (°C) in the polynomial.
 fn warmth(c: &[f64; 6], t: f64) -> f64 {
     within(1.0 + c[4] * (t - c[5]), 0.2, 2.0)
 }
 
-/// Coulomb friction of the table, N·m: what a straight line through two slow speeds has at standstill, in the direction in which that is
-/// less. Nothing where the table has not these speeds.
+/// Returns the Coulomb friction of the table, N·m: the value at standstill of a straight line through two slow speeds, in the direction in
+/// which that is less. Zero if the table does not have these speeds.
 pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     const SLOW: f64 = 0.1;
     let at = |direction: f64| {
@@ -44,12 +45,12 @@ fn within(x: f64, low: f64, high: f64) -> f64 {
     x.max(low).min(high)
 }
 
-/// Lowest and highest velocity of the table, rad/s.
+/// Returns the lowest and highest velocity of the table, rad/s.
 pub fn velocities(table: &TableOf<f32>) -> (f64, f64) {
     ends(&table.velocity)
 }
 
-/// Lowest and highest temperature of the table, °C.
+/// Returns the lowest and highest temperature of the table, °C.
 pub fn temperatures(table: &TableOf<f32>) -> (f64, f64) {
     ends(&table.temperature)
 }
@@ -59,11 +60,11 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
     (f64::from(*first), f64::from(*last))
 }
 
-/// Bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. A temperature outside has the value of the
+/// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. A temperature outside has the value of the
 /// nearest column; `None` for a velocity outside, the ends being inside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
-    // What interpolation between two points may add by rounding does not lead out of the table.
+    // Rounding in the interpolation between two points does not lead out of the table.
     let inside = (v >= slowest - ROUNDING) & (v <= fastest + ROUNDING);
     let (coldest, warmest) = temperatures(table);
     // Not `clamp`, which may panic. NaN becomes the coldest.
@@ -77,7 +78,7 @@ pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     inside.then_some(low + y * (high - low))
 }
 
-/// Where in its cell of an axis `value` is (0..1), and which of `cells` that is; `None` outside the axis.
+/// Returns the place of `value` in its cell of an axis (0..1), and that one of `cells`; `None` outside the axis.
 fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
     let mut found = None;
     // No early exit: the same number of instructions for every value.
@@ -90,7 +91,7 @@ fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Op
     Some(((value - f64::from(start)) / (f64::from(end) - f64::from(start)), cell))
 }
 
-/// Temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
+/// Returns the temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
 pub(crate) fn celsius(byte: u8) -> f64 {
     let t = f64::from(byte);
     if byte >= 200 { t - 256.0 } else { t }
@@ -177,7 +178,7 @@ mod tests {
         assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
     }
 
-    /// What rounding may add on the way between two points does not lead out of the table, and no more does not either.
+    /// Rounding on the way between two points does not lead out of the table; twice as much does.
     #[test]
     fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
         let t = sample();

@@ -1,7 +1,7 @@
-//! Which gains the inertia of the joints bears (J-71), and gains on trial.
+//! Gains that the inertia of the joints bears (J-71), and gains on trial.
 //!
-//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. What a joint feels
-//! at least is looked for in some fixed poses, one a tick; gains are compared with it.
+//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. The least inertia that
+//! a joint feels is looked for in some fixed poses, one in a tick; gains are compared with it.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -14,31 +14,31 @@ use crate::parameters::PidGains;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Poses in which the inertia of the joints is looked at.
+/// Number of poses in which the inertia of the joints is looked at.
 pub(crate) const POSES: usize = 17;
 /// Half of the ticks over which the derivative is taken, and half of the tick for which a torque is held: how much older than
 /// [`Config::delay_ticks`] the torque of the derivative is, ticks.
 const DERIVATIVE_AGE: f64 = 3.0;
-/// The same for the torque of the position error, ticks.
+/// Age of the torque of the position error beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Inertia that is asked for, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times what the loop of one joint needs to be stable,
-/// as long as Kp is not more than half of what its Kd can damp.
+/// Inertia that is asked for, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times the inertia that the loop of one joint needs to
+/// be stable, if Kp is at most half of the Kp that its Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Share of the limit of the position error by which a joint may sag when gains take its integral away.
+/// Highest sag of a joint, as a share of the limit of the position error, when gains take its integral away.
 const SAG: f64 = 0.25;
 /// Share of the torque limit that the position gain makes at the limit of the position error, at least.
 const STIFF: f64 = 0.03;
 /// Time over which new gains come in, and for which they are on trial, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
-/// Time after which an unstable loop is no longer blamed on new gains, ms.
+/// Time after which an unstable loop is not attributed to new gains any more, ms.
 const BLAMED_MS: u16 = 10_000;
 /// Factor of the gains of a joint whose loop is unstable, and time within which it may not be unstable again, ms.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
-/// Shares of the joints' ranges in the poses behind the first: points that fill them evenly (Halton 1960).
+/// Shares of the joints' ranges in the poses after the first: points that fill them evenly (Halton 1960).
 const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
 
 const fn shares() -> [[f32; JOINTS]; POSES - 1] {
@@ -61,7 +61,7 @@ const fn shares() -> [[f32; JOINTS]; POSES - 1] {
     shares
 }
 
-/// The pose of this number: the zero pose first, each within the limits of the joints.
+/// Returns the pose of this number: the zero pose first, each within the limits of the joints.
 fn pose(number: usize, config: &Config) -> JointVec {
     let shares = number.checked_sub(1).and_then(|n| SHARES.get(n));
     core::array::from_fn(|j| {
@@ -86,7 +86,7 @@ impl FeltInertia {
     /// No pose was looked at.
     pub const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
-    /// The pose of this number of an arm, without a payload.
+    /// Looks at the pose of this number of an arm, without a payload.
     #[inline(never)]
     pub fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
@@ -96,20 +96,20 @@ impl FeltInertia {
         }
     }
 
-    /// All poses of an arm were looked at.
+    /// Returns `true` if all poses of an arm were looked at.
     pub fn is_known(&self) -> bool {
         self.joints.iter().all(|felt| felt.is_finite())
     }
 
-    /// Every joint is heavy enough for its gains.
+    /// Returns `true` if every joint is heavy enough for its gains.
     pub fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         // Written so that NaN is refused.
         gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
     }
 }
 
-/// The least inertia (kg·m²) that each joint of an arm without a payload feels, with the others free, as a controller with these
-/// settings looks for it (J-71): the zero pose and sixteen poses within the position limits. A drive of which no rotor inertia is given
+/// Returns the least inertia (kg·m²) that each joint of an arm without a payload feels, with the others free, as a controller with these
+/// settings looks for it (J-71): in the zero pose and sixteen poses within the position limits. A drive without a configured rotor inertia
 /// counts with 0.7 kg·m².
 pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     let mut felt = FeltInertia::NONE;
@@ -117,20 +117,21 @@ pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     felt.joints
 }
 
-/// Inertia (kg·m²) that a joint has to feel for a controller to take its gains (J-71).
+/// Returns the inertia (kg·m²) that a joint must feel for a controller to take its gains (J-71).
 pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
     let derivative = DT * (f64::from(delay_ticks) + DERIVATIVE_AGE);
     derivative * (PER_KD * gains.kd + PER_KP * gains.kp * position_delay(delay_ticks))
 }
 
-/// By how much the torque of the position error is late, s.
+/// Returns the delay of the torque of the position error, s.
 fn position_delay(delay_ticks: u8) -> f64 {
     // No delay is shorter than the tick for which a torque is held.
     DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
 }
 
-/// A joint that is held by the torque `p` of its position error and that `i` of its integral, N·m, does not fall when it gets these
-/// gains: its position gain makes some torque, and what its integral does not hold any more makes a small error (J-71).
+/// Returns `true` if a joint that is held by the torque `p` of its position error and the torque `i` of its integral, N·m, does not fall
+/// when it gets these gains: its position gain makes some torque, and the torque that its integral does not hold any more makes a small
+/// error (J-71).
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -138,7 +139,7 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
     stiff && gains.kp > 0.0 && (held - kept).abs() < SAG * limits.position_error_max * gains.kp
 }
 
-/// What gains were given under torque, and how they do.
+/// Gains that were given under torque, and the state of their trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
     /// Gains before, while they may come back.
@@ -158,37 +159,37 @@ remembered!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 remembered!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// These gains were `given` under torque, in place of those `before`.
+    /// Begins a trial: these gains were `given` under torque, in place of those `before`.
     pub fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
         // Those that were on trial have not held yet.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
-        // What has held comes back: there is nothing to try.
+        // Gains that have held come back: there is nothing to try.
         self.before = self.before.filter(|before| before != given);
         self.held_ms = 0;
     }
 
-    /// The arm is not held any more. Gains on trial have not held it: returns those before.
+    /// Ends the trial, because the arm is not held any more. Gains on trial have not held it: returns the gains before.
     pub fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
         before
     }
 
-    /// The gains before come back only if they may.
+    /// Keeps the gains before only if they may come back.
     pub fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }
 
-    /// There is something to count.
+    /// Returns `true` if there is something to count.
     #[inline(always)]
     pub fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
     }
 
-    /// A tick under torque; `held`: all joints have settled, and none yields.
+    /// Runs a tick under torque; `held`: all joints have settled, and none yields.
     pub fn step(&mut self, held: bool) {
         self.again_ms = self.again_ms.saturating_sub(1);
         self.blend_ms = self.blend_ms.saturating_sub(1);
@@ -198,12 +199,13 @@ impl Trial {
         }
     }
 
-    /// Gains are on trial.
+    /// Returns `true` if gains are on trial.
     pub fn is_on(&self) -> bool {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// The gains of this tick, while those that were `given` come in: stiffness and damping go over, the integral has changed at once.
+    /// Returns the gains of this tick, while those that were `given` come in: stiffness and damping go over, the integral has changed at
+    /// once.
     pub fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -217,20 +219,20 @@ impl Trial {
         Some(blended)
     }
 
-    /// Other gains go over from those that act while `given` are in use.
+    /// Begins to go over to other gains from those that act while `given` are in use.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
         self.blend_ms = BLEND_MS;
     }
 
-    /// The joint was unstable a moment ago, and is so again.
+    /// Returns `true` if the joint was unstable less than [`AGAIN_MS`] ago.
     pub fn again(&self, joint: usize) -> bool {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Joints (a bit each) do not bear their `gains`; the loops of those that are `unstable` are so. Returns why and what the gains
-    /// become, if they have to change: those before come back. Where there are none, an unstable joint is held more softly.
+    /// Takes joints (a bit each) that do not bear their `gains`; the loops of the `unstable` ones are unstable. Returns the cause and the
+    /// new gains, if they must change: the gains before come back. Without such gains, an unstable joint is held more softly.
     pub fn fails(
         &mut self,
         failed: u8,
@@ -249,7 +251,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // The joints that fail are not held with what they do not bear for any longer.
+        // The joints that fail are not held any longer with gains that they do not bear.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
@@ -259,7 +261,7 @@ impl Trial {
     }
 }
 
-/// Softer gains for the `joints` (a bit each), which damp them at least.
+/// Returns softer gains for the `joints` (a bit each), which damp them at least.
 fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
     core::array::from_fn(|j| match gains[j] {
         own if joints >> j & 1 == 0 => own,

@@ -1,4 +1,4 @@
-//! Held stops (J-69): what moves comes to rest, the arm is held, and why is kept for the host.
+//! Held stops (J-69): moving joints come to rest, the arm is held, and the cause is kept for the host.
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
 
 use crate::controller::Controller;
@@ -7,43 +7,43 @@ use crate::remembered::remembered;
 use crate::teach::too_fast;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
-/// Why the arm came to a held stop last.
+/// Cause of the last held stop.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LastStop {
     cause: StopCause,
-    /// The tick in which it began; 0: there was none.
+    /// Tick in which the stop began; 0 without a stop.
     tick: u64,
 }
 
 remembered!(StopCause { kind, joint, value, limit });
 remembered!(LastStop { cause, tick });
 
-/// This `error` for each joint of a mask.
+/// Returns this `error` for each joint of a mask.
 fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {
     core::array::from_fn(|j| if joints & 1 << j != 0 { error } else { 0 })
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// A held stop begins. `errors`: what is shown of each joint.
+    /// Begins a held stop. `errors`: joint errors to show.
     pub(crate) fn hold_stop(&mut self, errors: &[u16; JOINTS], kind: StopKind) {
         let joint = errors.iter().position(|bits| *bits != 0).unwrap_or(0);
         let (value, limit) = self.measure(kind, joint);
         self.hold_stop_for(errors, self.cause(kind, joint, value, limit));
     }
 
-    /// The same for a cause that is known.
+    /// Like [`Self::hold_stop`], for a known cause.
     pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
-        // What comes while the arm is held already is a consequence more often than not.
+        // A cause that comes while the arm is already held is a consequence more often than not.
         if !self.errors.held_stop() {
             self.keep_cause(cause);
         }
         self.rest_and_hold(errors);
     }
 
-    /// What moves comes to rest, and the arm is held.
+    /// Brings moving joints to rest, and holds the arm.
     pub(crate) fn rest_and_hold(&mut self, errors: &[u16; JOINTS]) {
         self.errors.hold_joints(errors, self.config.protective_stop_latches);
-        // A Teaching that waits does so anew.
+        // A teach request that waits begins its wait again.
         self.teaching_waits_ms = 0;
         if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
             self.leave_path(ExecCommand::Pause);
@@ -51,7 +51,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// The encoders of joints do not fit (J-35): the arm comes to rest and is held, also out of Teaching.
+    /// Brings the arm to rest and holds it, also out of Teaching, because encoders of joints do not fit (J-35).
     #[cold]
     pub(crate) fn hold_misfits(&mut self) {
         let misfits = self.nodes.misfits();
@@ -67,8 +67,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A joint that is led too fast ends Teaching, before its over-speed releases the arm (J-25): the arm comes to rest and is held.
-    /// This tick is so `late`, ms.
+    /// Ends Teaching if a joint is led too fast, before its over-speed releases the arm (J-25): the arm comes to rest and is held. This
+    /// tick is `late` by this time, ms.
     pub(crate) fn end_fast_teaching(&mut self, late: u16) {
         let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
         for j in 0..JOINTS {
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-35: nothing is executed with positions that are not to be trusted. It is shown as what has occurred.
+    /// Refuses the execution of a trajectory while positions are not trusted (J-35), and shows that as an error that has occurred.
     pub(crate) fn check_trust(&mut self) -> Result<(), DataStatus> {
         match self.nodes.untrusted() {
             0 => Ok(()),
@@ -95,17 +95,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// The cause of a joint with this index.
+    /// Returns the cause of a joint with this index.
     pub(crate) fn cause(&self, kind: StopKind, joint: usize, value: f64, limit: f64) -> StopCause {
         StopCause { kind, joint: joint as u8 + 1, value: value as f32, limit: limit as f32 }
     }
 
-    /// From now on this is the last cause.
+    /// Keeps this cause as the last one.
     pub(crate) fn keep_cause(&mut self, cause: StopCause) {
         self.last_stop = LastStop { cause, tick: self.observed.tick };
     }
 
-    /// What has been found of a joint, and what is allowed, in the unit of the kind.
+    /// Returns the measured value of a joint, and its limit, in the unit of the kind.
     fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
         // An index of this crate's own: written so that the compiler sees that it is one of a joint.
         let j = joint.min(JOINTS - 1);
@@ -133,7 +133,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// What the controller does about what it has found, and why it stopped last: what Info says of it (J-69).
+    /// Returns the present reactions of the controller, and why it stopped last, for Info (J-69).
     pub fn reactions(&self) -> Reactions {
         let LastStop { cause, tick } = self.last_stop;
         let ago = self.observed.tick.saturating_sub(tick).min(u32::MAX.into()) as u32;

@@ -1,8 +1,8 @@
 //! Path time that is held back while a joint is overloaded by its motion (J-75).
 //!
-//! A path at the torque limits asks for more than there is where the arm is heavier or has more friction than its model. Slower, it asks
-//! for less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling under
-//! torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
+//! A path at the torque limits needs more torque than there is if the arm is heavier or has more friction than its model. A slower path
+//! needs less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling
+//! under torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
 use crate::JOINTS;
 use crate::path::PathClock;
 use crate::remembered::remembered;
@@ -11,26 +11,27 @@ use crate::remembered::remembered;
 const INERTIA_MS: u16 = 60;
 /// Time without a joint at its limit after which the path gets its pace back, ms.
 const QUIET_MS: u16 = 200;
-/// Longest time that a joint may be at its limit in one go, ms.
+/// Longest time that a joint may be at its limit without a break, ms.
 const PRESSED_MS: u16 = 250;
-/// Longest time of all of it in a run, ms.
+/// Longest total time of holding back in a run, ms.
 const RUN_MS: u16 = 5_000;
-/// Longest time at a rate below the first, ms, until the path has its pace again: torque that just suffices to hold the arm lets it stand for ever.
+/// Rate below which the path stands, and longest time below it, ms, until the path has its pace again. Torque that just suffices to hold
+/// the arm would let the path stand for ever.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
-/// How the path is held back.
+/// State of holding back the path.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
-    /// The path is on the way back to its pace, and for how long it has stood.
+    /// The path is on the way back to its pace (`restores`), and the time for which it has stood.
     restores: bool,
     stands_ms: u16,
     /// Ticks since the inertia was computed.
     since_ms: u16,
     /// Ticks in which a joint has been at its limit, without a break.
     pressed_ms: u16,
-    /// Ticks since one was.
+    /// Ticks since a joint was at its limit.
     quiet_ms: u16,
     /// Ticks of holding back in this run.
     run_ms: u16,
@@ -40,10 +41,10 @@ pub(crate) struct HoldBack {
 
 remembered!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
 
-/// What follows from a tick.
+/// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// It goes on as it is.
+    /// The path goes on as before.
     Nothing,
     /// The path gets its pace back.
     Restore,
@@ -52,17 +53,17 @@ pub(crate) enum Next {
 }
 
 impl HoldBack {
-    /// The path is held back.
+    /// Returns `true` if the path is held back.
     pub fn is_active(&self) -> bool {
         self.active
     }
 
-    /// Each tick has to be looked at.
+    /// Returns `true` if each tick must be watched.
     pub fn is_watched(&self) -> bool {
         self.active | self.restores
     }
 
-    /// A joint is overloaded. Returns whether the inertia of the arm has to be computed.
+    /// Begins to hold back because a joint is overloaded. Returns `true` if the inertia of the arm must be computed.
     pub fn begin(&mut self) -> bool {
         if self.active && self.since_ms < INERTIA_MS {
             return false;
@@ -74,22 +75,22 @@ impl HoldBack {
         true
     }
 
-    /// The path stops: it is not held back any more. What it took in this run counts on.
+    /// Ends holding back because the path stops. Its time in this run still counts.
     pub fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
 
-    /// Time of holding back in this run, ms.
+    /// Returns the time of holding back in this run, ms.
     pub fn run_ms(&self) -> u16 {
         self.run_ms
     }
 
-    /// Whether the joint has been at its limit since the path is held back.
+    /// Returns `true` if the joint has been at its limit since holding back began.
     pub fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }
 
-    /// A tick on the path, in the time of this clock; `joints` that are at their torque limits.
+    /// Runs a tick on the path, in the time of this clock; `joints`: `true` for those at their torque limits.
     pub fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;

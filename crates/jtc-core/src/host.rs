@@ -27,7 +27,7 @@ use upload::LineUpload;
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// J-51: existing hosts know no data status above 6.
+/// Returns the data status for existing hosts, which know none above 6 (J-51).
 pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     match data {
         DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
@@ -35,7 +35,7 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     }
 }
 
-/// How an event was served.
+/// Cost of an event that was served.
 enum Served {
     /// With a few instructions: there is time for another.
     Quickly,
@@ -46,8 +46,8 @@ enum Served {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Urgent commands first, then the oldest events of the host link: short ones up to the first long one, or a slice
-    /// of it. Returns how many are done.
+    /// Serves urgent commands first, then the oldest events of the host link: short ones up to the first long one, or a slice of it.
+    /// Returns the number of events that are done.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
             for (command, count) in commands.iter() {
@@ -69,7 +69,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// J-04: Stop and Pause act at once. Their records come when their frames have their turn.
+    /// Executes Stop and Pause at once (J-04). Their records come when their frames have their turn.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
@@ -80,7 +80,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Serves one event, or a slice of it; when it is done it has its record.
+    /// Serves one event, or a slice of it; an event that is done has its record.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
         let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
@@ -102,7 +102,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
-                            // It is older than a Stop or a Pause that has acted.
+                            // The Jog is older than a Stop or a Pause that has acted.
                             Command::Jog(_) if received.overtaken => {
                                 (SliceOutcome::Refused(DataStatus::NotAllowed), Served::Quickly)
                             }
@@ -138,7 +138,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// The command takes a few instructions and leaves the state of the controller as it is, on which the next one depends.
+    /// Returns `true` if the command takes a few instructions and leaves the state of the controller as it is, on which the next command
+    /// depends.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
             Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => {
@@ -159,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: what the controller reacts to is not gone yet.
+            // J-69: the condition that the controller reacts to is not gone yet.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -212,7 +213,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::ResetCanDevices { nodes } => {
                 self.nodes.reset(nodes);
-                // It is not to start by itself when the gripper is back.
+                // The pump must not start by itself when the gripper is back.
                 self.pump &= nodes & GRIPPER_MASK == 0;
                 SliceOutcome::Done
             }
@@ -231,8 +232,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-21: a fault that a joint still reports is raised again in this tick. A `clear` after which all is as before is refused: it is
-    /// not carried out later either, when the joint has been cleared.
+    /// Clears errors (J-21): a fault that a joint still reports is raised again in this tick. A `clear` after which all is as before is
+    /// refused: it is not carried out later either, when the joint has been cleared.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -245,12 +246,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Friction, gains or model.
+    /// Takes friction, gains or model.
     fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
-                // What is built in is another arm than the one that was stored (J-54).
+                // The built-in arm is another arm than the one that was stored (J-54).
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
             if self.extensions.stored.is_there() {
@@ -270,7 +271,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Friction, in slices.
+    /// Takes friction, in slices.
     fn take_friction(&mut self, command: &Command<'_>) -> SliceOutcome {
         let (parameters, config) = (&mut self.parameters, &self.config);
         match *command {
@@ -282,7 +283,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A model, in slices, `taken` by the parameters.
+    /// Takes a model, in slices, `taken` by the parameters.
     fn take_model(
         &mut self,
         taken: impl FnOnce(
@@ -305,7 +306,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         outcome
     }
 
-    /// Gains. Under torque they have to hold what is held, and are on trial (J-71).
+    /// Takes gains. Under torque they must hold the torque that is held now, and are on trial (J-71).
     #[inline(never)]
     fn take_gains(&mut self, gains: &[PidGains; JOINTS]) -> Result<(), DataStatus> {
         self.parameters.check_pid(gains, &self.config)?;
@@ -321,7 +322,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// What a default means where an arm is stored (J-54).
+    /// Uses the stored arm for a default, if an arm is stored (J-54).
     #[inline(never)]
     fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
         let Self { extensions, parameters, config, nodes, .. } = self;
@@ -337,7 +338,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
                 self.model_taken(outcome)
             }
-            // It has one friction, whichever a host asks for.
+            // The stored arm has one friction, whichever a host asks for.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
@@ -345,12 +346,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-69: a held stop is latched, or a joint yields. J-22: the safety input stops the arm.
+    /// Returns `true` if a held stop is latched, or a joint yields (J-69), or the safety input stops the arm (J-22).
     pub(crate) fn stops_held(&self) -> bool {
         self.errors.held_stop() || self.motion.law.any_yields() || self.safety_stop_ms.is_some()
     }
 
-    /// J-53: joints are set absent.
+    /// Returns `true` if joints are set absent (J-53).
     fn joints_absent(&self) -> bool {
         self.config.absent.contains(&true)
     }
@@ -365,14 +366,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: what was stopped is not to be gone on with.
+            // J-33: a stopped path must not go on.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Teaching was accepted, and begins as soon as the arm is held; a hand had led the arm, and it is not at rest yet; or joints are
-            // absent (J-53).
+            // Teaching was accepted, and begins as soon as the arm is held; a hand had led the arm, and it is not at rest yet; or joints
+            // are absent (J-53).
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()
@@ -382,7 +383,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // J-30: the Stop during its upload was meant for this.
+            // J-30: the Stop during its upload was meant for this trajectory.
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
                 if self.store.stopped() =>
             {
@@ -417,7 +418,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-36: what was found in a trajectory that was taken all the same is the reason to refuse it now, and is shown as what has occurred.
+    /// Refuses a trajectory that was taken although the check had found a violation (J-36), and shows that as an error that has occurred.
     fn check_verdict(&mut self) -> Result<(), DataStatus> {
         let Some(violation) = self.store.refused() else { return Ok(()) };
         let error = |j: usize| if j == violation.joint { violation.joint_error() } else { 0 };
@@ -426,8 +427,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Err(DataStatus::IncorrectValue)
     }
 
-    /// J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was
-    /// loaded, the path inside its velocities. No other parameter that is accepted in HoldPos bears on that check.
+    /// Checks J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was loaded,
+    /// the path inside its velocities. No other parameter that is accepted in HoldPos bears on that check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

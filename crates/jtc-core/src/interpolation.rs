@@ -24,7 +24,7 @@ pub struct SetPoint {
 remembered!(SetPoint { position, velocity, acceleration });
 
 impl SetPoint {
-    /// Standing still at `position`.
+    /// Returns a standstill at `position`.
     pub fn still(position: [f64; JOINTS]) -> Self {
         Self { position, ..Self::default() }
     }
@@ -40,7 +40,7 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// What rounding may add to a value between two points, in rad and rad/s: far below what any limit means.
+/// Addition to a value between two points by rounding, in rad and rad/s: too small to matter for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Rises from 0 to 1 without a corner.
@@ -49,18 +49,17 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// What the samples of both points contribute to the channels at one place between them: Hermite's basis. It is the same for all
-/// joints.
+/// Weights of the samples of both points in the channels at one place between them: Hermite's basis. They are the same for all joints.
 struct Weights {
-    /// Of the positions, the velocities and the accelerations to the position.
+    /// Weights of the positions, the velocities and the accelerations in the position.
     position: [[f64; 2]; 3],
-    /// Of the velocities and the accelerations to the velocity.
+    /// Weights of the velocities and the accelerations in the velocity.
     velocity: [[f64; 2]; 2],
-    /// Of the accelerations to the acceleration.
+    /// Weights of the accelerations in the acceleration.
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and what a step makes of them: what is the same in all of a trajectory.
+/// Units of the samples, and their changes in a step: the same in all of a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one.
@@ -74,7 +73,7 @@ struct Units {
 }
 
 impl Units {
-    /// Of points that are `h` seconds apart.
+    /// Creates the units of points that are `h` seconds apart.
     fn new(position: f64, velocity: f64, acceleration: f64, h: f64) -> Self {
         let (way, half_way, change) = (h * velocity, 0.5 * h * h * acceleration, h * acceleration);
         Self { position, velocity, acceleration, way, half_way, change }
@@ -82,7 +81,7 @@ impl Units {
 }
 
 impl Weights {
-    /// At the fraction `u` of a step.
+    /// Returns the weights at the fraction `u` of a step.
     #[inline(always)]
     fn at(u: f64, units: &Units) -> Self {
         let w = 1.0 - u;
@@ -103,7 +102,7 @@ impl Weights {
         }
     }
 
-    /// Position, velocity and acceleration from those of both points.
+    /// Returns position, velocity and acceleration from those of both points.
     #[inline(always)]
     fn between(&self, a: [f64; 3], b: [f64; 3]) -> (f64, f64, f64) {
         let of = |weights: &[f64; 2], channel: usize| weights[0] * a[channel] + weights[1] * b[channel];
@@ -126,7 +125,7 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// Of so many milliseconds, at least one.
+    /// Creates a step of `ms` milliseconds, at least one.
     pub fn new(ms: u16) -> Self {
         let ms = ms.max(1);
         let [position, velocity, acceleration] =
@@ -146,7 +145,7 @@ impl Step {
     }
 }
 
-/// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
+/// Returns the set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     let weights = Weights::at(u, &Units::new(1.0, 1.0, 1.0, h));
     let mut out = SetPoint::default();
@@ -157,8 +156,8 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Speed of the position itself (rad/s) where [`interpolate`] takes it: that of the cubic, and what is due to the way that the
-/// velocities of both points do not explain.
+/// Returns the speed of the position itself (rad/s) at the place of [`interpolate`]: the speed of the cubic, plus the part due to the way
+/// that the velocities of both points do not explain.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {
@@ -245,7 +244,7 @@ mod tests {
             }
         }
 
-        /// Where a trajectory has a point, it is met to the last bit, and at rest it is at rest.
+        /// A point of a trajectory is met to the last bit, and at rest it is at rest.
         #[test]
         fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
             let (step, mut at) = (Step::new(ms), SetPoint::default());

@@ -1,10 +1,10 @@
-//! What goes into a tick and what comes out.
+//! Inputs and outputs of a tick.
 use jtc_bus::Frame;
 use jtc_wire::{LinkEvent, UrgentCommands};
 
 use crate::HOST_LINES;
 
-/// How the joint bus is.
+/// State of the joint bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusState {
     /// The frame given out by the last tick was acknowledged on the bus.
@@ -13,18 +13,18 @@ pub struct BusState {
     pub bus_off: bool,
 }
 
-/// Something that a host sent, in the order of its line.
+/// Event that a host sent, in the order of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostEvent<'a> {
     /// The line, which gets the response record.
     pub line: usize,
-    /// It was received before an urgent command that the controller was given in this tick or an earlier one: an Execute
-    /// is not carried out any more, and a Stop or a Pause has acted already (J-04).
+    /// The event was received before an urgent command that the controller was given in this tick or an earlier one: an Execute is not
+    /// carried out any more, and a Stop or a Pause has acted already (J-04).
     pub overtaken: bool,
     /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51). Its record has no data
     /// status above 6, and segment 0 acts as a Stop in Operate (J-30).
     pub plain: bool,
-    /// What was received.
+    /// The event.
     pub event: LinkEvent<'a>,
 }
 
@@ -40,18 +40,18 @@ pub struct Inputs<'a> {
     pub safety_input: bool,
     /// Ticks since the last one that did not come, or came half a tick late or more (J-12).
     pub missed_ticks: u16,
-    /// Stop and Pause that have arrived on each line since the last tick. They act in this tick, whatever waits (J-04); their
-    /// frames come as events, too, once it is their turn.
+    /// Stop and Pause that have arrived on each line since the last tick. They act in this tick, before all events that wait (J-04); their
+    /// frames come as events, too, when it is their turn.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The oldest events of the host link (at most [`jtc_wire::EVENTS_MAX`] are looked at). Those that are not done
-    /// are to be offered again in the next tick.
+    /// The oldest events of the host link (at most [`jtc_wire::EVENTS_MAX`] are looked at). Events that are not done must be offered again
+    /// in the next tick.
     pub host: &'a [HostEvent<'a>],
     /// The serial transmitter can take a status now.
     pub status_free: bool,
 }
 
 impl Inputs<'_> {
-    /// A tick in which nothing comes and nothing is wrong.
+    /// A tick without frames, events and faults.
     pub const QUIET: Self = Inputs {
         bus: &[],
         bus_state: BusState { acknowledged: true, bus_off: false },
@@ -70,16 +70,16 @@ pub struct Outputs {
     pub bus: Option<Frame>,
     /// Level of the safety output: true = no error (J-22).
     pub safety_output: bool,
-    /// A JtcStatus frame is to be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. It is not
-    /// in here, because these outputs are copied in every tick, and few of them have a status.
+    /// A JtcStatus frame must be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. The frame is not in here,
+    /// because these outputs are copied in every tick, and few of them have a status.
     pub status: bool,
-    /// The line that the response record in that status is for, the other gets the status without it. `None`: it has none.
+    /// Line that the response record in that status is for; the other line gets the status without it. `None`: the status has no record.
     pub record_line: Option<usize>,
-    /// [`Controller::answer_frame`](crate::Controller::answer_frame) is to be sent now, on this line only (J-50). Never together with a
+    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). Never together with a
     /// status.
     pub answer_line: Option<usize>,
-    /// [`Controller::stored_arm`](crate::Controller::stored_arm) is to be written to the memory that lasts (J-54).
+    /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to the memory that lasts (J-54).
     pub store: bool,
-    /// So many of the host events are done, from the oldest on: release them.
+    /// Number of host events that are done, from the oldest on: release them.
     pub host_done: usize,
 }

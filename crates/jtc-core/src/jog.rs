@@ -1,6 +1,6 @@
-//! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of
-//! bounded acceleration and jerk, and slows down before the end of its range by itself. When the jog ends, its time comes to rest as that
-//! of a path does, which stops all joints as hard as on a path (J-33).
+//! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of bounded
+//! acceleration and jerk, and slows down before the end of its range by itself. When the jog ends, its time comes to rest like path time,
+//! which stops all joints as hard as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::config::Config;
@@ -17,35 +17,35 @@ const ACCELERATION: f64 = 0.2;
 /// Time in which that acceleration is reached, s.
 const RISE_S: f64 = 0.1;
 
-/// Highest acceleration of a joint where the torque limits leave enough for it, rad/s².
+/// Returns the highest acceleration of a joint if the torque limits leave enough torque for it, rad/s².
 pub(crate) fn hardest(limits: &JointConfig) -> f64 {
     ACCELERATION * limits.acceleration_max
 }
 
-/// One joint.
+/// Jog of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct JointJog {
     /// Commanded velocity, rad/s.
     wanted: f64,
     /// Highest acceleration, rad/s².
     most: f64,
-    /// Of the set values, rad/s and rad/s².
+    /// Velocity and acceleration of the set values, rad/s and rad/s².
     velocity: f64,
     acceleration: f64,
 }
 
-/// How fast the acceleration of a joint changes, rad/s³.
+/// Returns the rate at which the acceleration of a joint changes, rad/s³.
 pub(crate) fn jerk(limits: &JointConfig) -> f64 {
     hardest(limits) / RISE_S
 }
 
-/// All joints, from the first command until they rest.
+/// Jog of all joints, from the first command until they rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
     /// Ticks since the last command.
     silent_ms: u16,
-    /// The time in which they move.
+    /// Time in which the joints move.
     clock: PathClock,
 }
 
@@ -53,12 +53,13 @@ remembered!(JointJog { wanted, most, velocity, acceleration });
 remembered!(Jog { joints, silent_ms, clock });
 
 impl Jog {
-    /// At rest.
+    /// Begins at rest.
     pub fn begin() -> Self {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// New velocities, rad/s, and the highest accelerations, rad/s². Those that come on the way to rest count when the joints stand.
+    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that come on the way to rest count when the joints
+    /// stand.
     pub fn command(
         &mut self,
         wanted: &[f64; JOINTS],
@@ -79,13 +80,13 @@ impl Jog {
         }
     }
 
-    /// The joints come to rest.
+    /// Brings the joints to rest.
     pub fn end(&mut self) {
         self.silent_ms = 0;
         self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
-    /// A tick begins. Returns whether all joints begin to come to rest with it.
+    /// Begins a tick. Returns `true` if all joints begin to come to rest in it.
     pub fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
@@ -98,7 +99,7 @@ impl Jog {
         ends
     }
 
-    /// It has not begun to come to rest.
+    /// Returns `true` if the jog has not begun to come to rest.
     pub fn goes_on(&self) -> bool {
         self.clock.is_going()
     }
@@ -107,13 +108,13 @@ impl Jog {
         self.joints.iter().any(|joint| joint.wanted != 0.0)
     }
 
-    /// Every joint rests, and is to.
+    /// Returns `true` if every joint rests and no velocity is commanded.
     pub fn rests(&self) -> bool {
         let rests = |joint: &JointJog| joint.velocity == 0.0 && joint.acceleration == 0.0;
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
-    /// A tick: moves `point` on; `ramp` takes the clock on, on its way to another rate.
+    /// Runs a tick: moves `point` on; `ramp` advances the clock on its way to another rate.
     pub fn step(
         &mut self,
         point: &mut SetPoint,
@@ -124,7 +125,7 @@ impl Jog {
             (joints.map(|joint| joint.velocity), joints.map(|joint| joint.acceleration))
         };
         if self.clock.standing() {
-            // What was commanded on the way to rest.
+            // Forgets the velocities of the commands before the arm came to rest.
             for joint in &mut self.joints {
                 (joint.velocity, joint.acceleration) = (0.0, 0.0);
             }
@@ -146,7 +147,7 @@ impl Jog {
 }
 
 impl JointJog {
-    /// A tick that takes this time of the jog (s), towards what is wanted if the jog `goes` on.
+    /// Runs a tick that takes this time of the jog (s), towards the wanted velocity if the jog `goes` on.
     fn step(
         &mut self,
         position: &mut f64,
@@ -171,12 +172,13 @@ impl JointJog {
         *position = within;
     }
 
-    /// What it moves in this time (s) until it is in the state `next`, rad.
+    /// Returns the distance that the joint moves in this time (s) until it is in the state `next`, rad.
     fn way(&self, next: &Self, tick: f64) -> f64 {
         0.5 * (self.velocity + next.velocity) * tick
     }
 
-    /// So long (s) later, on the way to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster than `fastest` (rad/s).
+    /// Returns the state after this time (s), on the way to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster than
+    /// `fastest` (rad/s).
     fn toward(&self, target: f64, jerk: f64, fastest: f64, tick: f64) -> Self {
         if tick <= 0.0 {
             return *self;
@@ -191,7 +193,7 @@ impl JointJog {
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
-            // A joint that accelerates when its jog ends gets faster until its acceleration is back at zero. It arrives at the
+            // A joint that accelerates when its jog ends gets faster until its acceleration is back at zero. The joint arrives at the
             // velocity that was commanded before; whole ticks can add a few µrad/s, which the limit does not allow.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
@@ -200,8 +202,8 @@ impl JointJog {
         }
     }
 
-    /// The way until it stands, rad, when it stops at once: the acceleration falls to its highest, against the motion, with this `jerk`
-    /// (rad/s³), stays there, and rises to zero as steadily. A little more, for what the ticks make of it.
+    /// Returns the distance until the joint stands, rad, if it stops at once: the acceleration falls to its highest, against the motion,
+    /// with this `jerk` (rad/s³), stays there, and rises to zero as steadily. A little is added for the effect of whole ticks.
     fn stopping_way(&self, jerk: f64) -> f64 {
         let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
         let (v, a) = if sign < 0.0 {
@@ -209,7 +211,8 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // From where its acceleration is zero: still to come while it gets faster, behind it while it brakes.
+        // Counted from the point of zero acceleration: it is still to come while the joint gets faster, and in the past while the joint
+        // brakes.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
         let rest = if peak >= self.most * rise {
@@ -251,8 +254,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is commanded and when: within the range, the velocity and acceleration limits and the jerk, and at rest soon
-        /// after the last command.
+        /// For any commands at any time: within the range, the velocity and acceleration limits and the jerk, and at rest soon after the
+        /// last command.
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
@@ -283,7 +286,7 @@ mod tests {
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
                     let at_end = position[j] == low || position[j] == high;
-                    // What is left of a velocity at the very end of the range is next to nothing.
+                    // The velocity that remains at the very end of the range is almost zero.
                     let step = (v[j] - last.0[j]).abs();
                     assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
                     let jerk = (a[j] - last.1[j]).abs();
@@ -334,7 +337,7 @@ mod tests {
         [avena, with([3.15, 3.15, 3.15, 3.2, 3.2, 3.2], 20.0), with([3.1415; JOINTS], 15.0)]
     }
 
-    /// What ends a jog, or changes it.
+    /// Event that ends a jog, or changes it.
     #[derive(Clone, Copy, Debug)]
     enum End {
         /// No further Jog comes.
@@ -485,7 +488,7 @@ mod tests {
     }
 
     /// A key that is pressed before the arm stands, the same, the opposite one or another: first the arm comes to rest, and no joint gets
-    /// faster on the way. What moves then keeps to the acceleration of a jog.
+    /// faster on the way. A joint that moves then keeps to the acceleration of a jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
         let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];

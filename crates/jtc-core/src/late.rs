@@ -1,16 +1,16 @@
-//! Late and missing ticks (J-12): a few are borne; ten within a second are a failure of the device.
+//! Late and missing ticks (J-12): a few are tolerated; ten within a second are a failure of the device.
 use crate::remembered::remembered;
 
-/// So many of them.
+/// Number of late ticks that are a failure.
 const COUNT: usize = 10;
-/// Within less than this, ms.
+/// Window for these ticks, ms: they must come within less than this.
 const WINDOW_MS: u64 = 1_000;
 
-/// When the last late or missing ticks were.
+/// Times of the last late or missing ticks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LateTicks {
     now_ms: u64,
-    /// The last ones, a ring; those that never were lie far enough back.
+    /// The last times, in a ring; times that never were lie far enough back.
     at_ms: [u64; COUNT],
     next: usize,
 }
@@ -24,7 +24,7 @@ impl Default for LateTicks {
 }
 
 impl LateTicks {
-    /// One tick, before which `missed` did not come or came late; true when there have been too many.
+    /// Counts one tick, before which `missed` ticks did not come or came late. Returns `true` if there have been too many.
     pub fn count(&mut self, missed: u16) -> bool {
         self.now_ms += 1 + u64::from(missed);
         let mut too_many = false;
@@ -33,7 +33,7 @@ impl LateTicks {
                 *slot = self.now_ms;
             }
             self.next = (self.next + 1) % COUNT;
-            // What is there now is the oldest of the last ten.
+            // This slot now has the oldest of the last ten.
             too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
         }
         too_many
@@ -44,7 +44,7 @@ impl LateTicks {
 mod tests {
     use super::*;
 
-    /// Ticks, of which every `n`-th comes after `missed` that did not; in which tick that is too many.
+    /// Returns the tick in which the late ticks are too many, if every `n`-th tick comes after `missed` missing ones.
     fn until_too_many(n: u32, missed: u16) -> Option<u32> {
         let mut late = LateTicks::default();
         (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
@@ -55,7 +55,7 @@ mod tests {
         assert_eq!(until_too_many(1, 1), Some(10));
         assert_eq!(until_too_many(2, 1), Some(20), "every second or third one");
         assert_eq!(until_too_many(100, 1), Some(1000), "the tenth 909 ms after the first");
-        // One in 112 ms: the first and the tenth are 1008 ms apart.
+        // A late tick every 112 ms: the first and the tenth are 1008 ms apart.
         assert_eq!(until_too_many(111, 1), None);
         assert_eq!(until_too_many(109, 1), Some(1090));
         // Several at once count each.

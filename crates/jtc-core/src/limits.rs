@@ -20,30 +20,30 @@ pub struct JointConfig {
     pub position_error_max: f64,
     /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
     pub rotor_inertia: f64,
-    /// What the drive is asked for, as a multiple of the torque that the joint is to have (J-61). Drives that deliver less than
-    /// they are asked need more than 1.
+    /// Torque that the drive is asked for, as a multiple of the torque wanted at the joint (J-61). Drives that deliver less than they are
+    /// asked need more than 1.
     pub torque_gain: f64,
-    /// Damping in Teaching, N·m·s/rad (J-25); less where the joint is too light for it.
+    /// Damping in Teaching, N·m·s/rad (J-25); less if the joint is too light for it.
     pub teach_damping: f64,
 }
 
-/// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
+/// Rotor inertia of a drive for which none is configured, kg·m²: that of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
 
 impl JointConfig {
-    /// Rotor inertia that is counted with, kg·m²: a drive has a rotor also if the configuration gives none.
+    /// Returns the rotor inertia that counts, kg·m²: a drive has a rotor also if the configuration gives none.
     pub fn counted_rotor(&self) -> f64 {
         if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
     }
 }
 
-/// Ticks that are looked back upon.
+/// Number of the last ticks that count.
 const WINDOW: u16 = 100;
 
-/// How many of the last [`WINDOW`] ticks had something.
+/// Ticks with a property among the last [`WINDOW`] ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recent {
-    /// Which of them; the last tick is bit 0.
+    /// Ticks with the property, as a mask; the last tick is bit 0.
     history: u128,
     count: u16,
 }
@@ -51,7 +51,7 @@ pub(crate) struct Recent {
 remembered!(Recent { history, count });
 
 impl Recent {
-    /// Counts a tick. Returns whether it `has` that, and more than `most` of the last 100 ticks have.
+    /// Counts a tick. Returns `true` if it `has` the property, and more than `most` of the last 100 ticks have it.
     #[inline]
     pub fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
@@ -62,13 +62,13 @@ impl Recent {
         has & (self.count > most)
     }
 
-    /// Nothing is remembered.
+    /// Forgets all ticks.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 }
 
-/// Whether a joint's torque is at its limit, and how often it has been of late.
+/// State of a joint's torque at its limit, and the recent ticks with that.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
     /// The last torque was beyond the limit: the integral is held (J-41).
@@ -79,9 +79,9 @@ pub(crate) struct Saturation {
 remembered!(Saturation { saturated, over });
 
 impl Saturation {
-    /// The torque to command, within its limit, and whether the joint is overloaded: computed torques were beyond the limit in more
-    /// than `over_ms_max` of the last 100 ticks, whichever sign they had. For NaN no torque is commanded. While the arm is `braking`
-    /// with all the torque there is (J-33), nothing is counted.
+    /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: computed torques were beyond the limit in
+    /// more than `over_ms_max` of the last 100 ticks, with either sign. For NaN no torque is commanded. While the arm is `braking` with all
+    /// available torque (J-33), ticks are not counted.
     pub fn limit(
         &mut self,
         torque: f64,
@@ -98,7 +98,7 @@ impl Saturation {
         (if torque.is_nan() { 0.0 } else { limited }, overloaded)
     }
 
-    /// What was counted is forgotten.
+    /// Forgets all counts.
     pub fn forget(&mut self) {
         self.over.forget();
     }
@@ -107,21 +107,21 @@ impl Saturation {
 /// Time within which torques at both limits, twice each, are those of an unstable loop, ticks.
 const TURNS_MS: u32 = 200;
 
-/// How the torque of a joint goes from one limit to the other.
+/// Changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
     /// Ticks in which it came to a limit from the other one: the last three, oldest first.
     at: [u32; 3],
-    /// How many there have been, three at most.
+    /// Number of such ticks, three at most.
     count: u8,
-    /// The last of them was the upper limit.
+    /// The last of them was at the upper limit.
     upper: bool,
 }
 
 remembered!(Turns { at, count, upper });
 
 impl Turns {
-    /// The torque is at a limit in this tick. Returns whether it has been at both, twice each, of late.
+    /// Takes a tick in which the torque is at a limit. Returns `true` if it has been at both limits, twice each, within [`TURNS_MS`].
     pub fn hits(&mut self, upper: bool, tick: u32) -> bool {
         if self.count > 0 && self.upper == upper {
             return false;
@@ -134,10 +134,9 @@ impl Turns {
     }
 }
 
-/// Set values (position, velocity, acceleration) outside the limits, or a position `error` (rad, J-62), as joint errors. The
-/// position limit holds for positions that
-/// somebody `commanded`: an arm that is found beyond it is held where it is, or it could never be brought back. Rounding on
-/// the way between two points that the check of J-36 has passed is no error.
+/// Returns set values (position, velocity, acceleration) outside the limits, or a position `error` (rad, J-62), as joint errors. The
+/// position limit holds for positions that were `commanded`: an arm that is found beyond it is held at its position, because otherwise it
+/// could never be brought back. Rounding on the way between two points that the check of J-36 has passed is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // Written so that NaN is outside.
@@ -149,7 +148,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
-/// As much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
+/// Returns as much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
 pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
@@ -211,7 +210,7 @@ mod tests {
             assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
             assert!(saturation.saturated);
         }
-        // A tick within the limit is none, but does not start the time anew.
+        // A tick within the limit does not count, but does not restart the time.
         assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, false));
         assert!(!saturation.saturated);
         assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, true));
@@ -248,7 +247,7 @@ mod tests {
             assert!(saturation.saturated);
         }
         assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, false));
-        // What it did then is not held against it later.
+        // Ticks at the limit while braking do not count later.
         for _ in 0..10 {
             assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
@@ -277,13 +276,13 @@ mod tests {
                 let commanded = saturation.limit(torque, &l, 10, false).0;
                 prop_assert!(commanded.abs() <= l.torque_max);
                 prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
-                // Never against what was computed: compared by sign, because 0·∞ is no number.
+                // Never against the computed torque: compared by sign, because 0·∞ is not a number.
                 prop_assert!(torque.is_nan() || commanded == 0.0 || (commanded > 0.0) == (torque > 0.0));
             }
         }
     }
 
-    /// What the check of J-36 has passed, and rounding has moved by as much as it may, is no error in motion.
+    /// A value that the check of J-36 has passed, and rounding has moved as far as it may, is not an error in motion.
     #[test]
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();

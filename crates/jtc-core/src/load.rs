@@ -31,33 +31,33 @@ pub(crate) struct Load {
 remembered!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// Forgets the load: the joint has to find it again.
+    /// Forgets the load: the joint must find it again.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// N·m; what the `integral` (N·m) has found, before the load is known.
+    /// Returns the load, N·m; before the load is known, the torque that the `integral` (N·m) has found.
     pub fn torque(&self, integral: f64) -> f64 {
         if self.known { self.torque.into() } else { integral }
     }
 
-    /// N·m; none before the load is known.
+    /// Returns the load, N·m; zero before the load is known.
     pub fn known_torque(&self) -> f64 {
         self.torque.into()
     }
 
-    /// As much of a torque (N·m) as a load that was not observed is taken for.
+    /// Returns the part of a torque (N·m) that counts as a load without being observed.
     pub fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
     }
 
-    /// The load is known.
+    /// Returns `true` if the load is known.
     pub fn is_known(&self) -> bool {
         self.known
     }
 
-    /// It was found in another way: a load that was lowered has become this torque, N·m.
+    /// Sets a load that was found in another way: a load that was lowered has become this torque, N·m.
     pub fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// One that was lowered has been found to be more than the bound; it does not jump back.
+    /// A load that was lowered has been found to be more than the bound; it does not jump back.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

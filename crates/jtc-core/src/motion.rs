@@ -55,7 +55,8 @@ pub(crate) struct Motion {
 remembered!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Torque off: nothing is held, no torque is remembered. Each part is made new in its place, not all of them on the stack and copied.
+    /// Turns torque off: no joint is held, and no torque is remembered. Each part is reset in place, so that it is not built on the stack
+    /// and copied.
     pub fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
@@ -66,7 +67,7 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Joints that yield from the next tick on (J-68), and joints that lower their loads (J-70). The ramp has their inertia.
+    /// Begins the yield of joints from the next tick on (J-68), and of joints that lower their loads (J-70). The ramp has their inertia.
     pub fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
@@ -78,27 +79,27 @@ impl Motion {
         }
     }
 
-    /// The gains become these under the holding arm (J-71).
+    /// Changes the gains while the arm is held (J-71).
     pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.law.change_gains(gains);
         self.set.catch.iter_mut().for_each(Catch::watch_anew);
         self.limiter.forget_turns();
     }
 
-    /// All joints have settled since they were enabled, and none yields.
+    /// Returns `true` if all joints have settled since they were enabled, and none yields.
     pub fn holds(&self, config: &Config) -> bool {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Joints that are at their torque limits, and joints with position errors beyond half of what they may be.
+    /// Returns the joints at their torque limits, and the joints with position errors above half of their maximum.
     pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
         let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// The arm is held at rest, and what it carries is known. In a held stop a `contact` may be against it and is not waited for, and after
-    /// [`KNOWN_MS`] of waiting (`waits_ms`) nothing is.
+    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may be against the arm and is not
+    /// waited for; after [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the loads are not waited for either.
     pub fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -106,15 +107,15 @@ impl Motion {
             && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// A tick of Teaching: what a ramp needs is kept ready, since Teaching may end in the midst of a motion.
+    /// Runs a tick of Teaching: keeps the inertia for a ramp ready, because Teaching may end in the middle of a motion.
     pub fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
         }
     }
 
-    /// Teaching ends: the arm comes to rest and is held there, and the integral takes over what Teaching carried. What moves is stopped
-    /// within `ramp_ms`, or as much later, up to `stop_ms`, as the torque limits ask for (J-33).
+    /// Ends Teaching: the arm comes to rest and is held there, and the integral takes over the load that Teaching carried. Moving joints
+    /// stop within `ramp_ms`, or later, up to `stop_ms`, if the torque limits require it (J-33).
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {
@@ -132,7 +133,7 @@ impl Motion {
         self.law.latch(&latched);
     }
 
-    /// A tick of HoldPos: the held position, or that of a jog.
+    /// Runs a tick of HoldPos: steps the held position, or the jog.
     pub fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
@@ -142,7 +143,7 @@ impl Motion {
         }
     }
 
-    /// A tick on the path or of the approach, of which `at` are the full-speed values at the time of its clock (J-33).
+    /// Runs a tick on the path or of the approach. `at` holds the full-speed values at the time of its clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);
@@ -152,8 +153,8 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// A tick of the control law and of its limits: torques to command, and what was found on the way.
-    // One function with all that every tick does: calls inside would move the torques to and fro.
+    /// Runs a tick of the control law and of its limits. Returns the torques to command and the findings of the limits.
+    // A single function for the work of every tick: calls inside it would copy the torques back and forth.
     #[inline(never)]
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();

@@ -1,10 +1,10 @@
-//! Measured over-speed of a joint under torque (J-35): what no check of the commanded values can see.
+//! Measured over-speed of a joint under torque (J-35), which no check of the commanded values can see.
 use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
-/// How long each joint has been too fast.
+/// Time for which each joint has been too fast.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OverSpeed {
     /// Consecutive measurements above the threshold.
@@ -14,11 +14,11 @@ pub(crate) struct OverSpeed {
 remembered!(OverSpeed { ticks });
 
 impl OverSpeed {
-    /// Joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for
-    /// [`Config::overspeed_ms`]. Only measurements that came in this tick count: an answer that is missing or was not
-    /// accepted neither adds to the time nor ends it. Joints that are not enabled have no torque to be taken away.
+    /// Returns the joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for
+    /// [`Config::overspeed_ms`]. Only measurements that came in this tick count: an answer that is missing or was not accepted neither adds
+    /// to the time nor ends it. Joints that are not enabled have no torque to be taken away.
     pub fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
-        // What the joint answered, not what is used in place of missing answers. Written so that NaN is too fast.
+        // The velocity that the joint answered, not the one used in place of missing answers. Written so that NaN is too fast.
         let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;
             nodes.node(j).report.velocity.abs() <= threshold
@@ -50,7 +50,7 @@ impl OverSpeed {
 mod tests {
     use super::*;
 
-    /// Whether every joint is too fast after so many measurements of this multiple of its threshold.
+    /// Returns `true` if every joint is too fast after this number of measurements of this multiple of its threshold.
     fn found(measurements: u16, times: f64, config: &Config) -> bool {
         let threshold = config.joints.map(|joint| config.overspeed_factor * joint.velocity_max);
         let nodes = Nodes::enabled_at([0.0; JOINTS], threshold.map(|threshold| times * threshold));

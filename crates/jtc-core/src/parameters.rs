@@ -1,4 +1,4 @@
-//! What the host sends besides commands: model, gains and friction.
+//! Parameters that the host sends besides commands: model, gains and friction.
 use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
@@ -35,11 +35,11 @@ pub struct TableOf<T> {
 pub enum Friction {
     /// c0..c5 per joint, ascending; c4 = 0 means no temperature factor.
     Polynomial([[f64; 6]; JOINTS]),
-    /// One table per joint.
+    /// A table for each joint.
     Table([TableOf<f32>; JOINTS]),
 }
 
-/// What the host sends, or the defaults (section 7).
+/// Parameters from the host, or the defaults (section 7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
     /// Kinematics and masses.

@@ -1,36 +1,36 @@
-//! The payload on its way into the model (J-60): for half a second the arm that the control law computes with is between the one
-//! with the last payload and the one with the next, so that neither makes a step in torque.
+//! The payload on its way into the model (J-60): for half a second the control law computes with an arm between the one with the last
+//! payload and the one with the next, so that neither makes a step in torque.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
 use crate::remembered::remembered;
 
-/// Length of that way, ms.
+/// Length of the blend, ms.
 pub(crate) const BLEND_MS: u16 = 500;
 
-/// From one payload to another.
+/// Blend from one payload to another.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadBlend {
     from: LinkInertias,
     to: LinkInertias,
-    /// Mass that has not come yet, kg; negative where it goes.
+    /// Mass that has not come yet, kg; negative if mass goes.
     mass: f64,
     left_ms: u16,
 }
 
-/// What is remembered of it: the other end of the way is the arm with its payload.
+/// State of the blend: its other end is the arm with its payload.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,
     mass: f64,
-    /// Numbers of the arm that the way began with, unless it has ended.
+    /// Numbers of the arm at the begin of the blend, unless the blend has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
 remembered!(BlendState { left_ms, mass, from });
 
 impl PayloadBlend {
-    /// What is remembered of it.
+    /// Returns the state of the blend.
     pub fn state(&self) -> BlendState {
         BlendState {
             left_ms: self.left_ms,
@@ -39,7 +39,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Goes on from there, with the dynamics of the arm and all of its payload.
+    /// Goes on from that state, with the dynamics of the arm and all of its payload.
     pub fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
@@ -49,40 +49,40 @@ impl PayloadBlend {
         }
     }
 
-    /// The arm at the present place of the way.
+    /// Returns the arm at the present place of the blend.
     fn between(&self) -> LinkInertias {
         self.from.toward(&self.to, 1.0 - f64::from(self.left_ms) * (1.0 / BLEND_MS as f64))
     }
 
-    /// Nothing is on its way.
+    /// Creates a blend that has ended.
     pub fn none(dynamics: &Dynamics) -> Self {
         let now = dynamics.inertias();
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// From the arm `now`, which may be on its way itself, to the one with the `next` payload, which is by so much heavier than the last
-    /// (kg).
+    /// Begins a blend from the arm `now`, which may be in a blend itself, to the arm with the `next` payload, which is `heavier` than the
+    /// last by this mass (kg).
     pub fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
     }
 
-    /// The model was made anew, with the whole payload in it.
+    /// Forgets the blend, because the model was rebuilt with the whole payload in it.
     pub fn forget(&mut self) {
         (self.left_ms, self.mass) = (0, 0.0);
     }
 
-    /// Mass that comes with the next tick of the way, kg.
+    /// Returns the mass that comes with the next tick of the blend, kg.
     pub fn next_mass(&self) -> f64 {
         self.mass / f64::from(self.left_ms.max(1))
     }
 
-    /// Time left, ms.
+    /// Returns the time left, ms.
     pub fn left_ms(&self) -> u16 {
         self.left_ms
     }
 
-    /// A tick of the way.
+    /// Runs a tick of the blend.
     pub fn step(&mut self, dynamics: &mut Dynamics) {
         match self.left_ms {
             0 => {}
@@ -95,7 +95,7 @@ impl PayloadBlend {
         }
     }
 
-    /// The rest of the way at once: nobody is held by it.
+    /// Ends the blend at once, while the arm is not held by it.
     pub fn end(&mut self, dynamics: &mut Dynamics) {
         self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// Also where one payload follows another on its way.
+    /// Also if one payload follows another during the blend.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);

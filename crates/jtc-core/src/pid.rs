@@ -5,7 +5,7 @@ use crate::remembered::remembered;
 
 /// Ticks over which the derivative is taken.
 const WINDOW: usize = 5;
-/// 1/s: one over the length of the window.
+/// Inverse of the length of the window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
 /// Encoder steps of error at rest beyond which a held integral acts again: a joint that slips settles within that many.
@@ -24,7 +24,7 @@ pub struct Pid {
     settled: bool,
 }
 
-/// The three parts, N·m.
+/// The three parts of the torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PidTorque {
     /// Kp·e.
@@ -39,7 +39,7 @@ remembered!(Pid { integral, errors, settled });
 remembered!(PidTorque { p, i, d });
 
 impl PidTorque {
-    /// Sum, N·m.
+    /// Returns the sum, N·m.
     pub fn sum(&self) -> f64 {
         self.p + self.i + self.d
     }
@@ -65,17 +65,17 @@ impl Pid {
             if integral.is_finite() { integral.max(gains.int_min).min(gains.int_max) } else { 0.0 };
     }
 
-    /// The commanded position moves by `way` (rad) without a motion: the derivative does not see it.
+    /// Shifts the commanded position by `way` (rad) without a motion: the derivative does not see it.
     pub fn shift(&mut self, way: f64) {
         self.errors = self.errors.map(|error| error + way);
     }
 
-    /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step`
-    /// (rad): the joint is commanded at rest, and this is the resolution of its encoder; `None` in motion.
+    /// Runs one tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step` (rad):
+    /// the joint is commanded at rest, and this is the resolution of its encoder; `None` in motion.
     ///
-    /// At rest the integral is held from where the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
-    /// that goes on below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does
-    /// one that begins anew at each toggle of the last bit.
+    /// At rest the integral is held from the tick in which the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
+    /// that goes on below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does an
+    /// integral that restarts at each toggle of the last bit.
     pub fn step(
         &mut self,
         gains: &PidGains,
@@ -118,7 +118,7 @@ mod tests {
         pid.reset(0.0);
         let slope = 0.3;
         let mut d = 0.0;
-        // Longer than the window: what is older than five ticks is forgotten.
+        // Longer than the window: errors older than five ticks are forgotten.
         for k in 1..=12 {
             d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }

@@ -1,16 +1,16 @@
-//! What the controller does about what it finds of a joint while it can still act (J-66), rather than take the torque away.
+//! Reactions of the controller to its findings about a joint while it can still act (J-66), instead of taking the torque away.
 //!
 //! | found | reaction |
 //! |---|---|
-//! | a torque that is no number; with `torque_reaction` 1 an overloaded joint | release: the torque of all joints becomes zero (J-21) |
-//! | anything else in Teaching | none: what it adds to the model is bounded, and a joint that is led too fast ends it (J-25) |
+//! | a torque that is not a number; with `torque_reaction` 1 an overloaded joint | release: the torque of all joints becomes zero (J-21) |
+//! | anything else in Teaching | none: Teaching adds a bounded torque, and a joint that is led too fast ends it (J-25) |
 //! | an unstable loop: a torque that goes from limit to limit, or a swing that grows | the last gains come back, or the joint gets softer ones; it yields (J-68) |
 //! | the same joint again within 500 ms | release |
 //! | an overloaded joint that has not settled since it was enabled | it lowers its load (J-70) |
 //! | a joint that is pushed, or overloaded by its feedback torque; a position error | it yields (J-68), the others stop |
-//! | a joint that is overloaded otherwise: on the path or the approach | its time is held back (J-75); where that does not help the arm stops |
-//! | the same in a jog | the jog ends (J-33) |
-//! | the same at rest, or still in motion when a stop has taken its time | it lowers its load |
+//! | any other overloaded joint, on the path or the approach | path time is held back (J-75); if that does not help, the arm stops |
+//! | any other overloaded joint, in a jog | the jog ends (J-33) |
+//! | any other overloaded joint, at rest, or still in motion when a stop has taken its time | it lowers its load |
 //! | a limit of the path | the arm stops on its path, or its jog ends |
 //!
 //! The first row that applies to a joint wins. All but the first end in a held stop (J-69): the arm is held, the cause is shown, and
@@ -26,7 +26,7 @@ use crate::{JOINTS, TrajectoryState, joint_error};
 const PATH: u16 =
     joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION | joint_error::FRICTION_TABLE;
 
-/// What the controller does.
+/// Reaction of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reaction {
     /// The torque of all joints becomes zero.
@@ -35,11 +35,11 @@ enum Reaction {
     Yield,
     /// The joint lowers its load.
     Lower,
-    /// The arm stops where it is commanded to move.
+    /// The arm stops, if it is commanded to move.
     Stop,
 }
 
-/// The reaction to what was found of a joint, and its cause, also as joint errors. `again`: it was unstable a moment ago.
+/// Returns the reaction to the findings of a joint, and its cause, also as joint errors. `again`: the joint was unstable a moment ago.
 fn reaction(
     found: &Found,
     mode: ControlMode,
@@ -59,7 +59,7 @@ fn reaction(
     } else if overloaded && !settled {
         Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        // Its torque tells of the push, or its speed alone.
+        // The push shows in the torque of the joint, or only in its speed.
         Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
         Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
@@ -73,7 +73,7 @@ fn reaction(
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Reacts to what the control law has found of the joints. Returns the joint errors that release the arm.
+    /// Reacts to the findings of the control law. Returns the joint errors that release the arm.
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
@@ -124,14 +124,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// Gains that the controller has chosen: those before a trial that failed, or softer ones (J-66, J-71).
+    /// Uses gains that the controller has chosen: those before a trial that failed, or softer ones (J-66, J-71).
     fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.parameters.pid = *gains;
         self.motion.change_gains(gains);
         self.extensions.forget_hash();
     }
 
-    /// The arm is not held any more. Gains on trial have not held it: it is not enabled again with them.
+    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm: it is not enabled again with them.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;
@@ -139,7 +139,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.keep_cause(StopCause { kind: StopKind::Gains, ..StopCause::default() });
     }
 
-    /// The controller still reacts: it is too early to clear the cause (J-69).
+    /// Returns `true` if the controller still reacts: it is too early to clear the cause (J-69).
     pub(crate) fn is_reacting(&self) -> bool {
         let moves = self.trajectory == TrajectoryState::Execute || self.motion.set.jogging();
         self.motion.law.is_yielding() || (self.errors.held_stop() && (moves || self.motion.set.is_led()))
@@ -209,7 +209,7 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the manual's words torque alone releases, and is no push before that.
+            // With the reaction of the manual, torque alone releases, and does not count as a push before that.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

@@ -19,23 +19,23 @@ use crate::remembered::remembered;
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
-/// What stands in place of a table that was not received; not in use.
+/// Placeholder for a table that was not received; not in use.
 const NO_TABLE: TableOf<f32> =
     TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
 
-/// The parameters in use, the defaults where the host has sent none, and which of them it has sent.
+/// Parameters in use, the defaults if the host has sent none, and a record of those that the host has sent.
 #[derive(Clone, Debug)]
 pub(crate) struct ReceivedParameters {
-    /// One bit each ([`missing_parameter`]).
+    /// Parameters that were received, one bit each ([`missing_parameter`]).
     received: u8,
-    /// The same since the start, whatever was withdrawn since.
+    /// Parameters that were received since the start, also if they were withdrawn since.
     given: u8,
-    /// What `dynamics` was made of.
+    /// Model from which `dynamics` was made.
     model: ArmModel,
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// What the joints feel of the model that was received, and of one that is being looked at (J-71).
+    /// Inertia that the joints feel in the model that was received, and in a model that is being looked at (J-71).
     felt: FeltInertia,
     looked_at: FeltInertia,
     /// Gains that were given under torque.
@@ -48,7 +48,7 @@ pub(crate) struct ReceivedParameters {
     pub friction_is_new: bool,
 }
 
-/// What is remembered of them without the numbers, which are the arm's.
+/// State of the parameters without the numbers, which are the arm's.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceivedState {
     received: u8,
@@ -63,14 +63,14 @@ pub(crate) struct ReceivedState {
 remembered!(ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
 
 impl ReceivedParameters {
-    /// What is remembered of them, without the numbers.
+    /// Returns the state of the parameters, without the numbers.
     pub fn state(&self) -> ReceivedState {
         let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
         let payload = self.payload.state();
         ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
-    /// The same again, with the payload of these settings.
+    /// Restores the state, with the payload of these settings.
     pub fn restore(&mut self, state: &ReceivedState, config: &Config) {
         let ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
             *state;
@@ -81,12 +81,12 @@ impl ReceivedParameters {
         (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
     }
 
-    /// Gains, model and polynomial are those that are built in.
+    /// Returns `true` for each of gains, model and polynomial that is the built-in one.
     pub fn built_in(&self) -> [bool; 3] {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
-    /// Those of them that are.
+    /// Uses the built-in ones of those that are `true`.
     pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
@@ -99,7 +99,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// Nothing was received yet.
+    /// Creates the parameters before any was received.
     pub fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);
         Self {
@@ -119,7 +119,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// As if nothing had been received, in its place.
+    /// Resets the parameters in place, as if none had been received.
     pub fn begin(&mut self, config: &Config) {
         self.model = defaults::MODEL;
         self.set_gravity(config);
@@ -129,18 +129,18 @@ impl ReceivedParameters {
         self.forget();
     }
 
-    /// Nobody has given what is here: it was loaded.
+    /// Marks the parameters as not given by a host: they were loaded.
     pub fn forget(&mut self) {
         (self.received, self.given) = (0, 0);
         (self.friction_is_table, self.friction_is_new) = (false, false);
     }
 
-    /// The byte of the status: 1 = missing.
+    /// Returns the byte of the status: 1 = missing.
     pub fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Each of them was received since the start: none of the numbers is a built-in one that nobody asked for.
+    /// Returns `true` if each of them was received since the start: no number is a built-in one that a host has not asked for.
     pub fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -150,29 +150,29 @@ impl ReceivedParameters {
         self.given |= part;
     }
 
-    /// The friction tables, unless polynomials are in use.
+    /// Returns the friction tables, unless polynomials are in use.
     pub fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
         self.friction_is_table.then_some(&self.tables)
     }
 
-    /// What the control law needs of them.
+    /// Returns the parameters that the control law needs.
     pub fn control(&self) -> ControlParameters<'_> {
         let (dynamics, pid, polynomial) = (&self.dynamics, &self.pid, &self.polynomial);
         let on_trial = self.trial.is_on();
         ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use(), on_trial }
     }
 
-    /// The arm can be held at `position` (rad), by the torque limits (J-06).
+    /// Returns `true` if the arm can be held at `position` (rad), by the torque limits (J-06).
     pub fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
         holdable(&self.dynamics, position, config)
     }
 
-    /// The host has to send the model again.
+    /// Withdraws the model: the host must send it again.
     pub fn withdraw_model(&mut self) {
         self.received &= !missing_parameter::MODEL;
     }
 
-    /// The host has to send all again.
+    /// Withdraws all parameters: the host must send them again.
     pub fn withdraw_all(&mut self) {
         self.received = 0;
     }
@@ -183,8 +183,8 @@ impl ReceivedParameters {
         self.payload.forget();
     }
 
-    /// Every joint can hold the payload of these settings at `at` (rad), or holds less of it than now (J-60). Undecided before every
-    /// position is known and the model given; it is checked again when Init ends.
+    /// Returns `true` if every joint can hold the payload of these settings at `at` (rad), or holds less of it than now (J-60). Undecided,
+    /// and `true`, before every position is known and the model given; it is checked again when Init ends.
     pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
@@ -195,32 +195,33 @@ impl ReceivedParameters {
         (0..JOINTS).all(held)
     }
 
-    /// The payload of these settings comes into the model, over half a second (J-60); it is by so much heavier than the last (kg).
+    /// Begins to bring the payload of these settings into the model, over half a second (J-60); it is `heavier` than the last one by this
+    /// mass (kg).
     pub fn change_payload(&mut self, config: &Config, heavier: f64) {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
-    /// A tick in which the arm is held or taught: the payload comes on.
+    /// Runs a tick in which the arm is held or taught: the payload comes on.
     pub fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
 
-    /// A tick without torque: the payload is there.
+    /// Ends the blend in a tick without torque: the payload is there.
     pub fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
 
-    /// Mass that comes with the next [`blend_payload`](Self::blend_payload), kg.
+    /// Returns the mass that comes with the next [`blend_payload`](Self::blend_payload), kg.
     pub fn next_mass(&self) -> f64 {
         self.payload.next_mass()
     }
 
-    /// Milliseconds until the payload is in the model; 0: it is.
+    /// Returns the milliseconds until the payload is in the model; 0 if it is.
     pub fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }
 
-    /// What was given since the start is within the bounds of these settings, too (J-06); but for friction tables, see
+    /// Returns `true` if the parameters given since the start are within the bounds of these settings, too (J-06). For friction tables see
     /// [`table_fits`](Self::table_fits).
     pub fn fits(&self, config: &Config) -> bool {
         let bounds = &config.parameter_bounds;
@@ -234,13 +235,13 @@ impl ReceivedParameters {
             && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
     }
 
-    /// So is the friction table of the joint with this index, where tables are in use.
+    /// Returns `true` if the friction table of the joint with this index is within the bounds, or tables are not in use.
     pub fn table_fits(&self, j: usize, config: &Config) -> bool {
         let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
-    /// Gains that no joint is too light for (J-71), as far as the model is known.
+    /// Checks gains against their bounds, and against the inertia of the joints (J-71), as far as the model is known.
     pub fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
         for (gains, joint) in gains.iter().zip(&config.joints) {
             config.parameter_bounds.check_gains(gains, joint)?;
@@ -249,15 +250,15 @@ impl ReceivedParameters {
         borne.then_some(()).ok_or(DataStatus::IncorrectValue)
     }
 
-    /// A tick under torque after gains were given: the gains of this tick, while they come in. `held`: all joints have settled, and none
-    /// yields.
+    /// Runs a tick under torque after gains were given. Returns the gains of this tick, while they come in. `held`: all joints have
+    /// settled, and none yields.
     #[inline(never)]
     pub fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
         self.trial.step(held);
         self.trial.blended(&self.pid)
     }
 
-    /// The gains go with the model that was looked at last, with the present settings.
+    /// Returns `true` if the gains suit the model that was looked at last, with the present settings.
     pub fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
@@ -268,14 +269,14 @@ impl ReceivedParameters {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
     }
 
-    /// Gains that have passed [`check_pid`](Self::check_pid).
+    /// Puts gains in use that have passed [`check_pid`](Self::check_pid).
     pub fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
         self.pid = *gains;
         self.receive(missing_parameter::PID);
     }
 
-    /// Looks at the inertia of a model with these settings, a pose in each slice (J-71). Then it is refused if the gains that were given
-    /// need more; otherwise it is `used`.
+    /// Looks at the inertia of a model with these settings, one pose in each slice (J-71). Then the model is refused if the gains that were
+    /// given need more inertia; otherwise it is `used`.
     fn look_at(
         &mut self,
         model: &ArmModel,
@@ -304,7 +305,7 @@ impl ReceivedParameters {
         outcome.into()
     }
 
-    /// The model in use with other settings, where these have to do with the inertia of its joints (J-71).
+    /// Looks at the model in use with other settings, if these affect the inertia of its joints (J-71).
     pub fn look_again(&mut self, progress: SliceProgress, config: &Config, before: &Config) -> SliceOutcome {
         let same = |j: usize| {
             config.joints[j].rotor_inertia == before.joints[j].rotor_inertia
@@ -314,7 +315,7 @@ impl ReceivedParameters {
             return SliceOutcome::Done;
         }
         if self.missing() & missing_parameter::MODEL != 0 {
-            // It is looked at when it is given again.
+            // The model is looked at when it is given again.
             self.felt = FeltInertia::NONE;
             return SliceOutcome::Done;
         }
@@ -322,7 +323,7 @@ impl ReceivedParameters {
         self.look_at(&model, progress, config, |_| Ok(()))
     }
 
-    /// A model, in slices. `at`: measured positions (rad), once all are known.
+    /// Takes a model, in slices. `at`: measured positions (rad), once all are known.
     pub fn set_model(
         &mut self,
         model: &ArmModel,
@@ -339,7 +340,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// A model that has passed [`check_model`].
+    /// Puts a model in use that has passed [`check_model`].
     fn put_model(
         &mut self,
         model: &ArmModel,
@@ -368,12 +369,12 @@ impl ReceivedParameters {
         Ok(())
     }
 
-    /// The default tables, alike.
+    /// Takes the default tables, in the same way.
     pub fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 
-    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    /// Takes one joint's table in a tick: first all are checked, then all are copied, so that a refused table changes nothing.
     fn take_tables(
         &mut self,
         table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
@@ -425,13 +426,13 @@ fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result
     Ok(())
 }
 
-/// The dynamics of a model with the gravity and the payload of these settings.
+/// Returns the dynamics of a model with the gravity and the payload of these settings.
 #[inline(never)]
 fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
     Dynamics::with_payload(model, config.gravity, &config.payload)
 }
 
-/// An arm like this can be held at `position` (rad), by the torque limits (J-06).
+/// Returns `true` if an arm with these dynamics can be held at `position` (rad), by the torque limits (J-06).
 fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
     let gravity = dynamics.gravity_torque(position);
     // Written so that NaN is too much. A joint that is absent holds nothing (J-53).

@@ -1,13 +1,14 @@
 //! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that outlasts a reset.
 //!
-//! What is recorded is what went *into* each tick, as a rule in eight words, every [`SNAPSHOT_MS`] a *snapshot* of what the controller
-//! remembers, and for each tick a check of what came *out*. A [`Replay`] of the log through the controller gives everything that it
+//! The recorder stores the *inputs* of each tick, as a rule in eight words, every [`SNAPSHOT_MS`] a *snapshot* of the state of the
+//! controller, and for each tick a check of the *outputs*. A [`Replay`] of the log through the controller gives everything that it
 //! computed: commanded and measured motion, torques in their parts, states, errors. The arm and the points of the trajectory are named by
 //! hash.
 //!
 //! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared ([`Recorder::record`] executes that command, and
-//! those that read the log). It is also kept when the device was reset because it failed. A log in which the controller never had torque
-//! gives way to a new one as soon as torque comes on: an error at the start of a day is not to take the place of the one that matters.
+//! those that read the log). The log is also kept when the device was reset because it failed. A log in which the controller never had
+//! torque gives way to a new one as soon as torque comes on: an error at the start of a day must not take the place of the one that
+//! matters.
 mod block;
 mod inputs;
 mod memory;
@@ -44,9 +45,9 @@ pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 pub const SNAPSHOT_MS: u16 = 500;
 /// Ticks that are recorded after the first error (J-56).
 pub const AFTER_ERROR_MS: u16 = 300;
-/// After something that a replay cannot repeat, the next snapshot comes so soon after the last.
+/// Ticks from one snapshot to the next after an input that a replay cannot repeat.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Ticks for which recording rests after a page was asked for: what is being read is not overwritten.
+/// Ticks for which recording rests after a page was asked for, so that the block being read is not overwritten.
 const HELD_MS: u16 = 2_000;
 
 /// A request to the recorder that a host has sent.
@@ -54,20 +55,20 @@ const HELD_MS: u16 = 2_000;
 pub(crate) enum LogRequest {
     /// A page for this line, from a byte of a block on.
     Page { line: usize, block: u32, offset: u16 },
-    /// Forget the log and begin anew.
+    /// Forget the log and begin a new one.
     Clear,
 }
 
 /// The recorder. `P` is a piece of its memory: blocks that keep their contents over a reset and are not cached.
 ///
-/// The board makes one at its start with whatever the memory holds, and calls [`record`](Self::record) behind every tick.
+/// The board makes one at its start with any content of the memory, and calls [`record`](Self::record) after every tick.
 pub struct Recorder<P, const N: usize> {
     writer: Writer<P, N>,
     reference: Reference,
-    /// Check of what came out since the last snapshot.
+    /// Check of the outputs since the last snapshot.
     chain: u32,
     since_snapshot: u16,
-    /// Something came that a replay cannot repeat: a snapshot is due.
+    /// An input came that a replay cannot repeat: a snapshot is due.
     uncertain: bool,
     /// In the last tick an error was latched.
     was_in_error: bool,
@@ -78,8 +79,8 @@ pub struct Recorder<P, const N: usize> {
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
-    /// With this memory. What it holds of a log is kept when that log was stopped, or when the device was reset because it `failed`;
-    /// else recording begins anew.
+    /// Creates a recorder with this memory. A log in the memory is kept if that log was stopped, or if the device was reset because it
+    /// `failed`; otherwise a new log begins.
     pub fn new(pieces: [P; N], failed: bool) -> Self {
         let mut writer = Writer::new(pieces);
         if writer.state == LogState::Recording {
@@ -101,28 +102,28 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         }
     }
 
-    /// The memory, for the recorder after a reset.
+    /// Returns the memory, for the recorder after a reset.
     pub fn into_memory(self) -> [P; N] {
         self.writer.into_memory()
     }
 
-    /// The memory as it is.
+    /// Returns the memory as it is.
     pub fn memory(&self) -> &[P; N] {
         self.writer.memory()
     }
 
-    /// The blocks of the log, oldest first.
+    /// Returns the blocks of the log, oldest first.
     pub fn blocks(&self) -> impl Iterator<Item = &Block> {
         let (oldest, end) = self.writer.range();
         (oldest..end).filter_map(|block| self.writer.block(block))
     }
 
-    /// What the recorder does, or why it stopped.
+    /// Returns the state of the recorder, or why it stopped.
     pub fn state(&self) -> LogState {
         self.writer.state
     }
 
-    /// Records a tick that the controller has just executed, and serves what hosts ask of the recorder. For the board to call behind
+    /// Records a tick that the controller has just executed, and serves the requests of hosts to the recorder. The board calls this after
     /// every tick. Some hundred instructions; every [`SNAPSHOT_MS`] some ten thousand.
     #[inline(never)]
     pub fn record<M>(&mut self, controller: &mut Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
@@ -131,7 +132,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     {
         controller.hash_arm();
         let errors = controller.errors.word();
-        // A held stop is no error that ends a log (J-69): what comes after it may be worse.
+        // A held stop is not an error that ends a log (J-69): a worse one may follow.
         let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
         let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
         if self.writer.state != LogState::Recording && torque && !self.writer.powered {
@@ -146,7 +147,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         controller.extensions.log = self.writer.state;
     }
 
-    /// One tick of a log that goes on.
+    /// Records one tick of a log that goes on.
     fn take<M>(
         &mut self,
         controller: &Controller<M>,
@@ -164,7 +165,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.set_powered();
         }
         if self.held > 0 {
-            // An error is not to be missed.
+            // An error must not be missed.
             self.held = if new_error { 0 } else { self.held - 1 };
             if self.held > 0 {
                 return;
@@ -223,7 +224,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         (self.since_snapshot, self.uncertain) = (0, false);
     }
 
-    /// Forgets the log and begins anew, as a ClearLog has it do.
+    /// Forgets the log and begins a new one, as after a ClearLog.
     pub fn clear(&mut self) {
         self.writer.clear();
         (self.stops_in, self.held) = (None, 0);
@@ -239,11 +240,11 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         };
         let reads = block != LOG_NO_BLOCK && !self.writer.is_empty();
         if self.writer.state == LogState::Recording && self.stops_in.is_none() && reads {
-            // What comes after an error goes first.
+            // The ticks after an error go first.
             self.held = HELD_MS;
         }
         let (oldest, end) = self.writer.range();
-        // What is not there any more is passed over.
+        // Blocks that are not there any more are passed over.
         let (block, offset) = if block < oldest { (oldest, 0) } else { (block, offset) };
         let mut bytes = [0; LOG_PAGE];
         let read = self.writer.read(block, usize::from(offset) & !3, &mut bytes);
@@ -261,7 +262,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     }
 }
 
-/// Mixes what came out of a tick into the check of the ticks before it.
+/// Mixes the outputs of a tick into the check of the ticks before it.
 fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outputs) -> u32 {
     let mix = |hash: u32, word: u32| (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
     let states = u32::from(errors) << 16
@@ -280,7 +281,7 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     }
 }
 
-/// The part of it that is recorded: enough, because each check contains all ticks before it.
+/// Returns the part of the check that is recorded: enough, because each check contains all ticks before it.
 fn check(chain: u32) -> u16 {
     (chain >> 16) as u16
 }

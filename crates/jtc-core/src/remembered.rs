@@ -1,8 +1,8 @@
-//! What the controller remembers from tick to tick, as bits: written in a snapshot of the flight recorder (J-56), read by a replay.
+//! State that the controller keeps from tick to tick, as bits: written in a snapshot of the flight recorder (J-56), read by a replay.
 //!
-//! [`remembered!`] lists the fields of a type. The list is checked by the compiler: a field that is added to the type and not to the
-//! list does not compile, so that no snapshot lacks it. Reading is total: bits that no snapshot has give some value, and
-//! [`BitSource::is_damaged`] reports it.
+//! [`remembered!`] lists the fields of a type. The list is checked by the compiler: a field that is added to the type and not to the list
+//! does not compile, so that no snapshot lacks it. Reading is total: bits that are not those of a snapshot give some value, and
+//! [`BitSource::is_damaged`] reports that.
 use jtc_bus::{JointReport, NodeState};
 use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 
@@ -11,7 +11,7 @@ pub(crate) trait BitSink {
     /// Appends the lowest `bits` (0 to 32) of `value`, which has none above them.
     fn put(&mut self, value: u32, bits: u32);
 
-    /// Appends 64 bits, in one where all are zero: numbers of joints at rest.
+    /// Appends 64 bits, or one bit if all are zero: numbers of joints at rest.
     fn put_double(&mut self, value: u64) {
         self.put((value != 0).into(), 1);
         if value != 0 {
@@ -23,19 +23,19 @@ pub(crate) trait BitSink {
 
 /// Gives bits back in the order in which they were put.
 pub(crate) trait BitSource {
-    /// The next `bits` (0 to 32); zeros past the end.
+    /// Returns the next `bits` (0 to 32); zeros past the end.
     fn take(&mut self, bits: u32) -> u32;
-    /// What was read cannot have been written.
+    /// Reports that bits were read that cannot have been written.
     fn damage(&mut self);
-    /// More was taken than there is, or something that was never written.
+    /// Returns `true` if more was taken than there is, or bits that were never written.
     fn is_damaged(&self) -> bool;
 }
 
 /// A value that is part of a snapshot.
 pub(crate) trait Remembered: Sized {
-    /// Appends it.
+    /// Appends the value.
     fn write<S: BitSink>(&self, to: &mut S);
-    /// The same value again.
+    /// Reads the value back.
     fn read<S: BitSource>(from: &mut S) -> Self;
 }
 
@@ -111,7 +111,7 @@ impl Remembered for u128 {
 
 impl Remembered for usize {
     fn write<S: BitSink>(&self, to: &mut S) {
-        // None here is larger.
+        // No value here is larger.
         to.put(*self as u32, 32);
     }
 

@@ -1,4 +1,4 @@
-//! What the controller reports: the telemetry of the tick and the JtcStatus frame (section 2).
+//! Reports of the controller: the telemetry of the tick and the JtcStatus frame (section 2).
 use jtc_wire::{GripperStatus, JointStatus, RawPoint, Response, Status};
 
 use crate::JOINTS;
@@ -11,7 +11,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
     }
 
-    /// What the last tick computed. It is made here, not in the tick: a board needs little of it.
+    /// Returns the values that the last tick computed. They are collected here, not in the tick: a board needs few of them.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
         Telemetry {
@@ -26,7 +26,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Index of the current 1 ms point.
+    /// Returns the index of the current 1 ms point.
     fn point(&self) -> u32 {
         self.clock.time as u32
     }
@@ -55,10 +55,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A JtcStatus is due: at once for a response, else every period (J-04).
+    /// Returns `true` if a JtcStatus is due: at once for a response, else every period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        // Found out also where the line is busy: the same work in every tick.
+        // Computed also while the line is busy: the same work in every tick.
         let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
         let due = wanted && free;
         if due {
@@ -67,7 +67,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         due
     }
 
-    /// What a JtcStatus would report now, without a record.
+    /// Returns the status that a JtcStatus would report now, without a record.
     pub fn current_status(&self) -> Status {
         self.status(Response::NONE)
     }

@@ -1,7 +1,7 @@
 //! Response records that wait for their status frame (J-04): a queue for each line of the host link.
 use jtc_wire::Response;
 
-/// Records that wait at most on a line: with fewer, none is lost.
+/// Highest number of records that wait on a line: with fewer, none is lost.
 pub const RECORDS_MAX: usize = 64;
 /// Lines to hosts.
 pub const HOST_LINES: usize = 2;
@@ -25,10 +25,10 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Puts a record at the end; false when one is lost by it: that of noise if there is one, else the oldest.
+    /// Puts a record at the end. Returns `false` if a record is lost by that: the record of noise if there is one, else the oldest.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
-            // It joins the record that waits.
+            // The noise joins the record that waits.
             return true;
         }
         let full = self.len == RECORDS_MAX;
@@ -61,7 +61,7 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // That of noise moves up, or has gone.
+        // The record of noise moves up, or has gone.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
@@ -81,23 +81,23 @@ impl ResponseQueues {
         Self { lines: [const { ResponseQueue::new() }; HOST_LINES], turn: 0, lost: 0 }
     }
 
-    /// No record waits.
+    /// Returns `true` if no record waits.
     pub fn is_empty(&self) -> bool {
         self.lines.iter().all(|queue| queue.len == 0)
     }
 
-    /// Records lost since the start because too many waited.
+    /// Returns the number of records lost since the start because too many waited.
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// A record for `line`; `noise`: of bytes that are no frame.
+    /// Adds a record for `line`; `noise`: the bytes are not a frame.
     pub fn push(&mut self, line: usize, response: Response, noise: bool) {
         let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
         self.lost = self.lost.saturating_add(u32::from(!kept));
     }
 
-    /// The oldest record of a line and the line, one line after the other.
+    /// Returns the oldest record of a line and the line; the lines take turns.
     pub fn pop(&mut self) -> Option<(usize, Response)> {
         for _ in 0..HOST_LINES {
             let line = self.turn;
@@ -190,7 +190,7 @@ mod tests {
         }
     }
 
-    /// The others move up, wherever that of noise was.
+    /// The other records move up, for any place of the record of noise.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

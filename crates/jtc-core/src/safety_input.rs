@@ -9,13 +9,14 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// A tick in which the safety input is 0, or has been. With `safety_input_ramp_ms` what moves by command comes to rest first (stop category 1 of IEC 60204-1),
-    /// also where the input is 1 again meanwhile. The error is raised in every case, whatever has taken the torque away by then.
+    /// Runs a tick in which the safety input is 0, or has been. With `safety_input_ramp_ms` a commanded motion comes to rest first (stop
+    /// category 1 of IEC 60204-1), also if the input is 1 again meanwhile. The error is raised in every case, even if the torque has been
+    /// taken away by then.
     #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {
-            // It was raised in the last tick.
+            // The error was raised in the last tick.
             Some(OVER) => None,
             Some(_) if !self.powered() || self.stands_still() || self.motion.law.is_yielding() => Some(OVER),
             Some(ms) => {
@@ -30,7 +31,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
     }
 
-    /// The safety input takes the torque away in this tick.
+    /// Returns `true` if the safety input takes the torque away in this tick.
     pub(crate) fn safety_input_releases(&self, level: bool) -> bool {
         match self.safety_stop_ms {
             Some(ms) => ms == OVER,
@@ -38,7 +39,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// What moves comes to rest as by a Stop (J-33).
+    /// Brings the moving arm to rest as by a Stop (J-33).
     fn come_to_rest(&mut self) {
         self.teaching = false;
         if self.trajectory == TrajectoryState::Execute {
@@ -47,8 +48,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// The arm moves by command or is led, with the torque of every joint. Where drives are still to be enabled, a joint yields, or moves for
-    /// another reason, a stop would only keep the torque on.
+    /// Returns `true` if the arm moves by command or is led, with the torque of every joint. If drives are not enabled yet, a joint yields,
+    /// or the arm moves for another reason, a stop would only keep the torque on.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
         let moves = match self.state {
@@ -60,7 +61,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         moves && !self.motion.law.is_yielding() && (0..JOINTS).all(enabled)
     }
 
-    /// The arm is held at rest: nothing moves, and nothing is to.
+    /// Returns `true` if the arm is held at rest: nothing moves, and no motion is commanded.
     fn stands_still(&self) -> bool {
         self.state == ControllerState::HoldPos
             && self.trajectory != TrajectoryState::Execute

@@ -1,4 +1,4 @@
-//! Settings that a host reads and changes (J-53): a table, and how a list of values is applied whole or not at all.
+//! Settings that a host reads and changes (J-53): the table, and how a list of values is applied as a whole or not at all.
 use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
 
@@ -16,7 +16,7 @@ pub const SPEED: u8 = 128;
 /// Number of the tool speed limit (J-25).
 pub const TOOL_SPEED: u8 = 79;
 
-/// Number of the switch of an absent joint, and of where the model has that joint (J-53).
+/// Numbers of the switch of an absent joint, and of the position of that joint in the model (J-53).
 pub const ABSENT: u8 = 16;
 /// See [`ABSENT`].
 pub const ABSENT_POSITION: u8 = 17;
@@ -24,25 +24,25 @@ pub const ABSENT_POSITION: u8 = 17;
 /// Numbers of the payload (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
 pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 
-/// When a setting may be changed beside Init and Error.
+/// States in which a setting may be changed, besides Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {
-    /// Never. It is part of the arm: stored, and in its hash.
+    /// Never. The setting is part of the arm: stored, and in its hash.
     No,
-    /// Never, as `No`, but it is no part of the arm.
+    /// Never, as `No`, but the setting is not part of the arm.
     Unpowered,
-    /// In HoldPos, Teaching and Pause, but not while a motion runs. It is no part of the arm.
+    /// In HoldPos, Teaching and Pause, but not while a motion runs. The setting is not part of the arm.
     Standing,
-    /// In every state, also while the arm moves. It is no part of the arm.
+    /// In every state, also while the arm moves. The setting is not part of the arm.
     Always,
 }
 
-/// What a setting is, and where.
+/// Kind of a setting, and the place of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A number of each joint.
     Joint,
-    /// A number of each joint that is no limit of it.
+    /// A number of each joint that is not a limit of the joint.
     Each,
     /// A switch of each joint, 0 or 1.
     EachSwitch,
@@ -61,7 +61,7 @@ pub struct Setting {
     pub number: u8,
     /// Name in arm files, with its unit.
     pub name: &'static str,
-    /// Unit; empty where it has none.
+    /// Unit; empty if the setting has none.
     pub unit: &'static str,
     /// Lowest value.
     pub low: f64,
@@ -69,24 +69,24 @@ pub struct Setting {
     pub high: f64,
     /// Whole numbers only.
     pub whole: bool,
-    /// When it may be changed.
+    /// States in which the setting may be changed.
     pub live: Live,
-    /// What it is.
+    /// Meaning of the setting.
     pub meaning: &'static str,
     pub(crate) kind: Kind,
 }
 
-/// Why a value is not taken.
+/// Reason why a value is not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingError {
-    /// There is no such setting, or not of such a joint.
+    /// The setting does not exist, or not for this joint.
     Unknown {
         /// Number of the setting.
         setting: u8,
         /// Joint from 1, 0: none.
         joint: u8,
     },
-    /// Outside its range, no number, or no whole one.
+    /// Outside its range, not a number, or not a whole number.
     Value {
         /// Its row.
         name: &'static str,
@@ -99,9 +99,9 @@ pub enum SettingError {
         /// Highest.
         high: f64,
     },
-    /// The settings together are those of no arm.
+    /// The settings together do not suit any arm.
     Config(ConfigError),
-    /// The payload is no body (J-60).
+    /// The payload is not a valid body (J-60).
     Payload(PayloadError),
     /// The payload is beyond the bounds of masses and inertias (J-06).
     Bounds(OutOfBounds),
@@ -130,32 +130,32 @@ impl core::fmt::Display for SettingError {
 impl core::error::Error for SettingError {}
 
 impl Setting {
-    /// Each joint has one.
+    /// Returns `true` if each joint has a value of its own.
     pub const fn of_joint(&self) -> bool {
         matches!(self.kind, Kind::Joint | Kind::Each | Kind::EachSwitch)
     }
 
-    /// It belongs to the arm: it is stored with it, and in its hash.
+    /// Returns `true` if the setting belongs to the arm: it is stored with the arm, and in its hash.
     pub const fn of_arm(&self) -> bool {
         matches!(self.live, Live::No)
     }
 
-    /// Values that it has: one, or one for each joint.
+    /// Returns the number of values: one, or one for each joint.
     const fn count(&self) -> usize {
         if self.of_joint() { JOINTS } else { 1 }
     }
 
-    /// The value in `config`; `joint` from 1, 0 for a setting of the arm. `None` where there is none.
+    /// Returns the value in `config`; `joint` from 1, 0 for a setting of the arm. `None` if the value does not exist.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
         table::get(config, self.number, self.index(joint)?)
     }
 
-    /// The index of a joint from 1, 0 for a setting of the arm; `None` where it is not a setting of that.
+    /// Returns the index of a joint from 1, 0 for a setting of the arm; `None` if the setting does not belong to that.
     fn index(&self, joint: u8) -> Option<usize> {
         if self.of_joint() { usize::from(joint).checked_sub(1) } else { (joint == 0).then_some(0) }
     }
 
-    /// Its values in `config`, from the one with this index on.
+    /// Returns the values in `config`, from the one with this index on.
     fn values_from(&self, config: &Config, first: usize) -> impl Iterator<Item = SettingValue> + use<'_> {
         let (start, end) = if self.of_joint() { (1, JOINTS as u8) } else { (0, 0) };
         let values = core::array::from_fn::<f64, JOINTS, _>(|j| {
@@ -181,23 +181,23 @@ impl Setting {
     }
 }
 
-/// The row of a setting.
+/// Returns the row of a setting.
 pub fn setting(number: u8) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.number == number)
 }
 
-/// The row of the setting of this name.
+/// Returns the row of the setting with this name.
 pub fn named(name: &str) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.name == name)
 }
 
-/// How many values the table has; `arm_only`: those that belong to the arm.
+/// Returns the number of values in the table; `arm_only`: those that belong to the arm.
 pub fn count(arm_only: bool) -> usize {
     TABLE.iter().filter(|setting| !arm_only || setting.of_arm()).map(Setting::count).sum()
 }
 
-/// The values of a configuration in the order of the table, from the one with index `first` on; `arm_only`: those that belong to the
-/// arm.
+/// Returns the values of a configuration in the order of the table, from the one with index `first` on; `arm_only`: those that belong to
+/// the arm.
 pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<Item = SettingValue> {
     let mut skip = first;
     TABLE.iter().filter(move |setting| !arm_only || setting.of_arm()).flat_map(move |setting| {
@@ -207,16 +207,16 @@ pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<It
     })
 }
 
-/// Puts one value into a configuration, whose whole is not checked by that.
+/// Puts one value into a configuration, without a check of the whole.
 ///
 /// # Errors
-/// A value that is not taken.
+/// Returns an error for a value that is not taken.
 pub fn apply(config: &mut Config, value: SettingValue) -> Result<(), SettingError> {
     let SettingValue { setting: number, joint, value } = value;
     setting(number).ok_or(SettingError::Unknown { setting: number, joint })?.set(config, joint, value)
 }
 
-/// The values of a payload, to be set together (J-60).
+/// Returns the values of a payload, which must be set together (J-60).
 pub fn payload_values(payload: &Payload) -> impl Iterator<Item = SettingValue> {
     let Payload { mass, com: [x, y, z], inertia: [xx, xy, xz, yy, yz, zz] } = *payload;
     PAYLOAD.zip([mass, x, y, z, xx, xy, xz, yy, yz, zz]).map(|(setting, value)| SettingValue {
@@ -226,11 +226,11 @@ pub fn payload_values(payload: &Payload) -> impl Iterator<Item = SettingValue> {
     })
 }
 
-/// The configuration with these values in it.
+/// Returns the configuration with these values in it.
 ///
 /// # Errors
-/// The first value that is not taken, or what the configuration as a whole does wrong. Nothing is half changed: the configuration
-/// given is not touched.
+/// Returns an error for the first value that is not taken, or for a configuration that is wrong as a whole. No change is made in part: the
+/// given configuration is not touched.
 pub fn with_values(
     config: &Config,
     values: impl Iterator<Item = SettingValue>,

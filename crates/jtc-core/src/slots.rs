@@ -1,8 +1,7 @@
 //! Two slots of flash that keep one image over any loss of power (J-54).
 //!
-//! An image, here a stored arm, is bytes of any meaning. It is written to the slot that does not hold the newest one, so what
-//! was there before stays whole until the new one is. A slot is a header of one flash word and the image behind it, filled up
-//! to whole words:
+//! An image, here a stored arm, is bytes of any meaning. It is written to the slot that does not hold the newest image, so that the image
+//! before it stays whole until the new one is. A slot is a header of one flash word followed by the image, filled up to whole words:
 //!
 //! | bytes | what |
 //! |---|---|
@@ -12,14 +11,14 @@
 //! | 8..12 | bytes of the image |
 //! | 12..16 | sequence number: the newer image has the higher one, modulo 2³² |
 //! | 16..28 | 0 |
-//! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words behind them |
+//! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words after them |
 //! | 32.. | the image; the rest of its last word is 0xFF |
 //!
 //! The header is written last: a slot whose writing was cut off has none. A word that was being programmed, and a sector that was
 //! being erased, may hold anything; the CRC shows it. All numbers are little-endian.
 //!
-//! There is no hardware here: [`Storing`] returns what to do next, whoever has the flash does it. A flash word can be programmed
-//! once after it was erased, and [`Storing`] asks for no more.
+//! This module has no hardware: [`Storing`] returns the next action, and the owner of the flash carries it out. A flash word can be
+//! programmed once after it was erased, and [`Storing`] asks for no more.
 use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -31,12 +30,12 @@ pub const WORD: usize = 32;
 /// Slots.
 pub const SLOTS: usize = 2;
 
-/// What is programmed at once.
+/// Unit that is programmed at once.
 pub type Word = [u8; WORD];
 
 const MAGIC: [u8; 4] = *b"JTCA";
 const VERSION: u16 = 1;
-/// What erased flash holds, and what follows an image in its last word.
+/// Content of erased flash, and filler after an image in its last word.
 const ERASED: u8 = 0xFF;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -52,7 +51,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Of this image; `None` when it is longer than [`IMAGE_MAX`].
+    /// Creates the header of this image; `None` if the image is longer than [`IMAGE_MAX`].
     pub fn new(image: &[u8], sequence: u32) -> Option<Self> {
         let length = u32::try_from(image.len()).ok().filter(|_| image.len() <= IMAGE_MAX)?;
         let header = Self { length, sequence, crc: 0 };
@@ -63,14 +62,14 @@ impl Header {
         Some(Self { crc: digest.finalize(), ..header })
     }
 
-    /// The header that a word is, if it is one; whether its slot is whole is decided by [`Header::accepts`].
+    /// Parses a word as a header, if it is one; [`Header::accepts`] decides if its slot is whole.
     pub fn parse(word: &Word) -> Option<Self> {
         let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
         let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };
         (header.length as usize <= IMAGE_MAX && header.emit() == *word).then_some(header)
     }
 
-    /// Its bytes.
+    /// Returns its bytes.
     pub fn emit(&self) -> Word {
         let mut word = [0; WORD];
         let fields = self.checked_bytes().into_iter().chain(self.crc.to_le_bytes());
@@ -78,7 +77,7 @@ impl Header {
         word
     }
 
-    /// What stands before the CRC.
+    /// Returns the bytes before the CRC.
     fn checked_bytes(&self) -> [u8; 28] {
         let mut bytes = [0; 28];
         let [version, length, sequence] =
@@ -88,22 +87,22 @@ impl Header {
         bytes
     }
 
-    /// Bytes of the image.
+    /// Returns the number of bytes of the image.
     pub fn length(&self) -> usize {
         self.length as usize
     }
 
-    /// Sequence number.
+    /// Returns the sequence number.
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
 
-    /// Words of the slot, this one among them.
+    /// Returns the number of words of the slot, including this one.
     pub fn words(&self) -> usize {
         1 + self.length().div_ceil(WORD)
     }
 
-    /// The image if `rest`, which begins with all words behind the header, is what the header was made for.
+    /// Returns the image if `rest`, which begins with all words after the header, matches the header.
     pub fn accepts<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
         let words = rest.get(..(self.words() - 1) * WORD)?;
         let mut digest = CRC.digest();
@@ -113,29 +112,29 @@ impl Header {
     }
 }
 
-/// A word of an image, its last one filled up.
+/// Returns a word of an image, with its last word filled up.
 fn padded(bytes: &[u8]) -> Word {
     let mut word = [ERASED; WORD];
     word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
     word
 }
 
-/// Whether an image is newer than another by their sequence numbers, which begin again behind 2³² − 1.
+/// Returns `true` if an image is newer than another by their sequence numbers, which begin again after 2³² − 1.
 pub fn newer(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
 }
 
-/// What is in the slots: the sequence number of each that is whole.
+/// Content of the slots: the sequence number of each slot that is whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slots([Option<u32>; SLOTS]);
 
 impl Slots {
-    /// As they were found.
+    /// Creates the slots as they were found.
     pub const fn new(found: [Option<u32>; SLOTS]) -> Self {
         Self(found)
     }
 
-    /// The slot of the newest image, with its sequence number; `None` when no slot is whole.
+    /// Returns the slot of the newest image, with its sequence number; `None` if no slot is whole.
     pub fn current(&self) -> Option<(usize, u32)> {
         match self.0 {
             [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
@@ -145,7 +144,7 @@ impl Slots {
         }
     }
 
-    /// Where the next image goes, and its sequence number: never to the slot of the newest.
+    /// Returns the slot of the next image, and its sequence number: never the slot of the newest image.
     pub fn next(&self) -> (usize, u32) {
         self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
     }
@@ -157,7 +156,7 @@ impl Slots {
     }
 }
 
-/// What has to be done with the flash next.
+/// Next action on the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Erase the slot.
@@ -171,14 +170,14 @@ pub enum Action {
         slot: usize,
         /// Word in it; 0 is the header.
         word: usize,
-        /// What it is to hold.
+        /// Content to program.
         bytes: Word,
     },
-    /// Nothing: the image is stored, and found from now on.
+    /// No action: the image is stored, and found from now on.
     Stored,
 }
 
-/// One image on its way into its slot.
+/// An image on its way into its slot.
 ///
 /// ```
 /// use jtc_core::slots::{Action, Header, Slots, Storing, WORD};
@@ -208,7 +207,7 @@ pub struct Storing {
 }
 
 impl Storing {
-    /// Begins to store an image; `None` when it is longer than [`IMAGE_MAX`]. From here on what its slot held counts as lost.
+    /// Begins to store an image; `None` if it is longer than [`IMAGE_MAX`]. From here on the old content of its slot counts as lost.
     pub fn begin(slots: &mut Slots, image: &[u8]) -> Option<Self> {
         let (slot, sequence) = slots.next();
         let header = Header::new(image, sequence)?;
@@ -216,7 +215,7 @@ impl Storing {
         Some(Self { slot, header, done: 0 })
     }
 
-    /// What to do now; `image` is the one it began with.
+    /// Returns the action to do now; `image` is the one that the storing began with.
     pub fn action(&self, image: &[u8]) -> Action {
         let slot = self.slot;
         let Some(before) = self.done.checked_sub(1) else { return Action::Erase { slot } };
@@ -232,17 +231,17 @@ impl Storing {
         }
     }
 
-    /// The action of this moment is done, a word was read again and is right.
+    /// Marks the present action as done: a word was read again and is right.
     pub fn done(&mut self) {
         self.done = self.done.saturating_add(1).min(self.header.words() + 1);
     }
 
-    /// Slot, and the sequence number that it gets.
+    /// Returns the slot, and the sequence number that it gets.
     pub fn target(&self) -> (usize, u32) {
         (self.slot, self.header.sequence)
     }
 
-    /// Everything is done; without effect when it is not.
+    /// Records the new image if every action is done; has no effect otherwise.
     pub fn finish(&self, slots: &mut Slots) {
         if self.done > self.header.words() {
             slots.set(self.slot, Some(self.header.sequence));

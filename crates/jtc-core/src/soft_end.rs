@@ -1,10 +1,10 @@
-//! The soft end of a joint's range: a spring that pushes a joint back which a hand or a shove moves towards a position limit (J-25, J-68).
+//! The soft end of a joint's range: a spring that pushes back a joint that a hand or a shove moves towards a position limit (J-25, J-68).
 
 /// Distance from a position limit, rad, from which on the spring acts.
 pub(crate) const SOFT_END: f64 = 0.1;
 
-/// How far (rad) a joint at `position` is inside the soft end of its `range` (lowest and highest position, rad): above zero at the high
-/// end, below zero at the low one.
+/// Returns the depth (rad) of a joint at `position` inside the soft end of its `range` (lowest and highest position, rad): above zero at
+/// the high end, below zero at the low one.
 pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     let (low, high) = range;
     let above = (position - (high - SOFT_END)).max(0.0);
@@ -12,7 +12,7 @@ pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     above - below
 }
 
-/// Torque of a spring that is compressed by `depth` (rad), N·m: `most` at the position limit.
+/// Returns the torque of a spring that is compressed by `depth` (rad), N·m: `most` at the position limit.
 pub(crate) fn spring(depth: f64, most: f64) -> f64 {
     -most * depth / SOFT_END
 }

@@ -1,7 +1,7 @@
-//! The states of the controller: which one follows (J-20 to J-25). docs/protocol-jtc.md draws this function.
+//! The states of the controller, and the choice of the next one (J-20 to J-25). docs/protocol-jtc.md draws this function.
 use crate::ControllerState;
 
-/// What the next state depends on.
+/// Conditions of the next state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Conditions {
     /// An error is latched (J-21).
@@ -12,13 +12,13 @@ pub(crate) struct Conditions {
     pub initialised: bool,
     /// The host has enabled teaching.
     pub teaching: bool,
-    /// The arm is held at rest, and what it carries is known, or does not count (J-25); asked only when teaching is.
+    /// The arm is held at rest, and its loads are known, or do not count (J-25); asked only when teaching is.
     pub teachable: bool,
     /// A trajectory is being executed.
     pub execute: bool,
 }
 
-/// The state that follows: the first of Error, Init, Teaching, Operate and HoldPos that applies.
+/// Returns the state that follows: the first of Error, Init, Teaching, Operate and HoldPos that applies.
 pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> ControllerState {
     let Conditions { error, clearing, initialised, teaching, teachable, execute } = *conditions;
     if error || (state == ControllerState::Error && clearing) {
@@ -26,7 +26,7 @@ pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> Con
     } else if !initialised {
         ControllerState::Init
     } else if teaching && (state == ControllerState::Teaching || teachable) {
-        // Accepted, it waits until every joint is held at rest: what the arm carries is found only then (J-25).
+        // An accepted teach request waits until every joint is held at rest: the loads of the arm are found only then (J-25).
         ControllerState::Teaching
     } else if execute {
         ControllerState::Operate

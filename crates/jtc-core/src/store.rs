@@ -1,4 +1,4 @@
-//! The trajectory store: which segments are accepted (J-30), and the points.
+//! The trajectory store: acceptance of segments (J-30), and the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::check::{Passed, SpeedRange, Violation};
@@ -9,7 +9,7 @@ use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 /// This share of a step before a point is at the point.
 const AT_POINT: f64 = 1e-9;
 
-/// What was received of the current trajectory. `M` is the memory of its points.
+/// Received part of the current trajectory. `M` is the memory of its points.
 #[derive(Clone, Debug)]
 pub(crate) struct Store<M> {
     points: M,
@@ -25,17 +25,17 @@ pub(crate) struct Store<M> {
     dropped: bool,
     /// A Stop came during this upload, whose host survives no refused segment: it is completed and not executed.
     stopped: bool,
-    /// What the check has found in an upload whose host survives no refused segment: it is completed and not executed.
+    /// Violation that the check has found in an upload whose host survives no refused segment: the upload is completed and not executed.
     refused: Option<Violation>,
     step: Step,
-    /// What the check knows of the accepted segments.
+    /// State of the check after the accepted segments.
     passed: Passed,
     /// Points in memory, also of a trajectory that was given up, and their hash.
     held: usize,
     hash: u32,
 }
 
-/// What is remembered of the trajectory, without its points.
+/// State of the trajectory, without its points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoreState {
     received: usize,
@@ -53,7 +53,7 @@ pub(crate) struct StoreState {
 }
 
 impl StoreState {
-    /// ms between points.
+    /// Returns the ms between points.
     pub fn step_ms(&self) -> u16 {
         self.step_ms
     }
@@ -80,7 +80,7 @@ fn mix(hash: u32, word: u32) -> u32 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
 }
 
-/// The hash of points that follow others with this one.
+/// Returns the hash of points that follow others with this hash.
 fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
     points.iter().fold(hash, |hash, point| {
         let pairs =
@@ -111,7 +111,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Points that fit: never more than the protocol allows, never more than the memory holds.
+    /// Returns the number of points that fit: never more than the protocol allows, never more than the memory holds.
     fn capacity(&self) -> usize {
         self.points.as_ref().len().min(POINTS_MAX)
     }
@@ -122,18 +122,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments = 0;
     }
 
-    /// All segments are here.
+    /// Returns `true` if all segments are here.
     pub fn complete(&self) -> bool {
         self.segments > 0 && self.next_segment == self.segments
     }
 
-    /// Segments are here, and others are still to come.
+    /// Returns `true` if segments are here, and others are still to come.
     fn receiving(&self) -> bool {
         self.segments > 0 && self.next_segment < self.segments
     }
 
-    /// J-30: a Stop drops an upload that is not complete. One that was begun on a plain line, whose host would wait for ever, is
-    /// completed and not executed. Returns whether there was one.
+    /// Drops an upload that is not complete, because of a Stop (J-30). An upload that was begun on a plain line, whose host would wait for
+    /// ever, is completed and not executed. Returns `true` if there was one.
     pub fn drop_upload(&mut self) -> bool {
         let receiving = self.receiving();
         if receiving && self.plain {
@@ -145,43 +145,43 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         receiving
     }
 
-    /// A Stop came during the upload of this trajectory: it is not executed (J-30).
+    /// Returns `true` if a Stop came during the upload of this trajectory: it is not executed (J-30).
     pub fn stopped(&self) -> bool {
         self.stopped
     }
 
-    /// The upload was begun on a plain line, whose host survives no refused segment (J-51).
+    /// Returns `true` if the upload was begun on a plain line, whose host survives no refused segment (J-51).
     pub fn plain(&self) -> bool {
         self.plain
     }
 
-    /// Keeps what the check has found in the upload that has been begun.
+    /// Keeps the violation that the check has found in the upload that has been begun.
     pub fn refuse(&mut self, violation: Violation) {
         self.refused.get_or_insert(violation);
     }
 
-    /// What the check has found in this trajectory: it is not executed (J-36).
+    /// Returns the violation that the check has found in this trajectory, which is not executed then (J-36).
     pub fn refused(&self) -> Option<Violation> {
         self.refused
     }
 
-    /// Segment 0 of an upload was refused because of a Stop: the other segments of the upload are refused, too.
+    /// Refuses the other segments of an upload whose segment 0 was refused because of a Stop.
     pub fn refuse_rest(&mut self) {
         self.dropped = true;
     }
 
-    /// The upload was dropped, and no other has been begun since.
+    /// Returns `true` if the upload was dropped, and no other has been begun since.
     pub fn dropped(&self) -> bool {
         self.dropped
     }
 
-    /// Time of the last point, ms.
+    /// Returns the time of the last point, ms.
     pub fn duration_ms(&self) -> u32 {
         // At most 11 999 · 65 535, which fits.
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
-    /// Whether the segment may follow what was received. Changes nothing.
+    /// Checks that the segment may follow the received ones. Changes nothing.
     pub fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
@@ -209,8 +209,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy a segment that was accepted; segment 0 replaces what was there, and says whether its line is `plain`, and
-    /// whether a Stop came before it had its turn.
+    /// Begins to copy a segment that was accepted. Segment 0 replaces the old trajectory; `plain`: its line is plain; `stopped`: a Stop
+    /// came before it had its turn.
     pub fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
@@ -222,7 +222,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Copies points `from..to` of the segment behind those received; they count from `commit` on.
+    /// Copies points `from..to` of the segment after those received; they count from `commit` on.
     pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
@@ -231,7 +231,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.hash = hash_points(self.hash, slots);
     }
 
-    /// All points of the segment are copied; `passed` is what the check knows of all points so far.
+    /// Counts the segment, whose points are all copied; `passed` is the state of the check after all points so far.
     pub fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
         self.passed = passed;
         self.received = (self.received + segment.len()).min(self.capacity());
@@ -239,17 +239,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.held = self.received;
     }
 
-    /// Hash of the points in memory and how many they are, also of a trajectory that was given up.
+    /// Returns the hash of the points in memory and their number, also of a trajectory that was given up.
     pub fn points_hash(&self) -> (u32, u32) {
         (self.hash, self.held as u32)
     }
 
-    /// Those points from number `first` on.
+    /// Returns those points from number `first` on.
     pub fn held_points(&self, first: usize) -> &[RawPoint] {
         self.points.as_ref().get(first..self.held).unwrap_or(&[])
     }
 
-    /// What is remembered, without the points.
+    /// Returns the state, without the points.
     pub fn state(&self) -> StoreState {
         let Self {
             points: _,
@@ -283,7 +283,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// The same again; the points are put apart.
+    /// Restores the state; the points are put separately.
     pub fn restore(&mut self, state: &StoreState) {
         let StoreState {
             received,
@@ -306,41 +306,41 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.held, self.hash) = (held.min(self.capacity()), hash);
     }
 
-    /// Points from number `first` on.
+    /// Puts points from number `first` on.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
             *slot = *point;
         }
     }
 
-    /// How many points there are, the last of them, and what the check knows of them; `None` without points.
+    /// Returns the number of points, the last of them, and the state of the check after them; `None` without points.
     pub fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
         Some((self.received as u32, last, self.passed))
     }
 
-    /// Speeds of the points.
+    /// Returns the speeds of the points.
     pub fn speeds(&self) -> &[SpeedRange; JOINTS] {
         &self.passed.speeds
     }
 
-    /// ms between points.
+    /// Returns the ms between points.
     pub fn step_ms(&self) -> u16 {
         self.step.ms
     }
 
-    /// Positions of point 0, rad.
+    /// Returns the positions of point 0, rad.
     pub fn first(&self) -> Option<[f64; JOINTS]> {
         self.points.as_ref().get(..self.received)?.first().map(RawPoint::position_rad)
     }
 
-    /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
+    /// Returns the set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let mut at = SetPoint::default();
         self.put(time_ms, &mut at).then_some(at)
     }
 
-    /// The same put where they are wanted, in place of what is there; false without points.
+    /// Like [`Self::at`], but replaces the set values in `at`; returns `false` without points.
     #[inline]
     pub fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
@@ -348,7 +348,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         // The product may be rounded to below a point that the time has reached. `as` saturates: a negative or NaN time is point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // Also at a point itself and at the last one, where it changes nothing: the same work in every tick.
+        // Also at a point itself and at the last one, without any effect: the same work in every tick.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

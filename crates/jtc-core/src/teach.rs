@@ -1,9 +1,9 @@
-//! What Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, part of the joints' own friction taken away, and
-//! soft ends.
+//! Torques that Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, part of the joints' own friction
+//! taken away, and soft ends.
 //!
-//! A hand leads the arm, and where it lets go the arm is to stay. Of the torques that HoldPos had found, a mass at the flange is carried to
-//! other poses, and the rest fades as the arm is led ([`carried`]). All motion is damped, and a joint that is too fast for that ends Teaching
-//! ([`joint`]).
+//! A hand leads the arm; when the hand lets go, the arm must stay. Of the torques that HoldPos had found, a mass at the flange is carried
+//! to other poses, and the rest fades as the arm is led ([`carried`]). Every motion is damped, and a joint that is too fast for that ends
+//! Teaching ([`joint`]).
 mod carried;
 mod joint;
 
@@ -18,39 +18,40 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Ticks in which what changes slowly is computed, and before the first of them: the tick in which Teaching begins, one for the mass at the
-/// flange, one for the inertia of the whole arm, which a ramp needs, and one for that of each joint.
+/// Ticks of a round in which values that change slowly are computed, and ticks before the first round: the tick in which Teaching begins,
+/// one for the mass at the flange, one for the inertia of the whole arm, which a ramp needs, and one for that of each joint.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
-/// Ticks from one judgement of the load to the next, and the same in s.
+/// Ticks from one judgement of the load to the next, and that time in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Torque of 1 kg at the flange, all joints together (N·m/kg): up to the first nothing is attributed to a mass, from the second all that fits.
-/// HoldPos cannot tell a load from static friction, and a little friction must not become a great mass elsewhere.
+/// Torque of 1 kg at the flange, all joints together (N·m/kg): up to the first value nothing is attributed to a mass, from the second on
+/// all that fits. HoldPos cannot tell a load from static friction, and a little friction must not become a great mass elsewhere.
 const LOADS: (f64, f64) = (2.0, 6.0);
-/// Time after which a mass that drives the arm by itself is taken for one that is not there, ms, and time constant with which it goes then, s.
+/// Time after which a mass that drives the arm by itself counts as not there, ms, and time constant of the mass as it then goes, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
-/// Time after which a mass that has gone comes back where a joint sinks without it, ms, and time constant with which it does, s.
+/// Time after which a mass that has gone comes back if a joint sinks without it, ms, and time constant of its return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed from which on a joint is led, rad/s, and way of the fastest joint on which what no mass explains falls to a third, rad.
+/// Speed from which on a joint is led, rad/s, and distance of the fastest joint over which torque that no mass explains falls to a third,
+/// rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
-/// What is computed in a tick; the index is that of a joint.
+/// Computation of a tick; the index is that of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
     /// The first one: the loads that were found are carried.
     Begin,
-    /// The mass at the flange that explains them.
+    /// The mass at the flange that explains the loads.
     Mass,
-    /// The inertia of the whole arm. It is the ramp's, which computes it.
+    /// The inertia of the whole arm, which belongs to the ramp and is computed there.
     Ramp,
     Inertia(usize),
-    /// Friction of a joint, and what 1 kg at the flange loads the joints with.
+    /// Friction of a joint, and torque of 1 kg at the flange on the joints.
     Friction(usize),
-    /// What the motion says of the load.
+    /// The judgement of the load from the motion.
     Judge,
     /// The torques of the joints.
     Joints,
@@ -82,29 +83,30 @@ impl Turn {
     }
 }
 
-/// What Teaching remembers. Single precision, because the flight recorder keeps it.
+/// State of Teaching. Single precision, because the flight recorder keeps it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Taught {
     joints: [TaughtJoint; JOINTS],
     carried: [Carried; JOINTS],
-    /// Mass at the flange that the model lacks, kg; negative where the modelled arm is too heavy. What was found of it, and what is carried.
+    /// Mass at the flange that the model lacks, kg; negative if the modelled arm is too heavy: the mass that was found, and the mass that
+    /// is carried.
     found: f32,
     mass: f32,
-    /// What 1 kg at the flange loads each joint with, N·m.
+    /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// How long nothing but the mass has been needed to explain the motion, and how long a joint has sunk for want of it, ms.
+    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk for want of the mass, ms.
     driven_ms: u16,
     sinks_ms: u16,
-    /// How far the flange is above the tool speed limit, 0 to 1.
+    /// Excess of the flange speed over the tool speed limit, 0 to 1.
     haste: f32,
-    /// Ticks: what changes slowly is computed in turns.
+    /// Tick counter: values that change slowly are computed in turns.
     turn: u8,
 }
 
 remembered!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, haste, turn });
 
 impl Taught {
-    /// Teaching begins in an arm at rest at `q` (rad) that has found these loads (N·m).
+    /// Begins Teaching in an arm at rest at `q` (rad) that has found these loads (N·m).
     #[inline(never)]
     pub fn begin(q: &[f64; JOINTS], loads: &[f64; JOINTS], config: &Config) -> Self {
         let mut taught = Self::default();
@@ -133,37 +135,38 @@ impl Taught {
         }
     }
 
-    /// So much mass (kg) at the flange comes into the model with this tick (J-60): as much goes of the one that was found, and not beyond
-    /// nothing. More than that is a load that was not there when it was found.
+    /// Reduces the mass that was found by `mass` (kg) at the flange, which comes into the model with this tick (J-60), but not beyond zero.
+    /// More than that is a load that was not there when the mass was found.
     pub fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
         (self.found, self.mass) = (left(self.found), left(self.mass));
     }
 
-    /// Each tick, which is so `late`, ms: whether a joint has answered, and with which `position`, rad. Returns the speed that its positions make, rad/s.
+    /// Takes the answer of a joint in each tick, which is `late` by this time, ms: `fresh` if the joint has answered, with this `position`,
+    /// rad. Returns the speed that follows from its positions, rad/s.
     #[inline(always)]
     pub fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
         self.joints[j].hear(fresh, position, late)
     }
 
-    /// This is the first tick.
+    /// Returns `true` in the first tick.
     pub fn begins(&self) -> bool {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// In this tick nothing else is computed, so that there is time for the inertia of the whole arm.
+    /// Returns `true` in the tick in which nothing else is computed, so that there is time for the inertia of the whole arm.
     pub fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
 
-    /// What is carried by a joint in the first tick, N·m: all that was found, of which nothing is attributed to a mass yet.
+    /// Returns the torque that a joint carries in the first tick, N·m: all that was found. No part of it is attributed to a mass yet.
     pub fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
-    /// What changes slowly, in turns: in each tick one thing. Returns whether it took so long that the rest stays as it was in this tick; the
-    /// first of all only adds the load, without which there would be a step.
+    /// Computes the values that change slowly, in turns: one in each tick. Returns `true` if that took so long that the rest stays as it
+    /// was in this tick. The first tick of all only adds the load, without which there would be a step.
     #[inline(never)]
     pub fn look(
         &mut self,
@@ -208,13 +211,13 @@ impl Taught {
         }
     }
 
-    /// What the mass loads a joint with, N·m.
+    /// Returns the torque of the mass on a joint, N·m.
     #[inline(always)]
     fn by_mass(&self, j: usize) -> f64 {
         f64::from(self.mass) * f64::from(self.unit[j])
     }
 
-    /// A tick of one joint.
+    /// Runs a tick of one joint.
     #[inline(always)]
     pub fn step(&mut self, j: usize, led: &LedJoint<'_>, config: &Config) -> TaughtTorque {
         let by_mass = self.by_mass(j);
@@ -224,7 +227,7 @@ impl Taught {
         torque
     }
 
-    /// What the motion of the last [`JUDGED_MS`] says of the load.
+    /// Judges the load from the motion of the last [`JUDGED_MS`].
     fn judge(&mut self, v: &[f64; JOINTS]) {
         let (mut driven, mut sinks, mut fastest) = (false, false, 0.0_f64);
         for j in 0..JOINTS {
@@ -250,7 +253,7 @@ impl Taught {
         }
     }
 
-    /// Torque of the load and of the dry friction that holds a joint at `position` (rad), N·m.
+    /// Returns the torque of the load and of the dry friction that holds a joint at `position` (rad), N·m.
     pub fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)
     }

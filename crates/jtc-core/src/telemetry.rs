@@ -1,10 +1,10 @@
-//! What a tick computed, for recordings and tests.
+//! Values that a tick computed, for recordings and tests.
 use jtc_bus::NodeState;
 
 use crate::remembered::remembered;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// One joint in one tick.
+/// Telemetry of one joint in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointTelemetry {
     /// Commanded position, rad.
@@ -13,7 +13,7 @@ pub struct JointTelemetry {
     pub set_velocity: f64,
     /// Commanded acceleration, rad/s².
     pub set_acceleration: f64,
-    /// Position that was commanded for the time of the measurement, rad: what the control law compares it with (J-62).
+    /// Position that was commanded for the time of the measurement, rad: the control law compares the measurement with it (J-62).
     pub due_position: f64,
     /// Measured position, rad.
     pub position: f64,
@@ -33,7 +33,7 @@ pub struct JointTelemetry {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// What blends out a step at a change of state, and payload and brake of teaching, N·m.
+    /// Torque that blends out a step at a change of state, and payload and brake of teaching, N·m.
     pub torque_other: f64,
     /// Torque commanded on the bus, N·m.
     pub torque: f64,
@@ -44,13 +44,13 @@ pub struct JointTelemetry {
 }
 
 impl JointTelemetry {
-    /// Position error, rad: the position that was commanded for the time of the measurement minus the measured one.
+    /// Returns the position error, rad: the position that was commanded for the time of the measurement minus the measured one.
     pub fn position_error(&self) -> f64 {
         self.due_position - self.position
     }
 }
 
-/// One tick.
+/// Telemetry of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
     /// Ticks since boot.
@@ -61,7 +61,7 @@ pub struct Telemetry {
     pub trajectory: TrajectoryState,
     /// Index of the current 1 ms point.
     pub point: u32,
-    /// A pause or stop brakes with all the torque there is (J-33).
+    /// A pause or stop brakes with all available torque (J-33).
     pub braking: bool,
     /// Current error word.
     pub errors: u16,
@@ -71,7 +71,7 @@ pub struct Telemetry {
     pub joints: [JointTelemetry; JOINTS],
 }
 
-/// What a tick remembers for the telemetry alone.
+/// Values that a tick remembers for the telemetry alone.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
     /// Ticks since boot.
@@ -86,7 +86,7 @@ remembered!(Observed { tick, torque });
 mod tests {
     use super::*;
 
-    /// Positive where the joint lags behind a motion upwards, as the position part of the torque is.
+    /// Positive if the joint lags a motion upwards, like the position part of the torque.
     #[test]
     fn j41_the_position_error_is_commanded_minus_measured() {
         let joint = JointTelemetry { due_position: 0.5, position: 0.25, ..JointTelemetry::default() };

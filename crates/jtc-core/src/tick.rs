@@ -1,4 +1,4 @@
-//! One millisecond of the controller, from top to bottom as docs/architecture.md lists it.
+//! The control tick, from top to bottom as docs/architecture.md lists it.
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
@@ -10,11 +10,11 @@ use crate::motion::{ControlMode, Found, LawInputs};
 use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// One millisecond, with a bounded amount of work whatever the inputs.
+    /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
-        // 1. What has come in. The error flags are formed in front of the host's commands: a clear in the very tick in which a
-        // fault shows does not hide it. In Start nothing is carried out yet; the events are offered again.
+        // 1. Inputs. The error flags are formed before the commands of the host are executed: a clear in the tick in which a fault shows
+        // does not hide that fault. In Start no command is executed yet; the events are offered again.
         self.take_answers(inputs);
         if !inputs.safety_input || self.safety_stop_ms.is_some() {
             self.watch_safety_input(inputs);
@@ -26,13 +26,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
         self.watch_hosts(inputs, host_done);
 
-        // 2. What state that makes. What persists is raised again, where a host may have cleared it.
+        // 2. The state that follows. An error that persists is raised again, because a host may have cleared it.
         if !inputs.host.is_empty() {
             self.form_error_flags(inputs);
         }
         self.choose_state();
 
-        // 3. What to do in it.
+        // 3. The work of that state.
         let (torque, found) = self.work();
 
         // 4. An error found now zeroes the torque of this same tick.
@@ -42,7 +42,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let bus = self.frame(before, torque);
         self.observe(&torque);
 
-        // 6. What the board and the hosts get.
+        // 6. Outputs for the board and the hosts.
         // J-22: 0 in Start and while an internal error is latched.
         let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
@@ -53,7 +53,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Outputs { bus: Some(bus), safety_output, status, record_line, answer_line, store, host_done }
     }
 
-    /// The answers of the nodes, and whether this tick comes in time.
+    /// Takes the answers of the nodes, and checks that this tick is on time.
     fn take_answers(&mut self, inputs: &Inputs<'_>) {
         let found_moving = self.motion.set.next_tick();
         let commanded = &self.motion.set.commanded;
@@ -85,11 +85,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// The work of the state: torques within their limits, and the errors of joints found on the way.
+    /// Does the work of the state. Returns torques within their limits, and the joint errors found on the way.
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
-                // All else was released when the state began.
+                // Everything else was released when the state began.
                 self.motion.set.release(&self.nodes);
                 self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])
@@ -101,7 +101,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // The wait ends: the operator no longer expects the arm to go soft then.
+        // A pending teach request times out: by then the operator no longer expects the arm to become compliant.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         if self.parameters.blend_left_ms() > 0 {
@@ -121,13 +121,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return self.rest();
         }
         if jogged {
-            // It has come to rest.
+            // The jogged arm has come to rest.
             self.motion.law.change_mode();
         }
         self.control(ControlMode::Hold)
     }
 
-    /// A tick in which the arm comes to rest because a hand has led it.
+    /// Runs a tick in which the arm comes to rest because a hand has led it.
     fn rest(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         let mode = if self.motion.set.led_to_rest(&self.config) {
             self.motion.law.change_mode();
@@ -142,15 +142,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.keep_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
         self.motion.set.follow_measured(&self.nodes);
         if self.parameters.blend_left_ms() > 0 {
-            // As much of the mass that had been found is now given.
+            // The model takes over a part of the mass that Teaching had found.
             self.motion.law.give_way_to_payload(self.parameters.next_mass());
             self.parameters.blend_payload();
         }
         self.control(ControlMode::Teach)
     }
 
-    /// The control step in Operate: a function of its own, so that its instructions can be counted. On the path they are the
-    /// same number in every tick.
+    /// Runs the control step in Operate. A separate function lets its instructions be counted; on the path their number is the same in
+    /// every tick.
     #[inline(never)]
     fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.latch(&self.nodes, &self.config);
@@ -161,9 +161,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// The control law and its limits: the torques to command, and the errors that were not acted upon (J-66).
+    /// Runs the control law and its limits. Returns the torques to command, and the errors that were not acted upon (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
+        // A joint beyond its over-speed limit is out of control: the only reaction is to take its torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {
@@ -182,7 +182,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
-    /// Positions of the path outside the limits that the check of the trajectory has passed (J-36) are no error in motion (J-43).
+    /// Clears position errors in motion (J-43) for path positions outside the limits that the check of the trajectory has passed (J-36).
     #[cold]
     fn tolerate_positions(&self, found: &mut [Found; JOINTS]) {
         let Some(first) = self.store.first() else { return };
@@ -196,7 +196,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises what the limits have `found`; returns the torque to command, which is none with an error latched (J-21).
+    /// Raises the joint errors in `found`. Returns the torque to command, which is zero if an error is latched (J-21).
     pub(crate) fn form_error_flags_again(
         &mut self,
         torque: [f64; JOINTS],
@@ -210,12 +210,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// The one frame of this tick (J-12).
+    /// Returns the one frame of this tick (J-12).
     pub(crate) fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
-        // Drives keep their last torque: taking it away comes before everything else.
+        // Drives keep their last torque: removing it has priority over everything else.
         let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
         let must_move = new_error || (before.has_torque() && !self.powered());
-        // J-61: up to here torque is that of the joints.
+        // J-61: up to here, torque means joint torque.
         let torque = core::array::from_fn(|j| torque[j] * self.config.joints[j].torque_gain);
         self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
     }
@@ -234,7 +234,8 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// An accepted teaching waits as long as enabling may take, and is over then: the operator no longer expects the arm to go soft.
+    /// An accepted teach request waits as long as enabling may take, and then times out: by then the operator no longer expects the arm to
+    /// become compliant.
     #[test]
     fn j25_teaching_waits_for_a_while_only() {
         let most = Config::avena().enable_timeout_ms;

@@ -1,4 +1,4 @@
-//! Joints that are not there (J-53): what stands for them, what is refused, and a drive that answers all the same.
+//! Absent joints (J-53): values that stand for them, refused commands, and a drive that answers nevertheless.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -26,7 +26,7 @@ fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
         .collect()
 }
 
-/// A bench on which these joints are not: their nodes never answer.
+/// Returns a bench without these joints: their nodes never answer.
 fn bench(joints: &[(usize, f64)]) -> Rig {
     bench_with(Config::avena(), joints)
 }
@@ -51,7 +51,8 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// Whichever joints are not there: the others are brought up and held, with the torque that the model has for the whole arm.
+    /// With any set of absent joints, the others are brought up and held, with the torque that the model has for the
+    /// whole arm.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
@@ -72,7 +73,7 @@ proptest! {
                 prop_assert!((telemetry.joints[j].torque_model - gravity[j]).abs() < 1e-3, "joint {}", j + 1);
             }
         }
-        // Nothing was ever asked of their nodes.
+        // Their nodes were never addressed.
         for request in &rig.sent {
             match request {
                 Request::Move { torque, .. } => {
@@ -101,7 +102,7 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // In Error, for a drive that went silent.
+        // In Error, because a drive went silent.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -138,7 +139,7 @@ fn j53_absent_joints_forbid_motion_and_teaching_and_are_not_jogged() {
     }
 }
 
-/// Either the drive or the setting is wrong: the arm has no torque until that is mended.
+/// Either the drive or the setting is wrong: the arm has no torque until this is corrected.
 #[test]
 fn j53_absent_joints_whose_drives_answer_are_an_error() {
     for j in ALL {
@@ -157,14 +158,14 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
             };
             rig.until(10, |r| r.state() == ControllerState::Error);
             assert_ne!(rig.errors() & error::EXTERNAL_JOINTS, 0);
-            // Its state is shown, so that one sees which it is.
+            // Its state is shown, so that the operator sees which joint it is.
             let shown = rig.status().joints.map(|joint| joint.state);
             assert_eq!(shown[j], rig.nodes[j].report.state);
             rig.clear(true, 0x7F);
             rig.run(500);
             assert_eq!(rig.state(), ControllerState::Error, "it answers still");
             assert!(rig.torque == [0.0; 6]);
-            // It is there after all.
+            // The joint is set present.
             assert_eq!(set(&mut rig, &[(settings::ABSENT, j, 0.0)]), DataStatus::NoError);
             rig.run(50);
             rig.clear(true, 0x7F);
@@ -176,7 +177,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
     }
 }
 
-/// One that is enabled is not left so, whatever has enabled it.
+/// The drive of an absent joint is disabled if it is enabled, for any cause.
 #[test]
 fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     let mut rig = bench(&[(2, 0.0)]);
@@ -187,7 +188,7 @@ fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// What is left on the bus is watched as ever.
+/// The other nodes on the bus are supervised as usual.
 #[test]
 fn j53_absent_joints_hide_no_error_of_the_others() {
     for j in ALL {
@@ -199,7 +200,7 @@ fn j53_absent_joints_hide_no_error_of_the_others() {
     }
 }
 
-/// While the only node that is there boots, nobody acknowledges.
+/// While the only present node boots, no node acknowledges.
 #[test]
 fn j53_absent_joints_acknowledge_nothing() {
     let five: Vec<_> = (1..6).map(|j| (j, 0.0)).collect();
@@ -219,7 +220,7 @@ fn j53_absent_joints_acknowledge_nothing() {
     assert_eq!(resets.count(), 0, "what is not there is not reset");
 }
 
-/// They are no part of the arm, and a payload is carried with them as without.
+/// Absent joints do not belong to the arm settings, and a payload is carried with them as without.
 #[test]
 fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     let mut rig = bench(&[(1, 0.9), (4, -0.3)]);
@@ -238,14 +239,14 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// What only a joint that is not there would have to hold is no reason to refuse a payload or a model.
+/// A payload or a model is not refused because of a load that only an absent joint would hold.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {
         let payload = Payload { mass, ..Payload::NONE };
         settings::payload_values(&payload).flat_map(|value| value.emit()).collect::<Vec<u8>>()
     };
-    // Stretched out: joint 2 holds hardly more than itself.
+    // Stretched out: joint 2 can hold little more than the arm itself.
     for there in [true, false] {
         let mut rig = if there { Rig::new(Config::avena()) } else { bench(&[(1, 1.5)]) };
         if there {
@@ -257,7 +258,7 @@ fn j53_absent_joints_hold_nothing() {
         assert_eq!(rig.state(), ControllerState::HoldPos);
         let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
         assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
-        // Also where it is asked for again, at the end of Init.
+        // Also when the load is checked again, at the end of Init.
         rig.press_stop(10);
         rig.clear(true, 0x7F);
         rig.run(3_000);

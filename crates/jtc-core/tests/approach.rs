@@ -1,4 +1,4 @@
-//! On the way to the path, and on the way from it: what is remembered of a motion must not outlive its place.
+//! The approach to the path and the departure from it: data of a motion must not be kept longer than they are valid.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
@@ -19,7 +19,7 @@ fn points() -> Vec<RawPoint> {
         .collect()
 }
 
-/// A pause that has not been seen to end is none once the arm is taught: a hand moves the joints then.
+/// A pause whose end was not detected is over once the arm is taught, because a hand then moves the joints.
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
@@ -40,7 +40,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
-/// Who stops or pauses an arm wants it held, also one that would be taught as soon as it stands.
+/// A Stop or a Pause means that the arm must be held. It also cancels a Teaching that waits for the arm to stand.
 #[test]
 fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     for command in [ExecCommand::Stop, ExecCommand::Pause] {
@@ -56,13 +56,13 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
             rig.nodes[1].report.velocity = 0.0;
             rig.run(12_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{command:?} {taught_ms}");
-            // Nothing is left to stop.
+            // The second command has nothing to stop.
             assert_eq!(rig.exec(command), DataStatus::NotAllowed);
         }
     }
 }
 
-/// The hand that stops an arm may hit another key, too.
+/// The operator who stops an arm may also press another key.
 #[test]
 fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     for ms in [1, 20, 100, 180] {
@@ -91,7 +91,7 @@ fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     );
 }
 
-/// The way to the first point is faster than the path, and than its friction table.
+/// The approach to the first point is faster than the path, and faster than the range of its friction table.
 #[test]
 fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     let mut rig = Rig::new(Config::avena());
@@ -112,8 +112,8 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// A Stop or a Pause on the approach: the arm slows down at once, and stands before it reaches the first point. The next Execute begins
-/// from there.
+/// A Stop or a Pause on the approach: the arm slows down at once, and stands before it reaches the first point. The
+/// next Execute begins from there.
 #[test]
 fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     for (command, trajectory) in
@@ -156,8 +156,9 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     }
 }
 
-/// An arm of metal with a load that the controller knows, in random poses, beside the first point by as much as it may be: by 0.02 rad, and by
-/// 0.3 rad with a wide tolerance. No torque gets to its limit on the approach. Where Execute is refused, little is left.
+/// A simulated arm with a load that the controller knows, in random poses, as far from the first point as is allowed:
+/// 0.02 rad, and 0.3 rad with a wide tolerance. No torque reaches its limit on the approach. If Execute is refused,
+/// little torque is left.
 #[test]
 fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     let seed = 13;
@@ -205,8 +206,8 @@ fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
 }
 
-/// A joint that stands at 98 % of its limit, and whose friction needs more than is left, does not set out: Execute is refused (8), as it is for an
-/// arm that stands elsewhere.
+/// A joint that stands at 98 % of its limit, and whose friction needs more than the margin, does not start: Execute is
+/// refused (8), as for an arm that stands elsewhere.
 #[test]
 fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     let holds = Parameters::avena().model;
@@ -231,8 +232,8 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
-/// A path may begin outside a limit for an arm that stands there (J-36). One that stands inside is not moved out to it, however wide the start
-/// tolerance is.
+/// A path may begin outside a limit if the arm stands there (J-36). An arm that stands inside is not moved out to the
+/// path, for any start tolerance.
 #[test]
 fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     for (at, first, tolerance, answer) in [
@@ -264,7 +265,8 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// An arm that stands exactly where it was paused goes on, however little torque is left. A friction table with torque at standstill once kept it there.
+/// An arm that stands exactly at its paused point continues, with any torque margin. A friction table with torque at
+/// standstill once prevented that.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;
@@ -315,7 +317,7 @@ fn j34_without_a_distance_there_is_no_approach() {
     }
 }
 
-/// An arm that is found a little beyond a position limit goes to a path inside.
+/// An arm slightly beyond a position limit can move to a path inside.
 #[test]
 fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
     let mut config = Config::avena();
@@ -337,14 +339,14 @@ fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
     assert_eq!(rig.status().joints[1].internal_occurred & joint_error::POSITION, 0);
 }
 
-/// J-16: an Execute waits for joints that are being enabled, but not for ever.
+/// J-16: an Execute waits for joints that are being enabled, but only for a limited time.
 #[test]
 fn j16_an_execute_does_not_wait_for_ever() {
     let mut rig = Rig::new(Config::avena());
     rig.defaults();
     rig.follow = false;
     rig.run(5);
-    // One joint swings in a hand, too fast to be enabled.
+    // A joint swings in a hand, too fast to be enabled.
     let mut phase = 0.0f64;
     let mut swing = |rig: &mut Rig| {
         phase += 0.001;
@@ -374,12 +376,12 @@ fn j16_an_execute_does_not_wait_for_ever() {
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
-/// J-06: a model sent before the positions are known is looked at once they are.
+/// J-06: a model that was sent before the positions are known is checked when they are.
 #[test]
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());
     let mut model = Parameters::avena().model;
-    // Millimetres in place of metres.
+    // Millimetres instead of metres.
     for joint in &mut model.joints {
         joint.xyz = joint.xyz.map(|x| 1000.0 * x);
     }
@@ -400,7 +402,8 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     rig.until(500, |r| r.state() == ControllerState::HoldPos);
 }
 
-/// Three times the friction of the model, at a torque limit that leaves little: the approach slows down until the torque suffices, and arrives.
+/// Three times the friction of the model, at a torque limit with a small margin: the approach slows down until the
+/// torque suffices, and arrives.
 #[test]
 fn j75_an_approach_that_takes_too_much_torque_is_held_back() {
     let pose = plant::POSES[0];

@@ -1,4 +1,4 @@
-//! Order of the bring-up: what counts when, and who is asked for what (J-16, J-20, J-21).
+//! Order of the bring-up: validity of reports, and frames to each node (J-16, J-20, J-21).
 use crate::rig;
 
 use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target, warning};
@@ -24,7 +24,7 @@ fn joint_answer(position: f64, state: NodeState) -> Frame {
     Answer::Joint { node: JOINT as u8, report }.emit(SCALE)
 }
 
-/// Its drive reports 0 until then, whatever else it answers in that tick.
+/// The drive reports position 0 until it is configured, even if it also sends other answers in that tick.
 #[test]
 fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     for move_first in [false, true] {
@@ -43,7 +43,7 @@ fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     }
 }
 
-/// An answer that was on its way when the node was reset is not of the node that restarts.
+/// An answer that was on its way when the node was reset does not count for the restarted node.
 #[test]
 fn j20_late_answers_after_a_reset_do_not_count() {
     let mut rig = Rig::holding();
@@ -88,7 +88,8 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// The way from Error to HoldPos leads through joints in ReadyToOperate; one that is still enabled is not taken over.
+/// The way from Error to HoldPos leads through joints in ReadyToOperate; a joint that is still enabled is not taken
+/// over.
 #[test]
 fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     let mut rig = Rig::holding();
@@ -105,7 +106,7 @@ fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
-/// A node that is on its way through 10, from Start to Init, has not followed yet.
+/// A node that is on its way through 10, from Start to Init, has not reached the target yet.
 #[test]
 fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     let mut rig = Rig::holding();
@@ -127,13 +128,13 @@ fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// Neither in Error, nor while a node of it is being cleared, is anything configured.
+/// No node is configured in Error or while it is being cleared.
 #[test]
 fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     let mut rig = Rig::holding();
     rig.safety_input = false;
     rig.run(50);
-    // It has restarted: its configuration is lost.
+    // The node has restarted: its configuration is lost.
     rig.nodes[JOINT].restart();
     let from = rig.sent.len();
     rig.run(500);
@@ -184,7 +185,8 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
 }
 
-/// The drive goes through Init for it: with the last parameter in the very next frame the arm is held only after that.
+/// The drive must go through Init to clear its error: if the last parameter comes in the very next frame, the arm is
+/// held only after that.
 #[test]
 fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     let mut rig = Rig::new(Config::avena());
@@ -299,7 +301,7 @@ fn j16_enabling_has_a_time_limit() {
     rig.until(200, |r| r.state() == ControllerState::HoldPos);
     rig.run(490);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // The arm has to have been still for 50 ms before enabling is asked for.
+    // The arm must have been still for 50 ms before enabling is requested.
     rig.run(80);
     assert_eq!(
         (rig.state(), rig.errors()),
@@ -323,7 +325,7 @@ fn j16_only_known_states_are_requested_and_positions_count_after_configuration()
         for j in 0..6 {
             let q = t.joints[j].position;
             assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
-            // A hold position is never latched from the zero that is reported before configuration.
+            // The zero that is reported before configuration is never latched as a hold position.
             if t.state == ControllerState::HoldPos {
                 assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
             }

@@ -1,4 +1,4 @@
-//! Enabling an arm that carries a load which its model lacks (J-43): any that the torque limits hold is caught.
+//! Enabling an arm that carries a load which its model lacks (J-43): every load within the torque limits is caught.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -8,7 +8,7 @@ use jtc_wire::{ExecCommand, RawPoint};
 use plant::{LuGre, POSES, Plant, loaded};
 use rig::Rig;
 
-/// Friction from none, which damps no swing, to that of the default arm.
+/// Friction from zero, which damps no swing, to that of the default arm.
 const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
 
 fn friction(factor: f64) -> [LuGre; 6] {
@@ -23,12 +23,12 @@ fn share(mass: f64, pose: &[f64; 6]) -> f64 {
     (0..6).map(|j| gravity[j].abs() / limits[j]).fold(0.0, f64::max)
 }
 
-/// An arm with `mass` kg at the flange that its brakes let go in `pose`, when its joints are enabled.
+/// An arm with `mass` kg at the flange, whose brakes open in `pose` when its joints are enabled.
 struct Let {
     arm: Plant,
     rig: Rig,
     pose: [f64; 6],
-    /// Largest way of a joint, rad, and ticks for which torque was at its limit.
+    /// Largest motion of a joint, rad, and ticks with torque at its limit.
     sag: f64,
     saturated: u32,
 }
@@ -59,7 +59,7 @@ impl Let {
         }
     }
 
-    /// From when its joints are enabled.
+    /// Runs from the moment at which its joints are enabled.
     fn caught(&mut self, ticks: usize) {
         while !self.enabled() {
             self.run(1);
@@ -140,8 +140,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// The time for a catch is over a second after a joint was enabled: then a load that comes is one of J-43 again. And it is a
-/// setting.
+/// The time for a catch ends one second after a joint was enabled; a load that comes later is an error of J-43 again.
+/// The time is a setting.
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {

@@ -1,4 +1,5 @@
-//! A trajectory is checked when it is loaded, and again by what may have changed when it is executed (J-36).
+//! A trajectory is checked when it is loaded, and checked again when it is executed for conditions that may have
+//! changed (J-36).
 use crate::rig;
 
 use jtc_core::check::Quantity;
@@ -6,7 +7,7 @@ use jtc_core::{Config, ControllerState, TrajectoryState, Violation};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, point, rad, rest, segment_body};
 
-/// Limits that are not the same both ways, and no limits but these.
+/// Limits that differ in both directions, and no other limits.
 fn rig() -> Rig {
     let mut config = Config::avena();
     for joint in &mut config.joints {
@@ -20,7 +21,7 @@ fn load(rig: &mut Rig, segment: u16, segments: u16, points: &[RawPoint]) -> Data
     rig.ask(FrameType::Trajectory, &segment_body(7, segment, segments, 100, points))
 }
 
-/// What the last refusal was for: point, joint, quantity.
+/// Returns the cause of the last refusal: point, joint, quantity.
 fn why(rig: &Rig) -> Option<(u32, usize, Quantity)> {
     rig.controller.violation().map(|v| (v.point, v.joint, v.quantity))
 }
@@ -57,7 +58,7 @@ fn j30_a_refused_segment_0_leaves_the_old_trajectory_as_it_was() {
     let mut rig = rig();
     let good: Vec<_> = (0..40).map(|i| point(2, 0.0005 * f64::from(i), 0.0, 0.0)).collect();
     assert_eq!(load(&mut rig, 0, 1, &good), DataStatus::NoError);
-    // As long as the old one, so that every point of it would be written over.
+    // As long as the old trajectory, so that it would overwrite every point.
     let mut bad = vec![point(2, 0.015, 0.0, 0.0); 39];
     bad.push(point(2, 3.0, 0.0, 0.0));
     assert_eq!(load(&mut rig, 0, 1, &bad), DataStatus::IncorrectValue);
@@ -74,7 +75,7 @@ fn j30_the_right_segment_can_follow_one_that_was_refused() {
     let mut rig = rig();
     let at = |q| point(3, q, 0.0, 0.0);
     assert_eq!(load(&mut rig, 0, 2, &[at(0.0), at(0.02)]), DataStatus::NoError);
-    // The way from the last point of one segment to the first of the next is part of the path.
+    // The motion from the last point of a segment to the first of the next is a part of the path.
     assert_eq!(load(&mut rig, 1, 2, &[at(0.2), at(0.2)]), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((1, 3, Quantity::PositionSpeed)));
     assert_eq!(load(&mut rig, 1, 2, &[at(0.04), point(3, 0.05, 0.2, 0.0)]), DataStatus::IncorrectValue);
@@ -101,7 +102,7 @@ fn j30_points_of_a_segment_that_loses_holdpos_do_not_count() {
         (rig.trajectory(), rig.exec(ExecCommand::Execute)),
         (TrajectoryState::Null, DataStatus::NotAllowed)
     );
-    // Nothing of it is there to go on behind.
+    // No part of the trajectory is left that a later segment could continue.
     let second = segment_body(7, 1, 2, 100, &[rest(0)]);
     assert_eq!(rig.ask(FrameType::Trajectory, &second), DataStatus::IncorrectSegmentOrder);
 }
@@ -150,7 +151,7 @@ fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execu
         (ControllerState::HoldPos, TrajectoryState::Stop),
         "nothing moves"
     );
-    // The polynomial has no ends.
+    // The polynomial has no limits of its range.
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     rig.until(2000, |r| r.trajectory() == TrajectoryState::Finish);
@@ -196,7 +197,7 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
         rig.until(1000, |r| r.controller.telemetry().point == 150);
         assert!((rig.controller.telemetry().joints[4].torque_friction - column).abs() < 1e-6);
-        // It gets colder or warmer than the table while it moves.
+        // The joint gets colder or warmer than the table while it moves.
         rig.nodes[4].report.temperature = if temperature == 20 { 251 } else { 70 };
         rig.run(20);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Operate, 0));
@@ -214,14 +215,14 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
 #[test]
 fn j42_friction_acts_at_the_commanded_velocity_not_at_the_measured_one() {
     let mut rig = rig();
-    // Torque by velocity alone: the row's number.
+    // Torque depends on the velocity alone: the number of the row.
     let rows = floats((0..6).flat_map(|_| {
         let axis = |from: f32, to: f32| (0..20).map(move |i| from + (to - from) * i as f32 / 19.0);
         axis(-0.95, 0.95).chain(axis(0.0, 60.0)).chain((0..400).map(|i| (i / 20) as f32))
     }));
     assert_eq!(rig.ask(FrameType::FrictionTable, &rows), DataStatus::NoError);
     assert_eq!(load(&mut rig, 0, 1, &swing(0.3)), DataStatus::NoError);
-    // Far outside the table, were it asked for this one.
+    // Far outside the table, if the table were used for this velocity.
     rig.nodes[4].report.velocity = -1.2;
     rig.exec(ExecCommand::Execute);
     for at in [130, 250, 420, 610] {
@@ -382,12 +383,12 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
             rig.plain = plain;
             let points = quintic(from, to);
             let (low, high) = executed(&mut rig, &points);
-            // Where it stands, by a step of the wire.
+            // The present position, to within a step of the wire.
             let (lowest, highest) = (from.min(to) - 97e-6, from.max(to) + 97e-6);
             assert!(low >= lowest && high <= highest, "{from} to {to}: {low}..{high}");
         }
     }
-    // Neither further out nor from further out.
+    // Neither further out, nor from a position that is too far out.
     for (from, to) in [(1.165, 1.169), (-0.555, -0.56), (1.175, 0.8), (-0.575, 0.0)] {
         let mut rig = standing(from);
         let body = segment_body(3, 0, 1, 10, &quintic(from, to));
@@ -398,7 +399,7 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
     }
 }
 
-/// What the check has not seen is found in motion: points that change in memory after it.
+/// An error that the check cannot detect is found in motion: points that change in memory after the check.
 #[test]
 fn j43_beyond_what_is_tolerated_a_position_ends_the_motion() {
     let mut points = quintic(0.8, 1.15);

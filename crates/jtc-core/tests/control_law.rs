@@ -41,7 +41,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     let points: Vec<_> = (0..100i16)
         .map(|i| RawPoint {
             position: [i; 6],
-            // Up and down again: it has to end at rest.
+            // Up and down again: the motion must end at rest.
             velocity: [50 * i.min(99 - i), 0, 30 * i.min(99 - i), 0, 0, 0],
             acceleration: [300, 0, 200, 0, 0, 100],
         })
@@ -50,7 +50,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     rig.move_along(&points, 105);
     let t = rig.controller.telemetry();
     let (q, qd, qdd) = (
-        // J-62: where the commanded motion has brought what was measured.
+        // J-62: the measured position, moved on by the motion that was commanded since the measurement.
         t.joints.map(|j| j.position + (j.set_position - j.due_position)),
         t.joints.map(|j| j.set_velocity),
         t.joints.map(|j| j.set_acceleration),
@@ -151,7 +151,7 @@ fn j42_polynomial_order_and_lengths() {
 fn j44_no_torque_step_at_any_switch() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    // A standing error, so that PID torque is there to be carried over.
+    // A lasting error, so that the PID controller has torque to carry over.
     for j in 0..6 {
         rig.nodes[j].report.position = 0.0003;
     }
@@ -182,14 +182,14 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint has more friction of its own than Teaching adds; it takes half of the Coulomb part away.
+    // The joint has more friction of its own than Teaching adds; Teaching compensates half of the Coulomb part.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
     assert!((t.torque_other + 60.0 * 0.2).abs() < 0.01, "{t:?}");
     assert!(t.torque_friction > 1.0 && t.torque_friction < 6.0, "{t:?}");
     assert!((t.torque - t.torque_model - t.torque_friction - t.torque_other).abs() < 1e-9, "{t:?}");
-    // It never asks for more than the joint has.
+    // The torque never exceeds the limit of the joint.
     rig.nodes[2].report.velocity = -1.999;
     rig.nodes[5].report.velocity = 1.999;
     rig.run(5);
@@ -214,7 +214,7 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 
 #[test]
 fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
-    // The rig's joint moves without torque, so the controller is not to run into a limit of its torque.
+    // The rig's joint moves without torque, so the controller must not run into a torque limit.
     let mut config = Config::avena();
     config.joints[1].torque_max = 360.0;
     let limits = config.joints[1];

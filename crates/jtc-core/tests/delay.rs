@@ -1,4 +1,4 @@
-//! A measurement is older than the command that answers it, and is compared with the set value of its own time (J-62).
+//! A measurement is older than the command of the same tick, and is compared with the set value of its own time (J-62).
 use crate::{plant, rig};
 
 use std::collections::VecDeque;
@@ -11,20 +11,20 @@ use proptest::prelude::*;
 use rig::{Rig, floats, pieces, put};
 
 const DT: f64 = 1e-3;
-/// Settings that there are.
+/// Largest setting.
 const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
-    // What a wrong delay makes of an exact motion is no push.
+    // The deviation that a wrong delay causes in an exact motion must not count as a push.
     let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
     if ticks > 3 {
-        // With the longest of them the gains need heavier joints (J-71).
+        // With the longest delays the gains need heavier joints (J-71).
         config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 1.8);
     }
     config
 }
 
-/// Ways of all joints (rad), there and back in `seconds` each.
+/// Returns motions of all joints (rad), out and back in `seconds` each.
 fn there_and_back(ways: &[f64; 6], seconds: f64) -> Vec<RawPoint> {
     let steps = (100.0 * seconds) as u32;
     let point = |k: u32| {
@@ -42,7 +42,7 @@ fn there_and_back(ways: &[f64; 6], seconds: f64) -> Vec<RawPoint> {
     (0..=2 * steps).map(point).collect()
 }
 
-/// An arm of metal, whose drives report positions so many ticks after they had them.
+/// A simulated arm whose drives report positions that are `late` ticks old.
 struct LateArm {
     arm: Plant,
     rig: Rig,
@@ -52,7 +52,7 @@ struct LateArm {
 }
 
 impl LateArm {
-    /// It is the arm of the model, without friction: what is left is what late measurements make.
+    /// Creates the arm of the model, without friction: the remaining deviation is caused by late measurements.
     fn holding(late: u8, config: Config) -> Self {
         let arm = Plant::new(&Parameters::avena().model, [LuGre::NONE; 6], [0.0; 6]);
         let mut rig = Rig::new(config);
@@ -67,14 +67,15 @@ impl LateArm {
         all
     }
 
-    /// One millisecond. What a tick of the rig answers is seen in the next one: it is one tick old then.
+    /// Advances one millisecond. The controller sees an answer of the rig in the next tick, when it is one tick old.
     fn tick(&mut self) {
         self.past.pop_back();
         self.past.push_front(self.arm.q);
         self.arm.tick_seen_at(&mut self.rig, &self.past[self.late - 1]);
     }
 
-    /// Executes `points`; RMS over the motion of commanded minus true position and of the commanded velocity, per joint.
+    /// Executes `points`; returns the RMS over the motion of commanded minus true position and of the commanded
+    /// velocity, per joint.
     fn follow(&mut self, points: &[RawPoint]) -> [(f64, f64); 6] {
         self.rig.upload(points, 10);
         self.rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
@@ -104,8 +105,8 @@ impl LateArm {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() })]
 
-    /// A setting that is off by so many ticks lets the arm be off by the way that it goes in them; the one that is right leaves a
-    /// small part of that.
+    /// A delay setting that is wrong by some ticks makes the arm deviate by its motion in these ticks; the right
+    /// setting leaves a small part of that.
     #[test]
     fn j62_the_true_position_follows_best_with_the_delay_that_the_answers_have(
         late in 1..=4u8,
@@ -126,7 +127,8 @@ proptest! {
     }
 }
 
-/// An arm that is where it was commanded to be in each tick, or where a hand leads it. Its answers are two ticks old or more.
+/// An arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. Its
+/// answers are two ticks old or more.
 struct ExactArm {
     rig: Rig,
     here: [f64; 6],
@@ -137,11 +139,11 @@ impl ExactArm {
     fn holding(late: u8) -> Self {
         let mut rig = Rig::holding_with(delayed(late));
         rig.follow = false;
-        // What it answers now is seen in the next tick, and knows the command of the last one.
+        // The controller sees an answer of now in the next tick; the answer reflects the command of the last tick.
         Self { rig, here: [0.0; 6], past: vec![[0.0; 6]; usize::from(late) - 2].into() }
     }
 
-    /// A tick, in which a hand leads an arm that is taught at this velocity (rad/s).
+    /// Runs a tick, in which a hand leads a taught arm at this velocity (rad/s).
     fn tick(&mut self, led: f64) -> [JointTelemetry; 6] {
         self.past.push_front(self.here);
         let seen = self.past.pop_back().expect("as many as before");
@@ -159,7 +161,7 @@ impl ExactArm {
         now
     }
 
-    /// Ticks until `done`, in each of which nothing is left for the PID controller to do.
+    /// Runs ticks until `done`; checks that the PID controller gives no torque in any of them.
     fn run(&mut self, what: &str, led: f64, mut done: impl FnMut(&Rig) -> bool) {
         for tick in 0..5_000 {
             if done(&self.rig) {
@@ -182,7 +184,7 @@ impl ExactArm {
         panic!("{what}: it goes on for ever: {:?}", self.rig.controller.telemetry());
     }
 
-    /// A command, and what becomes of it.
+    /// Sends a command and runs until its effect.
     fn command(&mut self, what: &str, frame: FrameType, body: &[u8], done: fn(&Rig) -> bool) {
         self.rig.send(frame, body);
         let mut ticks = 0;
@@ -193,7 +195,8 @@ impl ExactArm {
     }
 }
 
-/// Whatever begins, goes on or ends, at rest or in motion: an arm that follows exactly meets no torque of the PID controller.
+/// At every begin, continuation and end of a motion, an arm that follows exactly gets no torque from the PID
+/// controller.
 #[test]
 fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
     const EXEC: FrameType = FrameType::TrajSetExecStatus;
@@ -220,7 +223,7 @@ fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
             });
             arm.rig.send(FrameType::TeachingModeDisable, &[]);
             arm.run("teaching ends", led, held);
-            // It moved on; the arm comes to rest from there.
+            // The joint moved on; the arm comes to rest from there.
             let from = arm.here[0];
             for _ in 0..400 {
                 arm.tick(0.0);
@@ -236,7 +239,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
     const JOINT: usize = 1;
     for (late, velocity) in [(2, 0.6), (3, -0.4), (5, 1.1), (DELAY_MAX, -1.2)] {
         let mut arm = ExactArm::holding(late);
-        // One drive is slow to be enabled, and meanwhile the joint begins to fall.
+        // A drive is slow to be enabled, and meanwhile the joint begins to fall.
         arm.rig.nodes[JOINT].slow_enable = true;
         arm.rig.press_stop(1);
         arm.rig.clear(true, 0x7F);
@@ -252,7 +255,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
         }
         arm.rig.nodes[JOINT].report.velocity = velocity;
         arm.rig.nodes[JOINT].report.state = jtc_bus::NodeState::ENABLED;
-        // Until its answer has come, it goes on.
+        // The joint continues until its answer has come.
         for _ in 0..900 {
             arm.past.push_front(arm.here);
             let seen = arm.past.pop_back().expect("as many as before");
@@ -275,7 +278,7 @@ fn steady() -> Vec<RawPoint> {
     pieces(0, &[(5.0, 20), (0.0, 50), (-5.0, 20)])
 }
 
-/// A millirad is what such a joint goes in a tick.
+/// A joint at this speed moves a millirad per tick.
 #[test]
 fn j43_j62_the_position_error_is_that_of_the_same_time() {
     for late in 2..=DELAY_MAX {
@@ -302,7 +305,8 @@ fn j43_j62_the_position_error_is_that_of_the_same_time() {
     }
 }
 
-/// What is reported as position error is what the law acts on, and with the delay it is the one of as many ticks before.
+/// The reported position error is the one on which the law acts: with a delay, the error of that number of ticks
+/// before.
 #[test]
 fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     for delay in 0..=DELAY_MAX {
@@ -329,7 +333,8 @@ fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     }
 }
 
-/// Without a delay the law is that of J-40 and J-41 to the last bit: the set value of this tick, and the measured position.
+/// Without a delay the law is that of J-40 and J-41 to the last bit: the set value of this tick, and the measured
+/// position.
 #[test]
 fn j62_without_a_delay_the_present_set_value_is_compared() {
     let config = delayed(0);
@@ -356,8 +361,9 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     assert!(moved > 0.2, "{moved} rad/s");
 }
 
-/// What is predicted for a measurement that is lost is what it would have shown: of an arm that follows exactly nothing is left for
-/// the PID controller, wherever in a motion with corners of the velocity the loss begins, and however late the answers are.
+/// The prediction for a lost measurement equals the measurement: for an arm that follows exactly, the PID controller
+/// has nothing left to do, at any time of the loss in a motion with corners of the velocity, and for any age of the
+/// answers.
 #[test]
 fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
     for late in [2, 4, DELAY_MAX] {
@@ -373,13 +379,13 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The rate that is carried on is that of the last 5 ms, in which a corner was; 4 ms after it.
+        // The prediction uses the rate of the last 5 ms, in which a corner was; 4 ms after the corner.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }
 
-/// Measurements that are lost while a joint begins to be held in motion are predicted as ever: that its set values begin to move is
-/// no change of its motion.
+/// If measurements are lost while a position hold begins in motion, the prediction continues as usual: the beginning
+/// motion of the set values does not change the true motion.
 #[test]
 fn j63_a_loss_over_the_end_of_teaching_makes_no_step() {
     for late in [2, 5] {

@@ -1,4 +1,5 @@
-//! A Stop during an upload drops it: nothing of it is executed, and jogging, teaching and the next upload are free (J-30, J-58).
+//! A Stop during an upload drops it: no part of it is executed, and jogging, teaching and the next upload are possible
+//! (J-30, J-58).
 use crate::rig;
 
 use jtc_core::{ControllerState, TrajectoryState};
@@ -18,17 +19,17 @@ fn jog(rig: &mut Rig) -> DataStatus {
     rig.ask(FrameType::Jog, &floats([0.1f32, 0.0, 0.0, 0.0, 0.0, 0.0]))
 }
 
-/// The records of Stop frames.
+/// Returns the records of Stop frames.
 fn stops(rig: &Rig) -> Vec<DataStatus> {
     let stop = |record: &&Response| record.frame_type == FrameType::TrajSetExecStatus as u8;
     rig.records().iter().filter(stop).map(|record| record.data).collect()
 }
 
-/// What can be done after the Stop, each on its own.
+/// Checks that jogging, teaching and, with `upload`, the next upload are possible after the Stop.
 fn all_is_free(rig: &mut Rig, upload: bool) {
     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "nothing to execute");
     if upload {
-        // With other points: none of the upload before is left in it.
+        // With other points: no part of the earlier upload is left in it.
         let points: Vec<RawPoint> = vec![rest(0); 60];
         rig.upload(&points, 10);
         assert_eq!(rig.exec(ExecCommand::Execute), NoError);
@@ -64,7 +65,7 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
                     (rig.state(), rig.trajectory()),
                     (ControllerState::HoldPos, TrajectoryState::Null)
                 );
-                // A client that goes on learns of it with each segment, and nothing of it is ever executed.
+                // A client that continues gets an error for each segment, and no part of the upload is ever executed.
                 for n in received..SEGMENTS {
                     assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NotAllowed, "segment {n}");
                     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed);
@@ -75,7 +76,7 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
     }
 }
 
-/// The segments that wait, or are being executed, in whichever tick the Stop comes.
+/// Segments that wait or are being executed, with a Stop in any tick.
 #[test]
 fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     for begun in 0..3 {
@@ -105,7 +106,7 @@ fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     }
 }
 
-/// An upload whose segment 0 has been received before the Stop, and has had no turn: the trajectory before it stays.
+/// Segment 0 of an upload was received before the Stop, but was not handled yet: the earlier trajectory stays.
 #[test]
 fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     let mut rig = Rig::holding();
@@ -129,7 +130,7 @@ fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
     rig.tick();
     assert_eq!(rig.controller.telemetry().point, 590);
-    // The next upload is free, and its order is checked as ever.
+    // The next upload is possible, and its order is checked as usual.
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 0, 10)), NoError);
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 2, 10)), IncorrectSegmentOrder);
 }
@@ -161,17 +162,17 @@ fn j30_a_pause_drops_no_upload() {
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
 }
 
-/// A host on a plain line survives no refused segment. So its upload is completed; the Stop holds all the same: the trajectory is not
-/// executed.
+/// A host on a plain line does not survive a refused segment. Therefore its upload is completed, but the Stop still
+/// acts: the trajectory is not executed.
 #[test]
 fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
-    // The Stop: on which line, before the record of which segment, and after how many ticks of it.
+    // The Stop: its line, the segment whose record comes after it, and the ticks of that segment before it.
     for line in [0, 1] {
         for at in 0..SEGMENTS {
             for ticks in [0, 1, 5, 19, 23] {
                 let case = format!("line {line}, segment {at}, {ticks} ms");
                 let mut rig = Rig::holding();
-                // What is there before counts no more.
+                // The earlier trajectory no longer counts.
                 rig.upload(&[rest(0); 60], 10);
                 rig.plain = true;
                 rig.statuses.clear();
@@ -204,7 +205,7 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
     }
 }
 
-/// The other way round: nothing but a Stop during the upload keeps a plain host from executing.
+/// The counterpart: only a Stop during the upload prevents a plain host from executing.
 #[test]
 fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
@@ -225,7 +226,7 @@ fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     }
 }
 
-/// An upload that was begun by a client that knows the extensions is dropped, though its line has become plain.
+/// An upload that was begun by a client with extensions is dropped, even if its line has become plain.
 #[test]
 fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_became_plain() {
     let mut rig = Rig::holding();
@@ -241,7 +242,7 @@ fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_bec
     );
 }
 
-/// An upload that nobody completes does not keep the arm from being jogged, and one that is completed is whole.
+/// An incomplete upload does not block jogging, and an upload that is completed during a jog is complete.
 #[test]
 fn j58_joints_are_jogged_during_an_upload() {
     for plain in [true, false] {
@@ -253,7 +254,7 @@ fn j58_joints_are_jogged_during_an_upload() {
             assert_eq!(jog(&mut rig), NoError, "after segment {n}");
             rig.run(100);
         }
-        // J-51: in the words of the upload.
+        // J-51: the data status that the upload's segment 0 decided.
         let refused = if plain { IncorrectValue } else { NotAllowed };
         assert_eq!(rig.exec(ExecCommand::Execute), refused, "not while joints are jogged");
         // A Stop ends the jog and drops the upload.
@@ -277,7 +278,7 @@ fn j30_each_of_several_stops_drops_the_upload_before_it() {
                         format!("{frames_first} long frames, {stops_first} Stops, line {line}, {ticks} ms");
                     let mut rig = Rig::holding();
                     rig.statuses.clear();
-                    // It takes some ticks, in which the others wait.
+                    // The frame takes some ticks, during which the others wait.
                     (0..frames_first).for_each(|_| rig.send(FrameType::FrictionTableUseDefault, &[]));
                     (0..stops_first).for_each(|_| rig.urgent(0, UrgentCommand::Stop));
                     rig.send(FrameType::Trajectory, &segment(7, 0, 10));

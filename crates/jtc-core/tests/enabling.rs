@@ -1,4 +1,5 @@
-//! Joints are enabled only in an arm that hardly moves, and come to rest without a torque step where one moves all the same (J-16).
+//! Joints are enabled only in an arm that hardly moves. If a joint moves nevertheless, it comes to rest without a
+//! torque step (J-16).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -8,12 +9,12 @@ use rig::Rig;
 
 const JOINT: usize = 1;
 
-/// In Error, the cause gone and cleared; joint 1 swings. What it reports is up to `report`: position and velocity from its
-/// true ones.
+/// Swings joint 1 in Error, after the cause has ended and was cleared. `report` maps its true position and velocity to
+/// the reported ones.
 fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     let start = rig.nodes[JOINT].report.position;
     for k in 0..ticks {
-        // To and fro, 0.2 s each way, so that it stays near.
+        // To and fro, 0.2 s each way, so that the joint stays near.
         let phase = (k % 400) as f64;
         let (way, sign) = if phase < 200.0 { (phase, 1.0) } else { (400.0 - phase, -1.0) };
         let (position, velocity) = report(speed * way * 0.001, sign * speed);
@@ -23,7 +24,7 @@ fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     }
 }
 
-/// What a joint reports of its position and velocity.
+/// Maps a true position and velocity to the reported ones.
 type Report = fn(f64, f64) -> (f64, f64);
 
 fn asked_to_enable(requests: &[Request]) -> bool {
@@ -32,7 +33,7 @@ fn asked_to_enable(requests: &[Request]) -> bool {
         .any(|r| matches!(r, Request::ChangeFsm { target } if target[..6].contains(&Target::Enable)))
 }
 
-/// In Error with nothing left to clear.
+/// Returns a rig in Error without an error left to clear.
 fn stopped(config: Config) -> Rig {
     let mut rig = Rig::new(config);
     rig.defaults();
@@ -45,7 +46,7 @@ fn stopped(config: Config) -> Rig {
 
 #[test]
 fn j16_no_joint_is_enabled_while_one_moves() {
-    // As it is; a drive that reports no velocity; one that reports it while the position is still that of before.
+    // True values; a drive that reports no velocity; a drive that reports it while the position is still the old one.
     let reports: [Report; 3] = [|q, v| (q, v), |q, _| (q, 0.0), |_, v| (0.0, v)];
     for report in reports {
         for speed in [0.3, 1.5] {
@@ -54,7 +55,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             swing(&mut rig, 100, speed, report);
             rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
             let from = rig.sent.len();
-            // The time limit of enabling counts only while enabling is asked for.
+            // The time limit of enabling counts only while enabling is requested.
             swing(&mut rig, 3000, speed, report);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -62,7 +63,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
                 rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY),
                 "which the status shows"
             );
-            // It must have been slow for 50 ms.
+            // The joint must have been slow for 50 ms.
             let from = rig.sent.len();
             swing(&mut rig, 49, 0.2, report);
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -91,7 +92,7 @@ fn j16_the_speed_and_the_time_are_settings() {
 #[test]
 fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step() {
     for velocity in [0.2, -0.7, 1.4] {
-        // Its motor takes long, and meanwhile the joint begins to fall.
+        // The motor takes long to start, and meanwhile the joint begins to fall.
         let mut rig = stopped(Config::avena());
         rig.nodes[JOINT].slow_enable = true;
         rig.clear(true, 0x7F);
@@ -106,7 +107,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
-            // An arm that goes where it is commanded to; what it reports now is seen two ticks after that command (J-62).
+            // An arm that moves as commanded; its present answer is seen two ticks after that command (J-62).
             let t = rig.controller.telemetry().joints[JOINT];
             if t.set_velocity != 0.0 {
                 rig.nodes[JOINT].report.velocity = t.set_velocity;
@@ -136,8 +137,8 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
     }
 }
 
-/// The motor control of a drive rests after a stop. If it were asked earlier, the joint would be enabled at the end of that
-/// rest, whatever the arm does by then.
+/// The motor control of a drive rests after a stop. If enabling were requested earlier, the joint would be enabled at
+/// the end of that rest, regardless of the arm's motion at that time.
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();
@@ -149,7 +150,7 @@ fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     assert!((400..=410).contains(&ticks), "{ticks} ms");
 }
 
-/// A joint that leaves OperationEnable after it has been enabled is an error still, whatever the arm does.
+/// A joint that leaves OperationEnable after it has been enabled is still an error, for any motion of the arm.
 #[test]
 fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
     let mut rig = Rig::holding();

@@ -1,10 +1,10 @@
-//! Encoders that jump, slip, or have another scale than was set, on an arm of metal (J-35, J-66, J-69).
+//! Encoders that jump, slip, or have a scale other than the setting, on a simulated arm (J-35, J-66, J-69).
 use crate::plant::{LuGre, POSES, Plant, Random};
 use crate::rig::{Rig, floats, pieces};
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, StopCause, StopKind, error, joint_error};
 
-/// The shipped arm in a pose, its friction times `friction`.
+/// Returns the shipped arm in a pose, with its friction times `friction`.
 fn arm(pose: [f64; 6], friction: f64) -> Plant {
     let friction = if friction == 0.0 { [LuGre::NONE; 6] } else { LuGre::of_avena_times(friction) };
     Plant::new(&Parameters::avena().model, friction, pose)
@@ -19,7 +19,7 @@ fn held(pose: [f64; 6], friction: f64) -> (Plant, Rig) {
     (arm, rig)
 }
 
-/// Largest way of a joint in so many ticks, rad.
+/// Returns the largest motion of a joint within `ticks`, rad.
 fn moved(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> f64 {
     let (from, mut most) = (arm.q, 0.0f64);
     for _ in 0..ticks {
@@ -33,14 +33,14 @@ fn cause(rig: &mut Rig) -> Option<StopCause> {
     rig.info().reactions.expect("reported").stop.map(|(cause, _)| cause)
 }
 
-/// A held arm does not follow an encoder that jumps: it is a held stop, and shows why.
+/// A held arm does not follow an encoder that jumps: it makes a held stop and shows the cause.
 #[test]
 fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     let mut random = Random(35);
     for trial in 0..60 {
         let joint = trial % 6;
         let size = random.between(0.005, 0.3) * if trial % 4 < 2 { 1.0 } else { -1.0 };
-        // Without friction nothing else would hold it.
+        // Without friction only the controller holds the joint.
         let friction = if trial % 3 == 0 { 0.0 } else { 1.0 };
         let (mut arm, mut rig) = held(POSES[trial % 4], friction);
         rig.nodes[joint].glitch = size;
@@ -59,7 +59,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// So does one that moves: it comes to rest on its path, where it really is.
+/// An arm in motion does not follow either: it comes to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -87,7 +87,8 @@ fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     }
 }
 
-/// What the controller takes until the drive has been configured again: its positions are right, those of the drive are not.
+/// Commands that the controller accepts until the drive has been configured again. Its positions are right, those of
+/// the drive are not.
 #[test]
 fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);
@@ -107,7 +108,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert_eq!(rig.state(), ControllerState::Teaching);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     arm.run(&mut rig, 1_000);
-    // The drive is configured again: what it says counts.
+    // The drive is configured again: its position counts.
     rig.send(FrameType::Disable, &[]);
     arm.run(&mut rig, 100);
     assert_eq!(rig.state(), ControllerState::Init);
@@ -119,7 +120,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert!((position - arm.q[0] - 0.05).abs() < 2e-4, "{position} of {}", arm.q[0]);
 }
 
-/// An encoder that reads something else for a moment has not jumped.
+/// A short wrong reading of an encoder is not a jump.
 #[test]
 fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     for ticks in 1..5 {
@@ -133,7 +134,7 @@ fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     }
 }
 
-/// A hand that leads the arm feels nothing: Teaching ends, the arm is held where it is.
+/// A hand that leads the arm feels nothing: Teaching ends, and the arm is held at its present position.
 #[test]
 fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -147,7 +148,8 @@ fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     assert_eq!(cause(&mut rig).map(|cause| cause.kind), Some(StopKind::EncoderJump));
 }
 
-/// A drive whose speed has another full scale than was set is found in the first motion, and the factor is said.
+/// A drive whose speed has another full scale than the setting is detected in the first motion, and the factor is
+/// reported.
 #[test]
 fn j35_a_speed_of_another_scale_is_a_held_stop() {
     for (scale, reported) in
@@ -169,7 +171,7 @@ fn j35_a_speed_of_another_scale_is_a_held_stop() {
     }
 }
 
-/// An encoder that moves while its motor stands is not to be held by: the error of a drive that misbehaves.
+/// A moving encoder of a motor that stands cannot be used for holding: the drive misbehaves, which is an error.
 #[test]
 fn j35_an_encoder_that_slips_is_an_external_error() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -185,7 +187,7 @@ fn j35_an_encoder_that_slips_is_an_external_error() {
     panic!("not found: {:?}", rig.controller.telemetry().joints[3]);
 }
 
-/// Switched off, none of it is looked at.
+/// If the check is switched off, nothing is compared.
 #[test]
 fn j35_without_a_window_nothing_is_compared() {
     let mut arm = arm([0.0; 6], 1.0);
@@ -196,11 +198,12 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely clean: it comes over a value in between, in two parts, with answers that are lost meanwhile, in two joints at once, and
-/// goes back.
+/// A jump is rarely clean: it may pass a value in between, come in two parts, with lost answers, in two joints at once,
+/// and go back.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
-    // What joints 2 and 4 read beside the truth, rad, from so many ms on; and ticks whose answers are lost.
+    // Offsets of joints 2 and 4 from the true position, rad, each from a time in ms on; and ticks whose answers are
+    // lost.
     type Course = (&'static [(usize, f64, f64)], &'static [usize]);
     let courses: [Course; 7] = [
         (&[(0, 0.3, 0.0), (1, 0.02, 0.0)], &[]),
@@ -233,7 +236,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer that is wrong in position and speed is no jump: it is not used, as without a speed to compare it with.
+/// An answer with a wrong position and a wrong speed is not a jump: it is not used, like a wrong position without a
+/// speed to compare it with.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -256,8 +260,8 @@ fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     }
 }
 
-/// Drives run on clocks of their own: near the boundary an answer has a reading of this millisecond or of the last one. That is no jump, and no
-/// other scale, also at full speed.
+/// Drives have clocks of their own: near the boundary an answer has a reading of this millisecond or of the last one.
+/// That is neither a jump nor another scale, also at full speed.
 #[test]
 fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     for seed in 0..6u64 {
@@ -281,7 +285,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
                 *last = now;
             }
         }
-        // It is much noise for the position controller: that may look like a push, and end the jog.
+        // The position controller gets much noise, which may look like a push and end the jog.
         let kind = cause(&mut rig).map(|cause| cause.kind);
         let alarm = matches!(kind, Some(StopKind::EncoderJump | StopKind::SpeedScale));
         assert!(!alarm && rig.state() == ControllerState::HoldPos, "seed {}: {kind:?}", seed + 1);
@@ -289,7 +293,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// A hand winds up the gears of a taught arm before the motors break away: that is no encoder that slips.
+/// A hand winds up the gears of a taught arm before the motors break away: the encoder does not slip.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     for stiffness in [3_400.0, 10_000.0] {
@@ -300,7 +304,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
         rig.send(FrameType::TeachingModeEnable, &[]);
         arm.run(&mut rig, 500);
         assert_eq!(rig.state(), ControllerState::Teaching);
-        // What the encoder of the link sees of it, with the motor at rest: to and fro within 60 ms.
+        // Readings of the link's encoder, with the motor at rest: to and fro within 60 ms.
         for k in 0..600 {
             let part = 0.5 - 0.5 * (f64::from(k) * core::f64::consts::TAU / 120.0).cos();
             for (node, breakaway) in rig.nodes.iter_mut().zip([18.0, 18.0, 16.0, 8.0, 8.0, 8.0]) {
@@ -316,7 +320,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     }
 }
 
-/// A speed of another scale keeps everything fast away until the drives were configured with the right one.
+/// A speed of another scale blocks all fast motions until the drives were configured with the right scale.
 #[test]
 fn j35_a_speed_of_another_scale_is_not_trusted_until_the_setting_is_right() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);

@@ -1,4 +1,5 @@
-//! Which friction is taken from a host: any that an arm of such drives has, and none that would throw it (J-06, J-42).
+//! Friction that is accepted from a host: all values of arms with such drives, and none that would throw an arm (J-06,
+//! J-42).
 use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
@@ -48,7 +49,7 @@ fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
         .collect();
     rig.execute(&points);
     let mut torques = Vec::new();
-    // From the first torque on: the ticks until a record comes differ.
+    // From the first torque on, because the ticks until a record comes differ.
     while torques.len() < 500 {
         rig.tick();
         let torque = rig.controller.telemetry().joints.map(|j| j.torque_friction.to_bits());
@@ -66,11 +67,11 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&known)), DataStatus::NoError);
     let four = known.map(|[c0, c1, c2, c3, ..]| [c0, c1, c2, c3]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&four)), DataStatus::NoError);
-    // An existing host sends the rows of its file from left to right: everything else way round.
+    // An existing host sends the rows of its file from left to right: in the reverse order.
     let reversed = known.map(|[a, b, c, d, e, f]| [f, e, d, c, b, a]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&reversed)), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::NoError);
-    // None at all; noise around standstill; one way only.
+    // Friction of zero; noise around standstill; one direction only.
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&[[0.0; 6]; 6])), DataStatus::NoError);
     for table in [
         table_of(-0.95, |_| 0.0),
@@ -140,7 +141,7 @@ fn j06_the_bounds_of_friction_are_settings() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::IncorrectValue);
 }
 
-/// A cubic between the speeds at which it is looked at: arms often move as slowly as this.
+/// A cubic polynomial between the speeds at which it is checked: arms often move as slowly as this.
 #[test]
 fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     let limits = Config::avena().joints.map(|joint| joint.torque_max);
@@ -155,7 +156,7 @@ fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     }
 }
 
-/// A table may have friction at standstill: it begins with the way to the path, and not in one tick.
+/// A table may have friction at standstill: it is blended in on the approach, and not in one tick.
 #[test]
 fn j44_the_friction_of_a_table_at_standstill_makes_no_step() {
     let tables = Config::avena().joints.map(|joint| {

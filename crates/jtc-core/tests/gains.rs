@@ -1,5 +1,5 @@
-//! Gains that are given while the arm is held, on an arm of metal: what would drop it is refused, and what it does not stand is taken
-//! back (J-71).
+//! Gains that are changed while the arm is held, on a simulated arm: gains that would drop the arm are refused, and
+//! gains that it cannot bear are taken back (J-71).
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -33,7 +33,7 @@ fn body(gains: &Gains) -> Vec<u8> {
     floats(gains.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|x| x as f32)))
 }
 
-/// An arm without brakes that carries 2 kg which the model lacks, held at rest.
+/// Returns an arm without brakes that carries 2 kg which the model lacks, held at rest.
 fn held_with(friction: f64) -> (Plant, Rig) {
     let model = loaded(Parameters::avena().model, 2.0);
     let friction = if friction > 0.0 { LuGre::of_avena_times(friction) } else { [LuGre::NONE; 6] };
@@ -53,7 +53,7 @@ fn give(arm: &mut Plant, rig: &mut Rig, gains: &Gains) -> DataStatus {
     rig.records().last().unwrap().data
 }
 
-/// Farthest that a joint gets from `from` within the next `ms`, rad.
+/// Returns the largest distance of a joint from `from` within the next `ms`, rad.
 fn farthest(arm: &mut Plant, rig: &mut Rig, from: &[f64; 6], ms: usize) -> f64 {
     let mut farthest = 0.0f64;
     for _ in 0..ms {
@@ -63,7 +63,7 @@ fn farthest(arm: &mut Plant, rig: &mut Rig, from: &[f64; 6], ms: usize) -> f64 {
     farthest
 }
 
-/// Before, all of these were taken and the arm fell by a radian, or moved by 42 mrad.
+/// Earlier versions accepted all of these gains, and the arm fell by a radian, or moved by 42 mrad.
 #[test]
 fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     for (factor, expected) in [
@@ -84,7 +84,8 @@ fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     }
 }
 
-/// Without an integral the position error has to hold what it has found: that is allowed as long as it is small.
+/// Without an integral the position error must hold the load that the integral had found: that is allowed while the
+/// error is small.
 #[test]
 fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {
@@ -141,21 +142,21 @@ fn stiffness(rig: &Rig, joint: usize) -> f64 {
     joint.torque_p / (joint.due_position - joint.position)
 }
 
-/// What was found first in the last held stop (J-69).
+/// Returns the first cause of the last held stop (J-69).
 fn found(rig: &Rig) -> StopKind {
     rig.controller.reactions().stop.expect("a held stop").0.kind
 }
 
-/// Causes of a held stop that the status shows now.
+/// Returns the causes of a held stop that the status shows now.
 fn causes(rig: &mut Rig) -> u16 {
     rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
 }
 
-/// Nothing swings against these: the integral is too strong for the inertia, which no check of the controller sees. Within the two seconds
-/// in which they are on trial the arm swings, and the gains before are back.
+/// The swing has no external cause: the integral is too strong for the inertia, which no check of the controller
+/// detects. The arm swings within the two seconds of the trial, and the gains before come back.
 #[test]
 fn j71_gains_that_make_the_arm_swing_are_taken_back() {
-    // The torque of the last ones stays so small that only the swing shows.
+    // The torque of the last ones stays so small that only the swing is detected.
     for [kp, ki, kd] in
         [[8000.0, 50_000.0, 20.0], [2000.0, 50_000.0, 20.0], [8000.0, 14_000.0, 5.0], [400.0, 4000.0, 0.0]]
     {
@@ -163,7 +164,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         let from = arm.q;
         let swinging = of([[kp, ki, kd]; 6]);
         assert_eq!(give(&mut arm, &mut rig, &swinging), DataStatus::NoError);
-        // It is found at rest, and a touch is enough.
+        // The trial begins at rest, and a touch is enough.
         arm.run(&mut rig, 550);
         arm.push = [10.0, 20.0, 15.0, 5.0, 4.0, 4.0];
         arm.run(&mut rig, 30);
@@ -174,7 +175,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         assert_eq!(rig.state(), ControllerState::HoldPos, "{kp} {ki} {kd}");
         assert_eq!(found(&rig), StopKind::Gains, "{kp} {ki} {kd}: causes {causes:#x}");
         assert!(farthest < 0.05, "{kp} {ki} {kd}: {farthest} rad");
-        // Held again, by those before.
+        // Held again, by the gains before.
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
         arm.run(&mut rig, 1_000);
         let before = shipped();
@@ -187,7 +188,8 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     }
 }
 
-/// Whatever a joint does not stand while gains are on trial: they are not what it goes on with. Later a push says nothing about them.
+/// A joint that a push overloads while gains are on trial must not keep these gains. After the trial, a push does not
+/// concern the gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
@@ -203,7 +205,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
         let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
         assert_eq!(found(&rig), kind, "after {wait} ms");
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
-        // An error to measure the stiffness by.
+        // A position error, to measure the stiffness.
         arm.push[0] = 15.0;
         arm.run(&mut rig, 20);
         let expected = if taken_back { 8000.0 } else { 4000.0 };
@@ -211,7 +213,8 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
-/// A joint that swings with a growing amplitude, far below its torque limit: gains on trial are taken back. Gains that held before are kept.
+/// A joint that swings with a growing amplitude, far below its torque limit: gains on trial are taken back. Gains that
+/// were in use before are kept.
 #[test]
 fn j71_a_swing_that_grows_ends_the_trial() {
     for (wait, taken_back) in [(600, true), (2_300, false)] {
@@ -233,7 +236,7 @@ fn j71_a_swing_that_grows_ends_the_trial() {
     }
 }
 
-/// No torque steps when gains come in, whatever the integral has of it.
+/// The torque makes no step when gains change, for any share of the integral in it.
 #[test]
 fn j71_gains_come_in_without_a_step_of_the_torque() {
     let worst_step = |gains: Option<Gains>| {
@@ -255,14 +258,14 @@ fn j71_gains_come_in_without_a_step_of_the_torque() {
         println!(
             "{worst:.2} N·m a tick, {quiet:.2} without new gains; integral {integral:.1}, then {kept:.1} N·m"
         );
-        // A step of the encoder makes as much, with one and a half times the gains.
+        // A step of the encoder causes the same torque, with one and a half times the gains.
         let encoder = 1.5 * (8000.0 + 80.0 / 0.005) * plant::ENCODER_STEP;
         assert!(worst <= encoder + 0.1, "{worst} N·m, a step of the encoder makes {encoder}");
         assert!((kept - integral).abs() < 1.0, "{integral}, then {kept} N·m");
     }
 }
 
-/// A loop that is unstable when the joints are enabled: there are no gains before, and softer ones hold the arm.
+/// A loop that is unstable when the joints are enabled: no earlier gains exist, and softer gains hold the arm.
 #[test]
 fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     let model = Parameters::avena().model;
@@ -284,7 +287,7 @@ fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(found(&rig), StopKind::Unstable, "{causes:#x}");
     assert!(farthest < 0.09, "{farthest} rad");
-    // They hold it: a touch makes no swing that goes on.
+    // The softer gains hold it: a touch causes no lasting swing.
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     arm.run(&mut rig, 2_000);
     arm.push[1] = 20.0;
@@ -296,7 +299,7 @@ fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     assert!(speeds.iter().all(|v| *v < 0.02), "{speeds:?}");
 }
 
-/// Kp that acts in joint 1 after it was pushed a little, N·m/rad.
+/// Returns the Kp that acts in joint 1 after a small push, N·m/rad.
 fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
     arm.push[0] = 15.0;
     arm.run(rig, 20);
@@ -336,7 +339,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     }
 }
 
-/// Teaching says nothing about gains: the trial goes on behind it.
+/// Teaching does not test gains: the trial continues after it.
 #[test]
 fn j71_teaching_does_not_end_a_trial() {
     let (mut arm, mut rig) = held_with(1.0);
@@ -360,7 +363,8 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// An arm whose joints are too light for its gains with the present settings is not stored, where Disable has left its parts behind.
+/// An arm whose joints are too light for its gains with the present settings is not stored, if Disable has kept its
+/// parts.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -375,8 +379,8 @@ fn j71_an_arm_that_would_be_refused_is_not_stored() {
     assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
 }
 
-/// Gains, model and settings that do not go together are refused, whichever comes last, and change nothing. After Disable another arm can be
-/// given in any order.
+/// Gains, model and settings that do not fit together are refused in any order, and change nothing. After Disable
+/// another arm can be uploaded in any order.
 #[test]
 fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     use FrameType::{
@@ -390,7 +394,7 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     let mut rig = Rig::holding();
     rig.press_stop(5);
     assert_eq!(rig.state(), ControllerState::Error);
-    // Light rotors do not bear the gains in use; lighter gains come first.
+    // Light rotors cannot bear the gains in use; lighter gains must come first.
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(3.0))), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(0.1))), good);
@@ -423,7 +427,8 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     }
 }
 
-/// Two joints swing against new gains. The gains before come back, and what the second joint has swung before says nothing about them.
+/// Two joints swing under new gains. The gains before come back, and the earlier swing of the second joint does not
+/// count against them.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();

@@ -1,4 +1,5 @@
-//! The gripper: it is brought up beside the arm, never takes its torque away, and never starts its pump by itself (J-14, J-23).
+//! The gripper: it is brought up in parallel with the arm, never takes its torque away, and never starts its pump by
+//! itself (J-14, J-23).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request};
@@ -11,7 +12,7 @@ const FLAG: u32 = 1 << 14;
 const POWERED: [ControllerState; 3] =
     [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
 
-/// In a state with torque, the pump on.
+/// Returns a rig in a state with torque, with the pump on.
 fn powered(state: ControllerState) -> Rig {
     powered_with(Config::avena(), state)
 }
@@ -40,7 +41,7 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Runs, and sees that the arm is left alone: no error, no other state, nothing but Move in 19 of 20 ticks.
+/// Runs, and checks that the arm is not disturbed: no error, no other state, only Move in 19 of 20 ticks.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
@@ -62,7 +63,7 @@ fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, FLAG, FLAG));
         assert_eq!((status.errors, status.occurred, status.node_init), (0, 0, 1 << GRIPPER));
-        // It has been enabled all the time, its pump too: it keeps its part.
+        // The gripper has been enabled all the time, and so has its pump: it keeps its part.
         rig.nodes[GRIPPER].silent = false;
         undisturbed(&mut rig, 300, state);
         let status = rig.status();
@@ -98,7 +99,7 @@ fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump(
         rig.nodes[GRIPPER].report.state = NodeState::READY;
         undisturbed(&mut rig, 100, state);
         assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
-        // A fault of it is shown, and is cleared as any node's.
+        // A fault of the gripper is shown, and is cleared like that of any node.
         rig.nodes[GRIPPER].fault();
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.status().gripper.unwrap().state, NodeState::FAULT);
@@ -118,7 +119,7 @@ fn j23_joints_are_not_reset_while_the_arm_may_move() {
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.nodes[GRIPPER].resets, 1, "a refused frame changes nothing at all");
         assert!(rig.pump);
-        // The gripper alone is another matter.
+        // A reset of the gripper alone is different.
         assert_eq!(rig.ask(FrameType::ResetCanDevices, &[0x40, 0, 0, 0]), DataStatus::NoError);
         undisturbed(&mut rig, 400, state);
         assert_eq!((rig.nodes[GRIPPER].resets, rig.nodes[GRIPPER].report.state), (2, NodeState::ENABLED));
@@ -142,7 +143,7 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // Nor after a joint took the controller back to Init.
+    // Also not after a joint took the controller back to Init.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;
@@ -159,7 +160,7 @@ fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init(
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
     let status = rig.status();
     assert_eq!((status.can_error, status.can_current, status.node_init), (0, FLAG, 1 << GRIPPER));
-    // When it comes, it is brought up like the others.
+    // When the gripper appears, it is brought up like the other nodes.
     rig.nodes[GRIPPER].silent = false;
     rig.run(200);
     assert_eq!((rig.state(), rig.status().can_current), (ControllerState::HoldPos, 0));
@@ -208,14 +209,14 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
-        // Through Init as well.
+        // Also through Init.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
         assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: false, .. })));
-        // The host can let go of it in Error.
+        // The host can release the part in Error.
         error_and_clear(&mut rig);
         pump(&mut rig, false);
         assert!(!rig.pump);
@@ -239,7 +240,8 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     );
 }
 
-/// A command that was given while the gripper was brought up is carried out once it is; one from before its reset is not.
+/// A command that comes while the gripper is brought up is carried out after that; a command from before its reset is
+/// not.
 #[test]
 fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     let mut rig = Rig::new(Config::avena());

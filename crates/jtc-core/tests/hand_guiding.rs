@@ -1,5 +1,5 @@
-//! Leading arms by hand (J-25): the default arm, a UR5 and a Z1 as imported, with masses and friction that are not quite those of their
-//! models.
+//! Hand guiding of arms (J-25): the default arm, a UR5 and a Z1 as imported, with masses and friction that differ
+//! slightly from those of their models.
 use crate::plant::{ArmFile, Plant, Random, heavier, loaded};
 use crate::rig::Rig;
 use jtc_core::ControllerState;
@@ -35,7 +35,7 @@ pub fn farthest(arm: &Plant, from: &[f64; 6]) -> f64 {
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
-/// Teaching begins, as soon as it may.
+/// Begins Teaching as soon as it is possible.
 pub fn teach(plant: &mut Plant, rig: &mut Rig) {
     rig.send(FrameType::TeachingModeEnable, &[]);
     for _ in 0..9_000 {
@@ -47,7 +47,7 @@ pub fn teach(plant: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// An arm that has been held for `ms`.
+/// Returns an arm that has been held for `ms`.
 pub fn held(arm: &ArmFile, mass: f64, payload: f64, friction: f64, q: [f64; 6], ms: usize) -> (Plant, Rig) {
     let model = loaded(heavier(arm.model, mass), payload);
     let mut plant = Plant::of(arm, &model, arm.friction(friction), q);
@@ -58,7 +58,7 @@ pub fn held(arm: &ArmFile, mass: f64, payload: f64, friction: f64, q: [f64; 6], 
     (plant, rig)
 }
 
-/// Longest way (rad) and highest speed (rad/s) of a joint within `ms` of Teaching that nobody touches.
+/// Returns the longest motion (rad) and the highest speed (rad/s) of a joint within `ms` of Teaching without contact.
 pub fn untouched(plant: &mut Plant, rig: &mut Rig, ms: usize) -> (f64, f64) {
     let (from, mut way, mut speed) = (plant.q, 0.0_f64, 0.0_f64);
     for _ in 0..ms {
@@ -96,8 +96,8 @@ fn j25_an_arm_with_a_payload_that_the_model_lacks_stays_where_it_was_found() {
     }
 }
 
-/// A hand leads the arm to another place at 0.2 rad/s and lets go. What the load found does not explain there, and the model has wrong, is
-/// held by friction, or creeps.
+/// A hand leads the arm to another place at 0.2 rad/s and lets go. Friction holds the torque that neither the found
+/// load nor the model explains there, or the arm creeps.
 #[test]
 fn j25_where_a_hand_lets_go_the_arm_stays_or_creeps() {
     for arm in arms() {
@@ -136,7 +136,7 @@ pub fn highest_speed(plant: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     speed
 }
 
-/// How somebody leans on an arm.
+/// A push of a person who leans on an arm.
 struct Lean {
     mass: f64,
     friction: f64,
@@ -144,8 +144,8 @@ struct Lean {
     ms: usize,
 }
 
-/// Somebody leans on the held arm, Teaching begins, and 50 ms later the hand lets go. Returns the highest speed afterwards, or nothing
-/// where the arm is not taught: it yields.
+/// A person leans on the held arm, Teaching begins, and 50 ms later the push ends. Returns the highest speed
+/// afterwards, or `None` if Teaching does not begin because the arm yields.
 fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     let (mut plant, mut rig) = held(arm, lean.mass, 0.0, lean.friction, q, 1_500);
     plant.push = lean.push;
@@ -162,7 +162,7 @@ fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     None
 }
 
-/// For 2 s a lean is none that is learned; after 12 s it is taken for a load.
+/// A push that lasts 2 s is not learned as a load; a push that lasts 12 s is.
 #[test]
 fn j25_a_lean_that_ends_drives_no_joint_fast() {
     let (ur5, z1, avena) = (ArmFile::ur5(), ArmFile::z1(), ArmFile::avena());
@@ -187,7 +187,7 @@ fn j25_a_lean_that_ends_drives_no_joint_fast() {
     }
 }
 
-/// All joints at once, up to what is taken for a load.
+/// All joints at once, up to the torque that is taken for a load.
 #[test]
 fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     println!("seed 3");
@@ -207,7 +207,7 @@ fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     assert!(taught > 30, "{taught} of 96");
 }
 
-/// A hand pushes a joint, and lets go: it never comes near the over-speed of the drives, and is at rest soon.
+/// A hand pushes a joint and lets go: the joint never comes near the over-speed of the drives, and is at rest soon.
 #[test]
 fn j25_a_push_dies_out() {
     for (arm, joint, torque, ms) in [
@@ -258,7 +258,8 @@ fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     }
 }
 
-/// Teaching is left at the end of a push: set values are at rest within 500 ms, no joint comes to its torque limit, and nothing is raised.
+/// Teaching ends at the end of a push: set values are at rest within 500 ms, no joint reaches its torque limit, and no
+/// error is raised.
 #[test]
 fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     for friction in [0.7, 1.0, 1.3] {
@@ -300,7 +301,7 @@ fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     }
 }
 
-/// The highest rate (1/s) at which damping of these joints (N·m·s/rad) reduces a speed: power iteration.
+/// Returns the highest rate (1/s) at which damping of these joints (N·m·s/rad) reduces a speed: power iteration.
 fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6]) -> f64 {
     let dynamics = jtc_dynamics::Dynamics::new(&arm.model, [0.0; 3]);
     let (mut v, mut rate) = ([1.0, -0.9, 0.8, -0.7, 0.6, 0.5], 0.0);
@@ -313,8 +314,8 @@ fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6
     rate
 }
 
-/// Whatever a joint carries, and whatever of its rotor is true from a fifth on: no damper is near the 200 1/s that measured speeds of 8 ms
-/// leave unstable.
+/// For any load of a joint, and any true rotor inertia from a fifth of the proposed value on, no damper comes near the
+/// 200 1/s that are unstable with measured speeds that are 8 ms old.
 #[test]
 fn j25_no_damping_is_too_much_for_a_joint() {
     println!("seed 5");

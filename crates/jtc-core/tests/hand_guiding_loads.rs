@@ -1,4 +1,4 @@
-//! Loads in hand guiding (J-25): taken to other poses, given, taken away, lifted, and arms whose numbers are not true.
+//! Loads in hand guiding (J-25): moved to other poses, set, removed, lifted, and arms with wrong parameters.
 use jtc_core::{ControllerState, Payload, settings};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
@@ -19,7 +19,7 @@ fn give(plant: &mut Plant, rig: &mut Rig, mass: f64) {
     plant.run(rig, 1);
 }
 
-/// A hand leads a joint by `way` (rad) at `speed` (rad/s), the others as they like, and lets go.
+/// A hand leads a joint by `way` (rad) at `speed` (rad/s) while the others are free, and lets go.
 pub fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
     let (from, ms) = (plant.q[joint], (way.abs() / speed * 1000.0) as usize);
     for k in 0..ms + 500 {
@@ -31,7 +31,7 @@ pub fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }
 
-/// The arm with another mass at its flange, as it is now.
+/// Replaces the mass at the flange; the state of the arm stays.
 fn reload(plant: &mut Plant, arm: &ArmFile, mass: f64) {
     let now = std::mem::replace(plant, Plant::of(arm, &loaded(arm.model, mass), plant.friction, plant.q));
     (plant.v, plant.rotor, plant.speeds, plant.brakes) = (now.v, now.rotor, now.speeds, now.brakes);
@@ -53,7 +53,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// Found where it loads a joint with all of its weight, given upright, where it loads it with nothing: it is carried once.
+/// A payload that was found in a pose with its full load on a joint, and then set in the upright pose without load, is
+/// carried once.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);
@@ -68,7 +69,7 @@ fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// Over most of the range: what the payload asks for is another torque everywhere.
+/// Over most of the range: the payload needs another torque everywhere.
 #[test]
 fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     for (mass, from, way, speed) in [
@@ -94,7 +95,8 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// What a damper had needed was learned while it was lowered (J-70), whatever pulled; and then it is not there any more.
+/// The load that a damper had needed was learned while it was lowered (J-70), for any cause; then the load is
+/// removed.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -142,7 +144,7 @@ fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_
     assert!(taught >= 10 && lowered >= 3, "{taught}, {lowered}");
 }
 
-/// Arms whose rotors are lighter than was proposed: nothing swings, at the soft ends and above the tool speed limit, too.
+/// Arms with rotors lighter than proposed: nothing swings, also at the soft ends and above the tool speed limit.
 #[test]
 fn j25_an_arm_with_light_rotors_does_not_swing() {
     let mut ended = 0;
@@ -170,7 +172,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // It was too fast to be damped, and is held by gains for five times the rotor: that is not what is tested here.
+                // The joint was too fast to be damped, and is held by gains for five times the rotor, which is not
+                // tested here.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;
@@ -190,7 +193,7 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
     assert!(ended <= 4, "{ended} of 144 ended Teaching");
 }
 
-/// A hand lifts a payload that nobody has given, and knocks against it.
+/// A hand lifts a payload that the controller was not told of, and knocks against it.
 #[test]
 fn j25_a_payload_that_is_lifted_is_still_carried() {
     for (arm, mass, joint, way) in [
@@ -220,7 +223,7 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
     }
 }
 
-/// A small payload is given in HoldPos: the rest of what is there is found before Teaching begins.
+/// A small payload is set in HoldPos: the remainder of the load is found before Teaching begins.
 #[test]
 fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.2), 4_000);
@@ -231,7 +234,7 @@ fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     assert!(way < 0.01 && speed < 0.05, "{way} rad, {speed} rad/s");
 }
 
-/// The file says that there is friction, and there is none.
+/// The file specifies friction, but the arm has none.
 #[test]
 fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     for arm in [ArmFile::avena(), ArmFile::z1(), ArmFile::rough_ur5()] {
@@ -279,7 +282,7 @@ fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     assert_eq!(rig.ask(FrameType::PidParamUseDefault, &[]), DataStatus::NoError);
 }
 
-/// Any payload up to 3 kg that nobody has given, led from anywhere to anywhere.
+/// Any payload up to 3 kg that the controller was not told of, led from any pose to any other.
 #[test]
 fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     println!("seed 11");
@@ -320,7 +323,8 @@ fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     assert!(most < 0.6 && worst < 0.2, "{most} rad/s, then {worst} rad/s");
 }
 
-/// Somebody leans on an arm whose rotors are a fifth of what was proposed, long enough to be taken for a load, and lets go.
+/// A person leans on an arm whose rotors have a fifth of the proposed inertia, long enough to be taken for a load, and
+/// lets go.
 #[test]
 fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     println!("seed 13");
@@ -334,7 +338,7 @@ fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
             plant.push = arm.config.joints.map(|joint| random.between(-0.29, 0.29) * joint.torque_max);
             plant.run(&mut rig, 12_000);
             if rig.errors() != 0 {
-                // It is a push, and joints yield to it.
+                // The lean is detected as a push, and the joints yield to it.
                 continue;
             }
             teach(&mut plant, &mut rig);
@@ -351,7 +355,7 @@ fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     assert!((0.3..1.5).contains(&most), "{most} rad/s");
 }
 
-/// Nothing carries a load that nobody has found.
+/// A load that was not found is not carried.
 #[test]
 fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     let arm = ArmFile::avena();
@@ -365,7 +369,7 @@ fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     assert!(way > 0.3 && speed < 0.6, "{way} rad, {speed} rad/s");
 }
 
-/// A load that is carried is what was found, and all of it at rest.
+/// The carried load is the load that was found, and all of it at rest.
 #[test]
 fn j25_the_load_that_was_found_is_carried() {
     let arm = ArmFile::avena();
@@ -379,7 +383,8 @@ fn j25_the_load_that_was_found_is_carried() {
     }
 }
 
-/// A payload that nobody has given is put down: the arm rises slowly, until the controller has seen that nothing else drives it.
+/// A payload that the controller was not told of is put down: the arm rises slowly, until the controller detects that
+/// nothing else drives it.
 #[test]
 fn j25_an_arm_whose_payload_is_put_down_rises_slowly_and_stops() {
     for (mass, friction) in [1.0, 3.0].into_iter().flat_map(|m| [0.7, 1.0, 1.3].map(|f| (m, f))) {

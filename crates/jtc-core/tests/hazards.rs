@@ -6,7 +6,7 @@ use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, model_body, pieces, rad, rest, segment_body};
 
-/// No limits but those under test.
+/// Removes all limits except those under test.
 fn roomy(mut config: Config, acceleration_max: f64) -> Config {
     for j in &mut config.joints {
         j.torque_max = 1e6;
@@ -74,7 +74,7 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     assert_eq!(last.joints[0].set_position, rad(points.last().unwrap().position[0]));
 }
 
-/// Wherever in a legal motion a pause or a resume falls, it keeps to the acceleration limit, and it stops in the end.
+/// A pause or a resume at any time of a legal motion keeps to the acceleration limit, and ends at rest.
 #[test]
 fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
     let braking = pieces(0, &[(10.77, 13), (0.0, 60), (-10.77, 13)]);
@@ -136,7 +136,7 @@ fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
         last = v;
     }
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Pause, 0));
-    // Beside point 0.
+    // Away from point 0.
     let set = rig.controller.telemetry().joints[0].set_position;
     assert!(0.0 < set && set < rad(200), "{set}");
     rig.exec(ExecCommand::Execute);
@@ -195,7 +195,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
-    // A trajectory out there is another matter.
+    // A trajectory outside is treated differently.
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
     rig.follow = true;
@@ -298,7 +298,7 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
             "instead of {:?} in tick {tick}",
             healthy[tick]
         );
-        // It has been put off, no more.
+        // The frame was only postponed.
         rig.safety_input = true;
         rig.clear(true, 0x7F);
         rig.run(300);
@@ -345,7 +345,7 @@ fn j14_a_silent_node_is_seen_within_seven_frames() {
 
 #[test]
 fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
-    // The same arm with heavier links, on a wall so that gravity matters.
+    // The same arm with heavier links, on a wall so that gravity acts on them.
     let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
     let mut model = jtc_core::Parameters::avena().model;
     model.links.iter_mut().for_each(|link| link.mass *= 1.2);
@@ -361,17 +361,17 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
 
-/// A controller that hits its limits to and fro never stays long at one of them.
+/// A controller that alternates between its limits never stays long at one of them.
 #[test]
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {
         let swung = swings_until_error(held_ms);
-        // Where a load may still be caught, the first half swing looks like one.
+        // While a load may still be caught, the first half swing looks like one.
         assert!((10..=40 + 10 * usize::from(held_ms == 0)).contains(&swung), "{swung}");
     }
 }
 
-/// Ticks of a swing from limit to limit until the error, in an arm that has been held for so long.
+/// Returns the ticks of a swing from limit to limit until the error, in an arm that has been held for `held_ms`.
 fn swings_until_error(held_ms: usize) -> usize {
     let mut config = Config { torque_release: true, ..Config::avena() };
     config.joints[0].torque_max = 10.0;

@@ -1,4 +1,5 @@
-//! What begins only once the arm is held: teaching (J-25) and the way to a path (J-34), also with a load that the model lacks.
+//! Functions that begin only once the arm is held: Teaching (J-25) and the approach to a path (J-34), also with a load
+//! that the model lacks.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -24,7 +25,8 @@ fn way(arm: &Plant) -> f64 {
     (0..6).map(|j| (arm.q[j] - POSE[j]).abs()).fold(0.0, f64::max)
 }
 
-/// Asked for in the first tick of HoldPos, or while the load swings, it would begin before anybody knows what the arm carries.
+/// If Teaching began in the first tick of HoldPos, or while the load swings, the load of the arm would not be known
+/// yet.
 #[test]
 fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
@@ -37,7 +39,7 @@ fn j25_teaching_waits_until_the_load_is_held() {
             rig.send(FrameType::TeachingModeEnable, &[]);
             arm.run(&mut rig, 3_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "after {after} ms");
-            // With a third of the friction that the model has, what is left of the load creeps.
+            // With a third of the friction of the model, the remaining load creeps.
             let most = if factor == 1.0 { 0.03 } else { 0.1 * 3.0 };
             assert!(way(&arm) < most, "after {after} ms, friction times {factor}: {} rad", way(&arm));
         }
@@ -77,7 +79,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// One drive is seconds later than the others; its load swings, and moves the others' again.
+/// A drive is enabled seconds later than the others; its load swings, and moves the loads of the others again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {
@@ -96,7 +98,7 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// Gains with which a loop is unstable, and nothing that it swings against: the catch does not let it.
+/// Gains with which a loop is unstable, without an external load to swing against: the catch must not allow the swing.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {

@@ -1,5 +1,5 @@
-//! Arms as imported, with proposed gains: a UR5 and a Z1 are jogged (J-58) and begin paths (J-34) in random poses. Their loads are known, and no
-//! joint comes to its torque limit.
+//! Arms as imported, with proposed gains: a UR5 and a Z1 are jogged (J-58) and begin paths (J-34) in random poses.
+//! Their loads are known, and no joint reaches its torque limit.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
@@ -7,7 +7,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use crate::plant::{ArmFile, Plant, Random, highest};
 use crate::rig::{Rig, floats, raw, rest};
 
-/// Poses of each arm; 500 were tried.
+/// Poses of each arm; 500 were tested once.
 const TRIALS: usize = 120;
 const START_TOLERANCE: f64 = 0.3;
 
@@ -87,7 +87,7 @@ fn j34_an_imported_arm_begins_a_path_within_its_torque_limits_in_any_pose() {
             let about = format!("{} trial {trial}: from {q:.2?} to {first:.2?}", arm.name);
             rig.upload(&[RawPoint { position: first.map(|q| raw(q, 3.141592)), ..rest(0) }; 3], 50);
             if rig.exec(ExecCommand::Execute) != DataStatus::NoError {
-                // The point itself may take more than there is.
+                // The point itself may need more torque than the limit allows.
                 let there = Dynamics::new(&arm.model, arm.config.gravity).gravity_torque(&first);
                 let there = highest(&arm.shares(&there));
                 assert!(standing.max(there) > 0.8, "{about}: refused at {standing}, {there}");

@@ -1,5 +1,5 @@
-//! Answers of one joint that are lost again and again, never so many running that it is an error: the position loop stays
-//! closed, and the arm does what it does with every answer (J-14, J-63).
+//! Answers of one joint are lost repeatedly, but never enough consecutive ones for an error: the position loop stays
+//! closed, and the arm behaves as with every answer (J-14, J-63).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
@@ -9,12 +9,12 @@ use rig::{Rig, pieces};
 
 const JOINT: usize = 1;
 
-/// Which answers of the joint are lost.
+/// Pattern of the lost answers of the joint.
 #[derive(Clone, Copy, Debug)]
 enum Loss {
-    /// One good answer, then so many lost ones, for ever.
+    /// One good answer, then this number of lost ones, repeated for ever.
     Periodic(u32),
-    /// Every second one by chance, at most four running; the seed.
+    /// On average every second answer at random, at most four consecutive ones; the seed.
     Random(u32),
 }
 
@@ -29,7 +29,7 @@ const LOSSES: [Loss; 7] = [
 ];
 
 impl Loss {
-    /// The lost ones of the next `ticks` answers.
+    /// Returns the pattern of the next `ticks` answers: `true` if lost.
     fn pattern(self, ticks: u32) -> Vec<bool> {
         match self {
             Self::Periodic(lost) => (0..ticks).map(|k| k % (1 + lost) < lost).collect(),
@@ -81,7 +81,8 @@ fn on_the_path(lost: &[bool]) -> f64 {
     worst
 }
 
-/// Held with 1 kg that the model has not, and pushed with 20 N·m for 100 ms: how far it is moved, rad.
+/// Holds an arm with 1 kg that the model lacks, and pushes it with 20 N·m for 100 ms; returns the distance that it
+/// moves, rad.
 fn pushed(lost: &[bool]) -> f64 {
     let mut arm = arm(1.0, [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
     let mut rig = arm.holding(Config::avena());
@@ -118,8 +119,8 @@ fn j63_a_push_is_answered_while_answers_are_lost_for_ever() {
     }
 }
 
-/// Milliseconds until a joint that is blocked on the path is seen to be, and how far the position that the
-/// control law used was off till then, rad.
+/// Returns the milliseconds until a joint that is blocked on the path is detected, and the error of the position that
+/// the control law used until then, rad.
 fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
     const FROM: usize = 200;
     let mut rig = Rig::holding();
@@ -150,8 +151,8 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
     }
 }
 
-/// A joint that is stuck had not followed what was commanded: where the arm loses its torque because of it, and the next answers are
-/// missing, it is not predicted to move back.
+/// A joint that is stuck did not follow its command. If the arm loses its torque because of it, and the next answers
+/// are missing, the prediction must not move the joint back.
 #[test]
 fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     for velocity in [0.25, -0.25] {
@@ -164,7 +165,7 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
         assert_eq!(rig.state(), ControllerState::Error);
         let stuck = rig.nodes[JOINT].report.position;
         for k in 1..=4 {
-            // The answer to the Move of that tick was lost, too.
+            // The answer to the Move of that tick was also lost.
             rig.drop_answers(JOINT);
             rig.tick();
             let t = rig.controller.telemetry().joints[JOINT];
@@ -174,8 +175,8 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     }
 }
 
-/// Acknowledges missing in four of five ticks are no transmit timeout. A joint that is dead meanwhile is not predicted for
-/// longer than otherwise.
+/// Missing acknowledges in four of five ticks are not a transmit timeout. A joint that is dead meanwhile is not
+/// predicted for longer than otherwise.
 #[test]
 fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
     for start in 0..5 {

@@ -1,4 +1,5 @@
-//! Answers that are missing, or that no arm can have given: no torque step when they go, none when they come back (J-35, J-63).
+//! Missing answers, and answers that no arm can have given: no torque step when they begin, and none when they end
+//! (J-35, J-63).
 use crate::rig;
 
 use jtc_bus::Request;
@@ -29,7 +30,7 @@ const MOTIONS: [Motion; 7] = [
     Motion::Led(-0.9),
 ];
 
-/// What is wrong with the joint's answers.
+/// Fault of the joint's answers.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
@@ -104,12 +105,12 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     all
 }
 
-/// What the controller adds to the torque of the model, N·m.
+/// Returns the torque that the controller adds to that of the model, N·m.
 fn correction(joint: &JointTelemetry) -> f64 {
     joint.torque - joint.torque_model
 }
 
-/// The largest step of the correction in a tick that the run without the fault has not, N·m.
+/// Returns the largest step of the correction in a tick that does not occur in the run without the fault, N·m.
 fn worst_step(clean: &[JointTelemetry], faulty: &[JointTelemetry]) -> f64 {
     let steps = |run: &[JointTelemetry]| -> Vec<f64> {
         run.windows(2).map(|pair| correction(&pair[1]) - correction(&pair[0])).collect()
@@ -139,7 +140,7 @@ fn j63_lost_answers_make_no_torque_step() {
             let faulty = run(motion, Fault::Lost { ms });
             let worst = worst_step(&clean, &faulty);
             assert!(worst < 1.0, "{motion:?}, {ms} answers lost: {worst} N·m");
-            // And the position was right all the time.
+            // The position was correct all the time.
             for (clean, faulty) in clean.iter().zip(&faulty) {
                 let off = (clean.position - faulty.position).abs();
                 assert!(off < 2e-4, "{motion:?}, {ms} answers lost: {off} rad");
@@ -175,7 +176,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
     }
 }
 
-/// How long a joint may go on without usable answers is the setting, whatever they lack.
+/// The setting limits the number of consecutive unusable answers of a joint, missing or implausible.
 #[test]
 fn j63_silence_and_implausible_answers_count_together() {
     for max in [3, 5, 20] {
@@ -189,7 +190,7 @@ fn j63_silence_and_implausible_answers_count_together() {
         }
         rig.tick();
         assert_eq!(rig.errors(), NODE_ERROR, "{max}");
-        // A good answer begins the count anew.
+        // A good answer restarts the count.
         let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
         for tick in 0..500 {
             rig.nodes[JOINT].silent = tick % u32::from(max) != 0;
@@ -199,7 +200,7 @@ fn j63_silence_and_implausible_answers_count_together() {
     }
 }
 
-/// A drive that does not know its position yet corrects it by a sector when it does.
+/// A drive that does not know its exact position yet may correct it by a sector later.
 #[test]
 fn j35_a_position_that_becomes_accurate_may_jump() {
     let mut rig = Rig::new(Config::avena());

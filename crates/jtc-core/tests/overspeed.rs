@@ -1,11 +1,12 @@
-//! A joint that moves faster than it may, whatever was commanded (J-35), and arms that drives cannot do (J-35, J-43).
+//! Joints that move faster than the limit, with or without a command (J-35), and limits that the drives cannot reach
+//! (J-35, J-43).
 use crate::rig;
 
 use jtc_core::{Config, ConfigError, ControllerState, joint_error};
 use jtc_wire::FrameType;
 use rig::{Rig, rest};
 
-/// A rig in each of the states with torque.
+/// Returns a rig in each of the states with torque.
 fn powered() -> [Rig; 3] {
     let holding = Rig::holding();
     let mut operating = Rig::holding();
@@ -24,7 +25,7 @@ fn j35_a_joint_above_its_speed_for_5_ms_is_an_error_in_every_state_with_torque()
     for speed in [-1.85, 1.85] {
         for mut rig in powered() {
             rig.nodes[3].report.velocity = speed;
-            // One tick until it is reported, then four in a row that are too fast.
+            // One tick until the speed is reported, then four consecutive ticks that are too fast.
             rig.run(5);
             assert_eq!(rig.errors(), 0, "{:?}", rig.state());
             rig.run(1);
@@ -52,7 +53,7 @@ fn j35_a_glitch_or_a_speed_within_the_limit_is_no_error() {
 #[test]
 fn j35_answers_that_are_missing_neither_count_nor_excuse() {
     let mut config = Config { overspeed_ms: 3, ..Config::avena() };
-    // The prediction of the missing answers asks for torque, which is not what is tested.
+    // The prediction of the missing answers requires torque, which is not tested here.
     config.joints[3].torque_max = 1e6;
     let mut rig = Rig::holding_with(config);
     rig.nodes[3].report.velocity = 1.9;

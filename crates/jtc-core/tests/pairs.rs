@@ -1,5 +1,5 @@
-//! Whatever the controller does, something else may come: each pair ends in a state that docs/safety.md names. `UPDATE_DOCS=1` writes it
-//! again.
+//! Pairs of an activity of the controller and an event: each pair must end in a state that docs/safety.md names.
+//! `UPDATE_DOCS=1` updates the page.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_dynamics::Payload;
 use jtc_wire::{ExecCommand, FrameType, UrgentCommand};
@@ -8,9 +8,9 @@ use crate::plant::{LuGre, POSES, Plant, heavier, loaded, standing};
 use crate::pushed;
 use crate::rig::{Rig, floats};
 
-/// Time after which the end is looked at, ms.
+/// Time after which the end state is checked, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence that host supervision bears, ms: longer than what is under way takes to begin.
+/// Silence that host supervision tolerates, ms: longer than the activities take to begin.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// An arm of metal without brakes, and its controller.
@@ -20,8 +20,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The controller holds an arm at rest. The true masses are `mass` times those of the model, and the arm carries a `load` (kg) that the
-    /// model lacks.
+    /// Returns a bench that holds an arm at rest. The true masses are `mass` times those of the model, and the arm
+    /// carries a `load` (kg) that the model lacks.
     pub fn holding(config: Config, mass: f64, load: f64) -> Self {
         let model = loaded(heavier(Parameters::avena().model, mass), load);
         let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -31,7 +31,7 @@ impl Bench {
         Self { arm, rig }
     }
 
-    /// Somebody pushes joint 2, which begins to yield.
+    /// Returns a bench whose joint 2 is pushed and begins to yield.
     fn pushed(config: Config) -> Self {
         let mut bench = Self::holding(config, 1.0, 1.0);
         bench.arm.push[1] = -90.0;
@@ -43,7 +43,7 @@ impl Bench {
         self.arm.run(&mut self.rig, ms);
     }
 
-    /// Runs until it is so.
+    /// Runs until `is` returns `true`.
     pub fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
         for _ in 0..20_000 {
             if is(&self.rig) {
@@ -58,7 +58,7 @@ impl Bench {
         self.rig.send(frame_type, body);
     }
 
-    /// A motion of joints 2 and 3 from where the arm stands.
+    /// Executes a motion of joints 2 and 3 from the present position of the arm.
     pub fn execute(&mut self, way: f64, seconds: f64) {
         let mut to = POSES[0];
         to[1] += 0.6 * way;
@@ -78,7 +78,7 @@ impl Bench {
         self.send(FrameType::Jog, &floats([0.2f32, 0.0, 0.0, 0.0, 0.0, 0.0]));
     }
 
-    /// The end, in the words of the page.
+    /// Returns the end state in the words of the page.
     fn state(&self) -> &'static str {
         use ControllerState::{Error, HoldPos, Init, Operate, Teaching};
         let t = self.rig.controller.telemetry();
@@ -97,7 +97,7 @@ impl Bench {
     }
 }
 
-/// What the controller does.
+/// Activity of the controller.
 pub type Begin = fn(Config) -> Bench;
 pub const UNDER_WAY: [(&str, Begin); 11] = [
     ("holds", |config| Bench::holding(config, 1.0, 1.0)),
@@ -197,7 +197,7 @@ fn gains(bench: &mut Bench) {
     bench.send(FrameType::PidParam, &floats(numbers));
 }
 
-/// What comes: its name, what it does, and whether it releases the arm.
+/// Event: its name, its action, and `true` if it releases the arm.
 type Event = (&'static str, fn(&mut Bench), bool);
 const EVENTS: [Event; 16] = [
     ("nothing", |_| {}, false),
@@ -226,7 +226,7 @@ const EVENTS: [Event; 16] = [
     ("a drive's fault", |bench| bench.rig.nodes[3].fault(), true),
 ];
 
-/// The name of what a pair ends in.
+/// Returns the name of the state in which a pair ends.
 fn end((doing, begin): (&str, Begin), (name, event, releases): Event) -> &'static str {
     let mut config = Config::avena();
     if name == "the host is silent" {

@@ -1,4 +1,4 @@
-//! Which gains and models are taken, when, and that none of them throws an arm that is held (J-06).
+//! Gains and models that are accepted, and when; none of them may throw an arm that is held (J-06).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -7,7 +7,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use proptest::prelude::*;
 use rig::{Rig, floats, model_body, rest, segment_body};
 
-/// Gravity along y: the arm in its zero position has much to carry.
+/// Gravity along y: the arm in its zero position carries a large load.
 fn on_a_wall() -> Rig {
     Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() })
 }
@@ -20,7 +20,7 @@ fn torques(rig: &Rig) -> [u64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque.to_bits())
 }
 
-/// The frame is refused, and the arm is held with the same bits as if it had never come.
+/// Checks that the frame is refused, and that the arm is held with the same bits as without the frame.
 fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -53,7 +53,7 @@ fn j06_gains_that_would_throw_the_arm_are_refused_whole() {
         (4, 1001.0),
         (3, 121.0),
         (4, -121.0),
-        // 14 000 N·m/(rad·s) times 0.01 rad·s is more than the joint has.
+        // 14 000 N·m/(rad·s) times 0.01 rad·s is more than the torque limit of the joint.
         (3, 0.01),
         (4, -0.01),
         (0, f32::NAN),
@@ -80,7 +80,7 @@ fn j06_gains_in_use_are_taken() {
         let mut rig = Rig::holding();
         assert_eq!(rig.ask(FrameType::PidParam, &gains_body(gains)), DataStatus::NoError, "{gains:?}");
     }
-    // An arm with heavier joints bears these.
+    // An arm with heavier joints can bear these.
     let mut config = Config::avena();
     config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 2.0);
     let mut rig = Rig::holding_with(config);
@@ -152,7 +152,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     let mut rig = Rig::holding();
     check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    // What was found for the last model is given back first.
+    // The load that was found for the last model is given back first.
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
@@ -212,7 +212,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
     }
 }
 
-/// An arm of which one drive takes its time; Execute was given.
+/// Returns an arm with a drive that takes long to be enabled; Execute was sent.
 fn waiting_for_a_drive() -> Rig {
     let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
@@ -264,14 +264,15 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
                     "nothing moves later"
                 );
             }
-            // A new Execute is another matter.
+            // A new Execute is treated differently.
             assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
     }
 }
 
-/// Holds through a change of parameters: no error, no torque beyond the limits, no step; or nothing changes at all.
+/// Checks that the arm is held through a change of parameters: no error, no torque beyond the limits, no step; or
+/// nothing changes at all.
 fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseError> {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -296,7 +297,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     }
     if !accepted {
         quiet.run(300);
-        // The ticks until the record had come differ; what is held does not.
+        // The ticks until the record had come differ; the hold does not.
         let (a, b) = (asked.controller.telemetry(), quiet.controller.telemetry());
         for j in 0..6 {
             prop_assert!((a.joints[j].torque_model - b.joints[j].torque_model).abs() < 1e-9);
@@ -319,7 +320,7 @@ proptest! {
             *gain *= if sign == 0 { -1.0 } else { 1.0 };
         }
         gains[3] = -gains[3];
-        // At rest where it is to be: what the new gains make of nothing.
+        // At rest at the commanded position: the new gains act on an error of zero.
         holds(FrameType::PidParam, &gains_body(gains), 0.0)?;
     }
 

@@ -1,4 +1,4 @@
-//! A payload that the host gives (J-60): how it comes into the torque, when it may, and what it stays in.
+//! A payload that the host sets (J-60): how it is blended into the torque, when it is accepted, and how long it stays.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -9,7 +9,7 @@ use plant::{LuGre, POSES, Plant, loaded};
 use proptest::prelude::*;
 use rig::{Rig, floats, model_body, pieces};
 
-/// Time over which a payload comes into the model, ms.
+/// Time over which a payload is blended into the model, ms.
 const BLEND: usize = 500;
 
 fn point_mass(mass: f64) -> Payload {
@@ -21,7 +21,7 @@ fn set(rig: &mut Rig, payload: &Payload) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Held at `pose`, without physics: joints are where they are commanded.
+/// Returns a rig that is held at `pose`, without physics: joints are at their commanded positions.
 fn holding_at(pose: &[f64; 6]) -> Rig {
     let mut rig = Rig::new(Config::avena());
     for (node, q) in rig.nodes.iter_mut().zip(pose) {
@@ -42,7 +42,7 @@ fn gravity(payload: &Payload, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::with_payload(&Parameters::avena().model, Config::avena().gravity, payload).gravity_torque(q)
 }
 
-/// A cube at some place.
+/// Returns cubes at random places.
 fn cubes() -> impl Strategy<Value = Payload> {
     (0.0..2.5f64, prop::array::uniform3(-0.1..0.1f64), 0.0..0.1f64).prop_map(|(mass, com, side)| {
         let i = mass * side * side / 6.0;
@@ -53,8 +53,8 @@ fn cubes() -> impl Strategy<Value = Payload> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) })]
 
-    /// Whatever is set after whatever, in HoldPos and in Teaching, also while one is on its way: a tick changes the torque by the
-    /// five hundredth part of what is to come, and at last the joints carry the payload.
+    /// For any sequence of payloads, in HoldPos and in Teaching, also while one is being blended in: a tick changes the
+    /// torque by at most a five hundredth of the requested change, and finally the joints carry the payload.
     #[test]
     fn j60_a_payload_makes_no_step_in_torque(
         q in prop::array::uniform6(-1.2..1.2f64), list in prop::collection::vec((cubes(), 1..700usize), 1..4), taught: bool,
@@ -92,7 +92,7 @@ proptest! {
     }
 }
 
-/// What the integral had to find is the model's now, and the arm is not moved by it.
+/// The model takes over the load from the integral, without moving the arm.
 #[test]
 fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     for pose in POSES {
@@ -123,7 +123,7 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     }
 }
 
-/// A payload that Teaching had found by itself floats on when it is given.
+/// A payload that Teaching has found by itself stays balanced when it is set.
 #[test]
 fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found() {
     for pose in [POSES[0], POSES[2]] {
@@ -139,7 +139,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
-        // What it had found is right to within the friction.
+        // The found load is correct to within the friction.
         let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
@@ -151,7 +151,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
     }
 }
 
-/// A small correction is no reason to let go of the rest: half of what was found, and one after another.
+/// A small correction must not drop the remaining load: half of the found load, and several corrections in a row.
 #[test]
 fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
     for pose in [POSES[0], POSES[2]] {
@@ -160,7 +160,7 @@ fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
         arm.run(&mut rig, 4_000);
         taught(&mut arm, &mut rig);
         arm.run(&mut rig, 1_000);
-        // The second comes while the first is on its way.
+        // The second comes while the first is being blended in.
         for (mass, wait) in [(0.1, 1_000), (0.5, 200), (1.0, 3_000), (0.8, 3_000)] {
             let way = set_and_wait(&mut arm, &mut rig, &point_mass(mass), wait);
             assert!(way < 0.005 && rig.state() == ControllerState::Teaching, "{mass} kg: {way} rad");
@@ -173,12 +173,12 @@ fn j60_teaching_waits_until_the_payload_is_in_the_model() {
     let mut rig = holding_at(&POSES[0]);
     assert_eq!(set(&mut rig, &point_mass(1.0)), DataStatus::NoError);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    // And until the integral has given back what it had found for it, 3 s after.
+    // And until the integral has given back the part that it had found for the payload, 3 s later.
     let waited = rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     assert!((BLEND + 2_900..=BLEND + 3_100).contains(&waited), "{waited} ms");
 }
 
-/// Also a path that was paused: on it the model is what it is.
+/// Also for a paused path, because the model must not change on a path.
 #[test]
 fn j60_an_execute_waits_until_the_payload_is_in_the_model() {
     let mut rig = Rig::holding();
@@ -215,7 +215,8 @@ fn j60_j58_joints_are_not_jogged_on_the_way_and_a_payload_is_not_set_while_they_
     assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
 }
 
-/// What a joint cannot hold where it stands is refused; so is what is no body, and half of it is never taken.
+/// A payload that a joint cannot hold in its present position is refused, and so are values that are not a valid body.
+/// A refused payload is never taken partly.
 #[test]
 fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
@@ -244,7 +245,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
         assert_eq!(set(&mut rig, &bad), DataStatus::IncorrectValue, "{bad:?}");
         assert_eq!(rig.controller.config().payload, good);
     }
-    // Less of what is too much is taken: it is on its way down.
+    // A reduction of a payload that is too heavy is accepted: it is being blended out.
     rig.run(BLEND);
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
@@ -253,7 +254,8 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     assert_eq!(set(&mut rig, &Payload::NONE), DataStatus::NoError);
 }
 
-/// It outlasts errors and new models, at once where there is no torque, and is no part of the arm.
+/// The payload stays through errors and new models, changes at once if there is no torque, and is not a part of the
+/// arm.
 #[test]
 fn j60_the_payload_stays_through_errors_and_new_models() {
     let payload = point_mass(1.5);
@@ -292,7 +294,7 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(arm(rig.controller.config()), arm(&of_the_bench));
 }
 
-/// A model that cannot be held with what the arm carries is refused like one that cannot be held without.
+/// A model that cannot be held with the present payload is refused like a model that cannot be held without.
 #[test]
 fn j06_j60_a_model_is_held_with_its_payload() {
     let mut rig = holding_at(&POSES[1]);
@@ -324,7 +326,7 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     farthest
 }
 
-/// The same, behind a payload that is given.
+/// Sets a payload; returns the largest motion of a joint within `ms` afterwards, rad.
 fn set_and_wait(arm: &mut Plant, rig: &mut Rig, payload: &Payload, ms: usize) -> f64 {
     let body: Vec<u8> = settings::payload_values(payload).flat_map(|value| value.emit()).collect();
     rig.send(FrameType::SetSettings, &body);
@@ -342,8 +344,8 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// What the integral had found for a load is not a second one, when the load has just been given as the payload, or in a new model: an
-/// arm that nobody leads stays where it is.
+/// The load that the integral had found is not carried twice if it has just been set as the payload, or in a new model:
+/// an arm that no hand leads stays where it is.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {
@@ -375,7 +377,7 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is no payload: it takes nothing of what Teaching carries.
+/// A centre of mass without a mass is not a payload: it does not reduce the load that Teaching carries.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -1,4 +1,4 @@
-//! Plain lines, on which no extension request came: hosts that know the protocol of existing devices only (J-30, J-51).
+//! Plain lines, without any extension request: hosts that know only the protocol of existing devices (J-30, J-51).
 use crate::rig;
 
 use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
@@ -18,14 +18,14 @@ fn path() -> Vec<RawPoint> {
             point(0, 0.25 * (1.0 - cos), 0.25 * w * sin, 0.25 * w * w * cos)
         })
         .map(|mut p| {
-            // It begins and ends at rest.
+            // The path begins and ends at rest.
             p.velocity[1..].fill(0);
             p
         })
         .collect()
 }
 
-/// Segment 0 of one, of an arm that stands where it is.
+/// Returns segment 0 of one, which begins at the present position of the arm.
 fn first(rig: &Rig) -> Vec<u8> {
     let mut there = RawPoint::default();
     for (raw, joint) in there.position.iter_mut().zip(rig.controller.telemetry().joints) {
@@ -34,7 +34,7 @@ fn first(rig: &Rig) -> Vec<u8> {
     segment_body(9, 0, 1, 10, &[there; 20])
 }
 
-/// The arm moves along the path since so many ms.
+/// Returns a rig that has been moving along the path for `ms`.
 fn moving(ms: u32) -> Rig {
     let mut rig = Rig::holding();
     rig.execute(&path());
@@ -42,7 +42,7 @@ fn moving(ms: u32) -> Rig {
     rig
 }
 
-/// Where in Operate a segment can arrive.
+/// Returns rigs in all situations of Operate in which a segment can arrive.
 fn places() -> Vec<(&'static str, Rig)> {
     let mut places = Vec::new();
     let mut waiting = Rig::with_a_slow_drive(Config::avena());
@@ -82,7 +82,8 @@ fn places() -> Vec<(&'static str, Rig)> {
     places
 }
 
-/// An existing proxy repeats a refused segment for ever, and forwards nothing else. So it stops the arm, and is taken when the arm stands.
+/// An existing proxy repeats a refused segment for ever, and forwards nothing else. Therefore the segment stops the
+/// arm, and is accepted when the arm stands.
 #[test]
 fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
     for (n, (name, mut rig)) in places().into_iter().enumerate() {
@@ -107,13 +108,13 @@ fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
             "{name}"
         );
         assert_eq!(rig.errors(), 0, "{name}");
-        // The new trajectory is there, and begins where the arm stands.
+        // The new trajectory is loaded, and begins at the position of the arm.
         rig.nodes[2].slow_enable = false;
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError, "{name}");
     }
 }
 
-/// It does what a Stop does, in each tick.
+/// The segment acts as a Stop does, in each tick.
 #[test]
 fn j30_segment_0_on_a_plain_line_acts_as_a_stop_does() {
     for ((name, mut stopped), (_, mut rig)) in places().into_iter().zip(places()) {
@@ -137,7 +138,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
     let empty: &[RawPoint] = &[];
     for (plain, segment, points, stops, data) in [
         (true, 0, &[rest(0); 3][..], true, DataStatus::IncorrectValue),
-        // Whatever is wrong with it: its host goes on repeating it.
+        // With any error in it: its host keeps repeating it.
         (true, 0, empty, true, DataStatus::IncorrectValue),
         (true, 0, &[rest(32_767); 1500], true, DataStatus::IncorrectValue),
         (true, 1, &[rest(0); 3], false, DataStatus::IncorrectValue),
@@ -152,7 +153,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         let to = if stops { TrajectoryState::Stop } else { TrajectoryState::Execute };
         assert_eq!(rig.trajectory(), to, "plain {plain}, segment {segment}, {} points", points.len());
     }
-    // Without a motion a plain line is like any other.
+    // Without a motion a plain line behaves like any other.
     for (name, leave) in [
         ("Teaching", (|rig: &mut Rig| rig.send(FrameType::TeachingModeEnable, &[])) as fn(&mut Rig)),
         ("Error", |rig| rig.press_stop(1)),
@@ -167,7 +168,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         assert_eq!(rig.ask(SEGMENT, &segment), DataStatus::IncorrectValue, "{name}");
         assert_eq!(rig.state(), before, "{name}");
     }
-    // Paused, stopped and finished paths give way to it, as ever.
+    // Paused, stopped and finished paths are replaced, as usual.
     for plain in [true, false] {
         let mut rig = moving(1_000);
         rig.exec(ExecCommand::Pause);
@@ -236,7 +237,8 @@ fn of_three(segment: u16) -> Vec<u8> {
     segment_body(9, segment, 3, 10, &[rest(5_000); 20])
 }
 
-/// What its segment 0 has found holds, whatever the line is for the frames behind it.
+/// The data status values that segment 0 decided apply to the whole upload, whether or not the line is plain for later
+/// frames.
 #[test]
 fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed, StartPositionMismatch};
@@ -259,7 +261,7 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
                 let data = rig.exec(ExecCommand::Execute);
                 assert_eq!(data, in_words(plain, StartPositionMismatch), "{case}");
             }
-            // Other frames are those of their own time.
+            // Other frames follow the state of the line at their own time.
             rig.plain = at(3);
             let data = rig.exec(ExecCommand::Stop);
             assert_eq!(data, in_words(at(3), NotAllowed), "{case}");
@@ -274,7 +276,7 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     }
 }
 
-/// A drop is told in the words of segment 0.
+/// A drop is reported with the data status that segment 0 decided.
 #[test]
 fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     let mut rig = Rig::holding();
@@ -285,7 +287,7 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After its Execute a trajectory may be executed by another client, which has not shown that it knows more than 6.
+/// After its Execute a trajectory may be executed by another client, which has not shown that it knows values above 6.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -301,7 +303,7 @@ fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     }
 }
 
-/// Points that break J-36, with the error that the joint with index 3 would have in motion.
+/// Returns points that break J-36, with the error that the joint with index 3 would have in motion.
 fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
     let (still, at) = (rest(0), |q, v, a| point(3, q, v, a));
     let long = |bad: RawPoint, place: usize| {
@@ -329,7 +331,7 @@ fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStat
         .collect()
 }
 
-/// Existing hosts wait for ever for a segment that is refused, whatever is wrong with it.
+/// Existing hosts wait for ever for a segment that is refused, for any reason.
 #[test]
 fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     for (name, points, error) in broken() {
@@ -339,7 +341,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
             config.joints[3].acceleration_max = 8.0;
             let mut rig = Rig::holding_with(config);
             rig.plain = true;
-            // A good one before it is not executed in its place.
+            // An earlier good trajectory is not executed instead.
             rig.upload(&[rest(0); 60], 10);
             assert_eq!(uploaded(&mut rig, &points, segments), vec![DataStatus::NoError; segments], "{case}");
             assert_eq!(
@@ -365,7 +367,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
                 }
             }
             assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
-            // A Stop is answered as of any trajectory that is not executed, and the next upload is free.
+            // A Stop is answered as for any trajectory that is not executed, and the next upload is possible.
             assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
             assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
             assert_eq!(rig.controller.violation(), None);
@@ -375,7 +377,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     }
 }
 
-/// What segment 0 has found holds for the upload, and its verdict for whoever executes it.
+/// The decision at segment 0 applies to the whole upload, and its verdict applies to every client that executes it.
 #[test]
 fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     let (_, points, error) = broken().remove(0);
@@ -394,7 +396,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
                 continue;
             }
             assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
-            // On either line, and for a client that knows all numbers: 6 is the one for content.
+            // On either line, and also for a client that knows all values: 6 is the value for wrong content.
             for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
                 rig.plain = plain;
                 rig.statuses.clear();
@@ -409,7 +411,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     }
 }
 
-/// Frames that are no trajectory are refused on a plain line, too: counts, order, step time.
+/// Frames that are not a valid trajectory are also refused on a plain line: counts, order, step time.
 #[test]
 fn j30_j36_only_content_is_taken_on_a_plain_line() {
     use DataStatus::{

@@ -6,7 +6,7 @@ use jtc_wire::{ExecCommand, FrameType, RawPoint};
 use plant::{ArmFile, LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
 
-/// A motion from one position to another in `seconds`, of 100 points.
+/// Returns a motion from one position to another in `seconds`, of 100 points.
 pub fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
     let step = (seconds * 10.0).round() as u16;
     let seconds = f64::from(step) * 0.099;
@@ -27,7 +27,7 @@ pub fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u
     (points.collect(), step)
 }
 
-/// Uploads and executes it.
+/// Uploads and executes a motion.
 pub fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, *step, points));
     rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
@@ -35,7 +35,7 @@ pub fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
 
 const LIMITS: fn(usize) -> f64 = |joint| Config::avena().joints[joint].torque_max;
 
-/// An arm without brakes that a rig has held for a while.
+/// Returns an arm without brakes that a rig has held for a while.
 fn held(model: &jtc_dynamics::ArmModel, friction: [LuGre; 6], pose: [f64; 6]) -> (Plant, Rig) {
     let mut arm = Plant::new(model, friction, pose);
     let mut rig = arm.holding(Config::avena());
@@ -48,7 +48,7 @@ fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
-/// A pose of this arm within its ranges, rad, in which it stands with half of each torque limit at most.
+/// Returns a pose of this arm within its ranges, rad, in which it stands with half of each torque limit at most.
 fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     loop {
         let pose = core::array::from_fn(|j| {
@@ -62,8 +62,8 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     }
 }
 
-/// Pushes at random of a `share` of 60 to 100 % of what a joint has left beside its load, for 50 ms to 1 s, on an arm with errors of 10 % in
-/// its masses and of 20 % in its friction.
+/// Random pushes with a `share` of 60 to 100 % of the torque that a joint has left in addition to its load, for 50 ms
+/// to 1 s, on an arm with errors of 10 % in its masses and of 20 % in its friction.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
@@ -71,21 +71,21 @@ struct Pushes {
     share: f64,
     /// The rotors' inertias as multiples of those in the arm's file.
     rotors: f64,
-    /// N·m/rad of elastic gears; rigid ones if there are none.
+    /// Stiffness of elastic gears, N·m/rad; `None` for rigid gears.
     gears: Option<f64>,
 }
 
-/// What a push has done.
+/// Result of a push.
 struct Pushed {
     about: String,
     joint: usize,
     arm: Plant,
     rig: Rig,
-    /// rad that the joint that was pushed has moved.
+    /// Motion of the joint that was pushed, rad.
     way: f64,
-    /// The furthest that another joint moved, rad.
+    /// Largest motion of another joint, rad.
     aside: f64,
-    /// rad/s of the fastest joint right before the push.
+    /// Speed of the fastest joint right before the push, rad/s.
     before: f64,
     /// The arm was released by the over-speed of the joint that was pushed.
     released: bool,
@@ -95,7 +95,8 @@ const HELD: Pushes = Pushes { seed: 7, moving: false, share: 1.0, rotors: 1.0, g
 const MOVING: Pushes = Pushes { seed: 9, moving: true, ..HELD };
 
 impl Pushes {
-    /// 48 of them on an arm with rigid gears. Returns how many have released it: by over-speed, and nothing else.
+    /// Runs 48 pushes on an arm with rigid gears. Returns the number of pushes that released the arm; checks that
+    /// over-speed is the only cause.
     fn released(self, file: &ArmFile) -> usize {
         let checked = self.push(file).map(|mut pushed| {
             self.check(&mut pushed);
@@ -163,7 +164,7 @@ impl Pushes {
         Pushed { about, joint, arm, rig, way, aside, before: speed, released }
     }
 
-    /// An arm that was pushed stays held, at rest, and names the joint that was pushed.
+    /// Checks that an arm that was pushed stays held, at rest, and names the joint that was pushed.
     fn check(self, pushed: &mut Pushed) {
         let Pushed { about, joint, arm, rig, way, aside, before: _, released } = pushed;
         let still = !self.moving && self.rotors == 1.0;
@@ -193,9 +194,9 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     assert_eq!(MOVING.released(&ArmFile::avena()), 0);
 }
 
-/// Arms as they are imported: their gains are weak, because nobody has measured their rotors. A push of 100 to 180 rad/s² takes such a joint to
-/// its over-speed within 12 ms, and what its drive reports is 8 ms old. Without an eye on the speed more than 80 of these 192 pushes release the
-/// arm, and 18 where the reported speed alone counts.
+/// Arms as they are imported: their gains are weak, because their rotors were not measured. A push of 100 to 180 rad/s²
+/// takes such a joint to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without
+/// supervision of the speed more than 80 of these 192 pushes release the arm, and 18 if only the reported speed counts.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released =
@@ -204,8 +205,8 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
     assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
 }
 
-/// The rotors are only proposed. Where they are half as heavy, or a third, what yields is too hard for them: it becomes softer, does not swing, and
-/// pushes of 24 to 40 % of what is left release no arm.
+/// The rotors are only proposed. If they are half as heavy, or a third, the yielding loop is too stiff for them: it
+/// becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
@@ -215,8 +216,8 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
-/// Elastic gears under the same pushes: what comes of it is printed, and a release is over-speed. Arms without friction have nothing but
-/// the controller that damps their gears: some swing before anybody pushes.
+/// Elastic gears under the same pushes: the results are printed, and a release is caused by over-speed. In arms without
+/// friction only the controller damps the gears: some swing before they are pushed.
 #[test]
 fn j66_j68_arms_with_elastic_gears_are_pushed() {
     let slick = [ArmFile::avena(), ArmFile::ur5(), ArmFile::z1()].map(|arm| (arm.slick(), 3e4));
@@ -241,7 +242,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// Whoever pushes again and again, or to and fro, still meets all of the torque: that is no swing of a joint that is lighter than its file says.
+/// A person who pushes repeatedly, or to and fro, still meets the full torque: this is not a swing of a joint that is
+/// lighter than its file says.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -275,8 +277,8 @@ fn j68_a_joint_that_is_shaken_stays_held() {
     }
 }
 
-/// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after it is noticed on the drive presses the joint against it with
-/// no more than its share, and it is a held stop.
+/// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after detection on, the drive presses the joint
+/// against it with no more than its share, and the stop is a held stop.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     let model = Parameters::avena().model;
@@ -298,7 +300,7 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 arm.tick(&mut rig);
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
-                // A joint that the wall throws back is braked.
+                // The controller brakes a joint that the wall throws back.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
@@ -319,8 +321,8 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     }
 }
 
-/// A hand leads joint 2 up through 1 rad in 5 s, at the end of a stiff spring: it gets no more than the share against it, and where it lets
-/// go the arm stays.
+/// A hand leads joint 2 up through 1 rad in 5 s, at the end of a stiff spring: the joint resists with no more than its
+/// share, and the arm stays when the hand lets go.
 #[test]
 fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     let model = Parameters::avena().model;
@@ -342,8 +344,8 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Loads of 90 to 110 % of a torque limit are let down slowly, with the whole limit against the motion where that is needed, to where the
-/// arm is in balance; the joint is never released.
+/// Loads of 90 to 110 % of a torque limit are lowered slowly, with the whole limit against the motion if needed, to a
+/// position in which the arm is in balance; the joint is never released.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
@@ -385,7 +387,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// Gains that make the loop unstable, or leave it without strength, under a held arm with 2 kg that nobody told it of.
+/// Gains that make the loop unstable, or too weak, for a held arm with 2 kg that the controller was not told of.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [

@@ -1,4 +1,5 @@
-//! The flight recorder on the bench: what it keeps, when it stops, and that its memory is readable whatever a reset leaves (J-56).
+//! The flight recorder on the bench: its contents, its stop conditions, and memory that stays readable after any reset
+//! (J-56).
 use crate::rig;
 
 use std::collections::BTreeSet;
@@ -16,7 +17,7 @@ use rig::Rig;
 const BLOCKS: usize = 96;
 
 fn memory() -> [Vec<Block>; 2] {
-    // Not of one size, and not clean: memory after power-up holds anything.
+    // Pieces of different size with old contents: memory after power-up holds random data.
     [vec![[0x4A46_0001; BLOCK_WORDS]; BLOCKS - 5], vec![[0xA5A5_5A5A; BLOCK_WORDS]; 5]]
 }
 
@@ -26,7 +27,7 @@ fn recorded() -> Rig {
     rig
 }
 
-/// In HoldPos, recorded since the start.
+/// Returns a rig in HoldPos, recorded since the start.
 fn holding() -> Rig {
     let mut rig = recorded();
     rig.defaults();
@@ -43,7 +44,7 @@ fn blocks(rig: &Rig) -> Vec<Block> {
     recorder(rig).blocks().copied().collect()
 }
 
-/// The ticks of a log, each as what it comes to, and those after which there is a snapshot.
+/// Returns the ticks of a log, each with its result, and the ticks that are followed by a snapshot.
 fn contents(blocks: &[Block]) -> (Vec<u64>, Vec<u64>) {
     let (mut ticks, mut snapshots) = (Vec::new(), Vec::new());
     for record in Log::new(blocks) {
@@ -66,7 +67,7 @@ fn contents(blocks: &[Block]) -> (Vec<u64>, Vec<u64>) {
     (ticks, snapshots)
 }
 
-/// The ticks that a replay gives, none of which differs.
+/// Returns the ticks of a replay, after checking that none differs.
 fn replayed(rig: &Rig) -> Vec<u64> {
     let blocks = blocks(rig);
     let hash = rig.controller.points_hash();
@@ -91,14 +92,14 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(ticks.last(), Some(&(error + u64::from(AFTER_ERROR_MS))));
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "every tick once");
 
-    // Neither time, nor the end of the error, nor another error changes it.
+    // The end of the error, another error, or the passing of time does not change the log.
     let before = blocks(&rig);
     rig.clear(true, 0x7F);
     rig.run(600);
     rig.press_stop(1);
     rig.run(1_000);
     assert_eq!((blocks(&rig), recorder(&rig).state()), (before.clone(), LogState::Error));
-    // Nor a reset, of whatever kind.
+    // A reset of any kind does not change it either.
     for failed in [false, true] {
         let memory = rig.recorder.take().unwrap().into_memory();
         rig.recorder = Some(Recorder::new(memory, failed));
@@ -112,7 +113,7 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(recorder(&rig).state(), LogState::Recording);
 }
 
-/// An emergency stop that is pressed while the device starts is an error; it is not to cost the log of what goes wrong later.
+/// An emergency stop that is pressed while the device starts is an error; it must not cost the log of a later error.
 #[test]
 fn j56_a_log_without_torque_gives_way_when_torque_comes_on() {
     let mut rig = recorded();
@@ -142,7 +143,7 @@ fn j56_a_reset_keeps_the_log_of_a_device_that_failed_and_begins_anew_otherwise()
     rig.recorder = Some(Recorder::new(memory, false));
     assert_eq!(recorder(&rig).state(), LogState::Recording);
     assert_eq!(recorder(&rig).blocks().count(), 0);
-    // Power-up leaves anything.
+    // Memory at power-up holds random data.
     for failed in [false, true] {
         let recorder = Recorder::new(self::memory(), failed);
         assert_eq!((recorder.state(), recorder.blocks().count()), (LogState::Recording, 0));
@@ -154,7 +155,7 @@ fn found(memory: &[Vec<Block>; 2]) -> Vec<Block> {
     Recorder::new(memory.clone(), true).blocks().copied().collect()
 }
 
-/// What a tick writes counts with the last of its words, and not before.
+/// The data of a tick count when their last word is written, and not before.
 #[test]
 fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before() {
     const MAGIC: usize = 0;
@@ -175,7 +176,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
             .collect();
         assert!(changed.iter().any(|&(_, _, word)| word == COMMIT));
         let (ticks, snapshots) = contents(&found(&before));
-        // A tick that begins a block is long: not each of its words.
+        // A tick that begins a block is long: some of its words are tested, not all.
         for leave_out in (0..changed.len()).step_by(1 + changed.len() / 8) {
             let mut cut = before.clone();
             for (n, &(piece, block, word)) in changed.iter().enumerate() {
@@ -197,7 +198,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// Whatever is changed, what is read was written, and what is whole is read.
+/// For any change of the memory, all data that are read were written, and all complete data are read.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();
@@ -213,13 +214,13 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
         damaged[block][word] ^= 1 << bit;
         let (left, _) = contents(&damaged);
         assert!(left.iter().all(|tick| known.contains(tick)), "block {block}, word {word}, bit {bit}");
-        // A snapshot behind the damage and all that follows are still there.
+        // A snapshot after the damage, and everything after it, are still there.
         let behind = whole[block + 1..].iter().position(|block| block[3] as u16 != 0xFFFF);
         if let Some(first) = behind.map(|first| block + 1 + first) {
             assert!(left.ends_with(&contents(&whole[first..]).0));
         }
     }
-    // Blocks that are missing at an end, and words that are no log at all.
+    // Blocks that are missing at an end, and words that are not a log.
     for cut in 0..whole.len() {
         assert!(ticks.ends_with(&contents(&whole[cut..]).0));
         assert!(ticks.starts_with(&contents(&whole[..cut]).0));
@@ -232,7 +233,7 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     for n in 0..50 {
         let mut noise = whole.clone();
         for block in &mut noise {
-            // Heads stay as they are every other time.
+            // Every other time the heads of the blocks stay unchanged.
             block[if n % 2 == 0 { 5 } else { 0 }..].fill_with(&mut next);
         }
         contents(&noise);
@@ -285,10 +286,10 @@ fn j56_a_log_is_read_in_pages_while_recording_rests() {
     rig.run(2_500);
     let before = blocks(&rig);
     let read = fetched(&mut rig);
-    // Recording went on until the first page was asked for.
+    // Recording continued until the first page was requested.
     let (before, read) = (contents(&before).0, contents(&read).0);
     assert!(read.starts_with(&before) && read.len() < before.len() + 10);
-    // It goes on by itself, with a snapshot.
+    // Recording continues by itself, with a snapshot.
     let rested = rig.controller.telemetry().tick;
     rig.run(2_500);
     let ticks = replayed(&rig);
@@ -304,7 +305,7 @@ fn j56_an_error_is_recorded_also_while_a_host_reads() {
     page(&mut rig, 0, 0);
     rig.press_stop(1);
     let error = rig.controller.telemetry().tick;
-    // The host goes on reading.
+    // The host continues to read.
     for _ in 0..20 {
         page(&mut rig, 0, 0);
     }
@@ -336,7 +337,7 @@ fn j56_j50_a_device_without_a_recorder_refuses_what_is_asked_of_one() {
 #[test]
 fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     let mut rig = holding();
-    // As many as on the boards.
+    // As many blocks as on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     let begin = rig.controller.telemetry().tick;
     for n in 0..3_000u32 {
@@ -356,8 +357,8 @@ fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
 }
 
-/// A payload that is on its way into the model when a snapshot is taken goes on its way in the replay (J-60): from the first snapshot after
-/// it each tick is the same to the bit.
+/// A payload that is being blended into the model when a snapshot is taken continues to blend in the replay (J-60):
+/// from the next snapshot on each tick is the same to the bit.
 #[test]
 fn j56_a_payload_on_its_way_is_replayed() {
     let mut rig = holding();
@@ -371,7 +372,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
     let blocks = blocks(&rig);
     let first = contents(&blocks).1.into_iter().find(|tick| *tick > given).expect("a snapshot");
     assert!(first < given + 300, "it comes while the payload is on its way: {given} {first}");
-    // By a controller that was given no payload.
+    // By a controller without a payload.
     let mut other = Rig::new(Config::avena());
     other.defaults();
     let replay = Replay::new(Log::new(&blocks), other.controller, None);
@@ -380,11 +381,12 @@ fn j56_a_payload_on_its_way_is_replayed() {
     assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }
 
-/// An emergency stop at power-up that is cleared at once does not stop the log in which the arm then gets its torque.
+/// An emergency stop at power-up that is cleared at once does not stop the log of the time in which the arm then gets
+/// its torque.
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
-    // As many as on the boards.
+    // As many blocks as on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::Init && rig.controller.telemetry().tick > 50);
@@ -401,7 +403,8 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// Requests that read, beside others in a tick, take the turns that they took: a controller of its own, without a recorder, does the same.
+/// Read requests take their turns also in a replay when a tick has further requests: a controller without a recorder
+/// does the same.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -432,13 +435,14 @@ fn j56_requests_beside_others_are_replayed_in_their_turns() {
     }
 }
 
-/// Disabled or held; a StoreArm after so many ticks, and half a second and more.
+/// Returns a rig, disabled or held, that has got a StoreArm after `wait` ticks, and has run half a second longer or
+/// more.
 fn storing(state: ControllerState, wait: usize) -> Rig {
     let mut rig = recorded();
     rig.controller.set_store_state(StoreState::Empty, 0);
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // What was before the torque is not kept.
+    // The log from before the torque is not kept.
     rig.run(600);
     let stored = state == ControllerState::Init;
     if stored {
@@ -452,8 +456,8 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig
 }
 
-/// A replay has no memory to store an arm in and refuses it at once, which is no difference of the controller's, also where there is a
-/// snapshot meanwhile. Behind the next one all is as it was.
+/// A replay has no memory to store an arm in and refuses the store at once. This is not reported as a difference of the
+/// controller, also with a snapshot in between. After the next snapshot everything is equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

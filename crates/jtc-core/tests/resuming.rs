@@ -1,4 +1,5 @@
-//! What Execute after a Pause waits for and goes on from (J-16, J-33, J-34), and what holding does not wear out (J-25).
+//! Conditions and starting point of an Execute after a Pause (J-16, J-33, J-34), and the wait of Teaching, which a long
+//! hold does not use up (J-25).
 use crate::rig;
 
 use jtc_bus::NodeState;
@@ -30,7 +31,7 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// A little beside its commanded position, as friction leaves an arm.
+/// The joint stands slightly off its commanded position, as friction leaves an arm.
 #[test]
 fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     let mut rig = Rig::holding();
@@ -51,7 +52,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     assert!(rig.controller.telemetry().point > paused.point + 2, "{} after {}", last, paused.point);
 }
 
-/// Its time to wait counts from the command, not from when the arm was first held.
+/// The waiting time of Teaching counts from the command, not from the moment at which the arm was first held.
 #[test]
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });

@@ -1,4 +1,4 @@
-//! The safety input with a ramp (J-22): what moves stops first, and then the torque goes.
+//! The safety input with a ramp (J-22): all motion stops first, and then the torque goes.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
 
@@ -10,13 +10,13 @@ fn config(ramp_ms: u16) -> Config {
     Config { safety_input_ramp_ms: ramp_ms, ..Config::avena() }
 }
 
-/// Highest true speed and highest commanded speed, rad/s.
+/// Returns the highest true speed and the highest commanded speed, rad/s.
 fn speeds(bench: &Bench) -> (f64, f64) {
     let most = |speeds: [f64; 6]| speeds.into_iter().fold(0.0, |most: f64, v| most.max(v.abs()));
     (most(bench.arm.v), most(bench.rig.controller.telemetry().joints.map(|joint| joint.set_velocity)))
 }
 
-/// Ticks until the torque is gone.
+/// Returns the ticks until the torque is gone.
 fn released(bench: &mut Bench) -> usize {
     for k in 1..2_000 {
         bench.arm.tick(&mut bench.rig);
@@ -29,7 +29,8 @@ fn released(bench: &mut Bench) -> usize {
     panic!("the torque stays");
 }
 
-/// A pulse of 1 ms is enough. What moves by command has come to rest when the torque goes; what yields or is led has until the end of the ramp.
+/// A pulse of 1 ms is enough. Commanded motion has come to rest when the torque goes; a joint that yields or is led has
+/// until the end of the ramp.
 #[test]
 fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     for (doing, begin) in UNDER_WAY {
@@ -44,7 +45,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
         println!("{doing}: from {before:.2} rad/s, {ms} ms, then {speed:.3} rad/s");
         assert!(ms <= 500, "{doing}: {ms} ms");
         match doing {
-            // No motion that was commanded: a stop would only keep the torque on.
+            // No commanded motion: a stop would only keep the torque on.
             _ if before == 0.0 && !operates && doing != "teaches" && doing != "slows down after a Stop" => {
                 assert_eq!(ms, 0, "{doing}")
             }
@@ -76,7 +77,7 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     for ramp_ms in [0, 1, 20, 100] {
         assert_eq!(released(&mut moving(ramp_ms)), 1 + usize::from(ramp_ms));
     }
-    // What a drive or another error asks for does not wait.
+    // A release for a fault of a drive or another error does not wait.
     let mut bench = moving(500);
     bench.run(50);
     bench.rig.nodes[3].fault();
@@ -84,7 +85,7 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     assert!(ticks < 20, "{ticks} ms");
 }
 
-/// What takes the torque away meanwhile does not hide that the safety input has been 0.
+/// Another cause that takes the torque away meanwhile does not hide that the safety input has been 0.
 #[test]
 fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     for reset in [false, true] {
@@ -93,7 +94,7 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
         bench.rig.safety_input = true;
         bench.run(50);
         if reset {
-            // The drive begins anew: no error of its own.
+            // The drive restarts, without an error of its own.
             bench.rig.nodes[3].report.state = jtc_bus::NodeState::START;
         } else {
             bench.rig.nodes[3].fault();
@@ -103,7 +104,7 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     }
 }
 
-/// While drives are still to be enabled there is nothing to stop.
+/// While drives are being enabled there is nothing to stop.
 #[test]
 fn j22_a_ramp_enables_no_drive() {
     let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -120,7 +121,7 @@ fn j22_a_ramp_enables_no_drive() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// Nothing begins to move while the safety input stops the arm, also when it is 1 again.
+/// No motion begins while the safety input stops the arm, even if it is 1 again.
 #[test]
 fn j22_nothing_begins_during_the_ramp() {
     let mut bench = moving(500);
@@ -138,7 +139,7 @@ fn j22_nothing_begins_during_the_ramp() {
     rig.until(500, |rig| rig.state() == ControllerState::Error);
 }
 
-/// The setting is one of the arm: it changes without torque only.
+/// The setting belongs to the arm: it can be changed only without torque.
 #[test]
 fn j22_j53_the_ramp_is_a_setting_that_changes_without_torque_only() {
     let row = settings::setting(80).expect("the setting");

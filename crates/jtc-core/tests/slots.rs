@@ -1,16 +1,16 @@
-//! J-54: the two slots on a model of the flash that can lose its power at any word and in the middle of it.
+//! J-54: the two slots on a model of the flash whose power can fail at any word and in the middle of it.
 use jtc_core::slots::{Action, Header, IMAGE_MAX, SLOTS, Slots, Storing, WORD, Word, newer};
 use proptest::prelude::*;
 
 const WORDS: usize = 1 + IMAGE_MAX / WORD;
 const ERASED: Word = [0xFF; WORD];
 
-/// What a word reads as.
+/// State of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cell {
-    /// As after an erasure: it may be programmed.
+    /// As after an erasure: the word can be programmed.
     Erased,
-    /// Programmed, or something like it.
+    /// Programmed, completely or partly.
     Holds(Word),
     /// More bits are wrong than the flash can correct: reading it is an error.
     Unreadable,
@@ -33,7 +33,7 @@ impl Flash {
         }
     }
 
-    /// A slot's image and sequence number, if it is whole.
+    /// Returns a slot's image and sequence number, if the slot is complete.
     fn load(&self, slot: usize) -> Option<(Vec<u8>, u32)> {
         let header = Header::parse(&self.read(slot, 0)?)?;
         let words: Option<Vec<Word>> = (1..header.words()).map(|word| self.read(slot, word)).collect();
@@ -41,12 +41,12 @@ impl Flash {
         Some((image, header.sequence()))
     }
 
-    /// As the board starts.
+    /// Reads the slots as the board does when it starts.
     fn slots(&self) -> Slots {
         Slots::new([0, 1].map(|slot| self.load(slot).map(|(_, sequence)| sequence)))
     }
 
-    /// The image that the board uses.
+    /// Returns the image that the board uses.
     fn current(&self) -> Option<Vec<u8>> {
         self.slots().current().and_then(|(slot, _)| self.load(slot)).map(|(image, _)| image)
     }
@@ -63,10 +63,10 @@ impl Flash {
         }
     }
 
-    /// The power goes in the middle of an action.
+    /// Simulates a loss of power in the middle of an action.
     fn torn(&mut self, action: &Action, rng: &mut Chance) {
         match *action {
-            // Some words are erased, some not, some neither.
+            // Some words are erased, some not, some only partly.
             Action::Erase { slot } => {
                 for cell in &mut self.0[slot] {
                     let before = match cell {
@@ -173,8 +173,8 @@ fn j54_no_wrong_bit_is_accepted() {
     }
 }
 
-/// J-54: the power goes before, in the middle of and after everything that is done to the flash, at the first stores and at
-/// later ones: the old image or the new one is there, whole; and the next store works as if nothing had been.
+/// J-54: the power fails before, during and after every action on the flash, at the first stores and at later ones. The
+/// old image or the new one is there, complete; and the next store works normally.
 #[test]
 fn j54_a_power_cut_leaves_one_whole_image() {
     for (stores, length) in [(0, 200), (1, 200), (2, 200), (3, 333), (4, 0), (5, 2000), (1, IMAGE_MAX)] {
@@ -214,7 +214,7 @@ fn j54_a_power_cut_leaves_one_whole_image() {
     }
 }
 
-/// Both slots damaged: there is no image, and a store brings one.
+/// If both slots are damaged, there is no image, and a store creates one.
 #[test]
 fn j54_two_damaged_slots_are_no_image() {
     let mut flash = Flash::new();
@@ -228,7 +228,7 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would find a slot that is not whole; without a header nobody needs to compute it.
+/// The CRC alone would detect an incomplete slot; without a header it need not be computed.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);
@@ -260,7 +260,7 @@ fn sequence_numbers_begin_again() {
     assert_eq!(Slots::new([Some(9), None]).next(), (1, 10));
 }
 
-/// The layout of the documents, with a CRC that was computed elsewhere (Python's `zlib.crc32`).
+/// The documented layout, with a CRC that was computed elsewhere (Python's `zlib.crc32`).
 #[test]
 fn the_header_is_the_documented_one() {
     let header = Header::new(b"arm", 0x0102_0304).expect("short").emit();
@@ -273,7 +273,7 @@ fn the_header_is_the_documented_one() {
 const CRC_OF_PYTHON: u32 = 0x26B4_110F;
 
 proptest! {
-    /// Whatever the flash holds, loading it neither panics nor accepts what was not stored.
+    /// For any contents of the flash, loading neither panics nor accepts an image that was not stored.
     #[test]
     fn garbage_is_no_image(words in prop::collection::vec(any::<[u8; WORD]>(), 1..20), length in 0..700u32) {
         let mut flash = Flash::new();
@@ -281,7 +281,7 @@ proptest! {
             *cell = Cell::Holds(*word);
         }
         prop_assert_eq!(flash.current(), None);
-        // With a header that looks right but for its CRC.
+        // With a header that is valid except for its CRC.
         let mut header = Header::new(&[], 5).expect("short").emit();
         header[8..12].copy_from_slice(&length.to_le_bytes());
         header[28..].copy_from_slice(&words[0][..4]);

@@ -24,10 +24,10 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     rig.tick();
     assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.errors(), error::EMERGENCY_INPUT | error::EXTERNAL);
-    // Clearing while the cause is there does not help.
+    // Clearing has no effect while the cause is present.
     rig.clear(true, 0x7F);
     assert_eq!(rig.state(), ControllerState::Error);
-    // The cause gone does not help either.
+    // The end of the cause alone has no effect either.
     rig.safety_input = true;
     rig.run(200);
     assert_eq!(rig.state(), ControllerState::Error);
@@ -52,7 +52,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     rig.clear(true, 0);
     assert_eq!(rig.state(), ControllerState::Error, "the node's fault is still there");
-    // The node does not listen for a while.
+    // The node ignores frames for a while.
     rig.nodes[1].report.state = NodeState::FAULT_REACTION;
     rig.clear(true, 1 << 1);
     let from = rig.sent.len();
@@ -116,7 +116,8 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     );
 }
 
-/// Existing hosts show the answer: a clear that has cleared nothing says so, and is not carried out later, unasked.
+/// Existing hosts show the answer: a clear that cleared nothing is refused, and is not carried out later without a new
+/// request.
 #[test]
 fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     type Fault = fn(&mut Rig);
@@ -138,11 +139,12 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // The controller alone; it with a joint that has nothing to clear; the occurred ones, of which none is old.
+            // The controller's errors alone; together with a joint that has nothing to clear; the occurred errors, none
+            // of which is old.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
-            // Clears of nodes say nothing of the controller.
+            // Clears of nodes do not concern the controller.
             assert_eq!(rig.clear(false, 0x01), DataStatus::NoError, "{name}");
             rig.nodes[4].report.state = NodeState::FAULT;
             assert_eq!(rig.clear(false, 0x10), DataStatus::NoError, "{name}");
@@ -158,7 +160,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // Together with the joint, or while that is on its way, the clear is taken.
+    // A clear together with the joint, or while the joint is being cleared, is accepted.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -172,7 +174,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
         rig.run(300);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // One that clears something else is taken, and the fault stays.
+    // A clear that clears another error is accepted, and the fault stays.
     let mut rig = Rig::holding();
     rig.press_stop(1);
     rig.nodes[4].report.state = NodeState::FAULT;
@@ -180,10 +182,10 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // What has occurred, too: it is gone from its word once, and no more.
+    // The occurred errors, too: the first clear empties their word, the second has nothing to clear.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
-    // A controller without errors has nothing to refuse.
+    // A controller without errors refuses no clear.
     let mut rig = Rig::holding();
     assert_eq!(rig.clear(true, 0x7F), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
@@ -207,7 +209,7 @@ fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() 
     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
     assert!(is_move(rig.sent.last().unwrap()), "the first frame after an error is Move");
     assert!(rig.last.safety_output, "an external error does not pull the output");
-    // An internal error pulls it, and its bit is set.
+    // An internal error sets the safety output to 0, and its bit is set.
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
     rig.until(20, |r| r.state() == ControllerState::Error);
@@ -234,7 +236,7 @@ fn j23_a_reset_touches_only_the_nodes_in_its_mask() {
     rig.ask(FrameType::ResetCanDevices, &[0, 0, 0, 0]);
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // Bits that mean nothing are ignored: hosts send 0xFF for all.
+    // Bits without a meaning are ignored: hosts send 0xFF for all.
     rig.ask(FrameType::ResetCanDevices, &[0xFF, 0, 0, 0]);
     rig.run(600);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -307,7 +309,7 @@ fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
         rig.run(600);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // A few are borne, for ever.
+    // A few late ticks are tolerated for any time.
     let mut rig = Rig::holding();
     for _ in 0..100 {
         rig.missed_ticks = 5;
@@ -421,7 +423,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // It latches, and its bit is that of an internal error that neither a joint nor the bus explains.
+    // The error latches; its bit is that of an internal error that is caused neither by a joint nor by the bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

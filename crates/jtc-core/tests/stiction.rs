@@ -1,4 +1,4 @@
-//! Holding joints with stiction, which an integral can make hunt for ever (J-41).
+//! Holding joints with stiction, with which an integral can cause endless hunting (J-41).
 use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};
@@ -8,7 +8,7 @@ use rig::{Rig, raw, segment_body};
 
 const POSE: [f64; 6] = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
 
-/// The range of what was seen of one joint while it was held.
+/// Range of the observed values of one joint while it was held.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     low: f64,
@@ -27,7 +27,7 @@ impl Seen {
     }
 }
 
-/// Correction torque (N·m) and true position (rad) of each joint over `ticks`.
+/// Returns the correction torque (N·m) and the true position (rad) of each joint over `ticks`.
 fn watch(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> [(Seen, Seen); 6] {
     let mut seen = [(Seen::NOTHING, Seen::NOTHING); 6];
     for _ in 0..ticks {
@@ -41,13 +41,13 @@ fn watch(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> [(Seen, Seen); 6] {
     seen
 }
 
-/// The default arm's friction with this ratio of stiction to Coulomb friction and these bristles.
+/// Returns the default arm's friction with this ratio of stiction to Coulomb friction and these bristles.
 fn sticky(ratio: f64, stribeck: f64, stiffness: f64, damping: f64) -> [LuGre; 6] {
     core::array::from_fn(|j| LuGre { stribeck, stiffness, damping, ..LuGre::avena(j, ratio) })
 }
 
-/// Everything is quiet: at most a toggle of the encoder's last bit, which is 3.8 N·m of P and D on the large joints, and the
-/// joint stands where the integral lets it settle.
+/// Checks that every joint is quiet: at most a toggle of the encoder's last bit, which is 3.8 N·m of P and D on the
+/// large joints, and the joint stands at the position at which the integral settles.
 fn assert_quiet(arm: &mut Plant, rig: &mut Rig, what: &str) {
     for (j, (torque, position)) in watch(arm, rig, 6000).iter().enumerate() {
         let joint = j + 1;
@@ -78,8 +78,8 @@ fn j41_no_joint_hunts_or_buzzes_in_stiction() {
     }
 }
 
-/// An integral that is never held turns an error below the resolution of the encoder into a limit cycle: the plant of these tests
-/// shows it.
+/// An integral that is never frozen turns an error below the resolution of the encoder into a limit cycle: the plant of
+/// these tests shows it.
 #[test]
 fn j41_an_integral_that_is_never_held_hunts() {
     let mut arm =
@@ -118,7 +118,7 @@ fn j41_a_motion_ends_without_hunting() {
     }
 }
 
-/// A point of a motion of 0.3 rad there (`u` 0 to 1) and back (1 to 2), 2 s each, from where the joints are held.
+/// Returns a point of a motion of 0.3 rad out (`u` 0 to 1) and back (1 to 2), 2 s each, from the hold position.
 fn point(rig: &Rig, u: f64) -> RawPoint {
     let (u, back) = if u > 1.0 { (2.0 - u, -1.0) } else { (u, 1.0) };
     let way = 0.3 * u * u * u * (10.0 + u * (6.0 * u - 15.0));

@@ -24,12 +24,12 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
     model
 }
 
-/// A hand turns `joint` with `push` N·m for 0.6 s, against grease only, and holds the others back: how the brake acts in the
-/// last 0.4 s.
+/// Effect of the brake in the last 0.4 s of a push: a hand turns `joint` with `push` N·m for 0.6 s, against grease
+/// only, and holds the others back.
 struct Braked {
     /// Highest speed, rad/s.
     fastest: f64,
-    /// How often the brake has turned from growing to shrinking or back, by more than 0.2 N·m in a tick.
+    /// Number of changes of the brake between growing and shrinking, by more than 0.2 N·m in a tick.
     turns: u32,
 }
 
@@ -37,7 +37,8 @@ fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
     braked_with(model, rotor, rotor, None, joint, push)
 }
 
-/// The same, but the controller is `given` another rotor inertia than the true one (kg·m²), and another damping (N·m·s/rad).
+/// Like `braked`, but the controller is `given` another rotor inertia than the true one (kg·m²), and another damping
+/// (N·m·s/rad).
 fn braked_with(
     model: &ArmModel,
     given: f64,
@@ -97,7 +98,8 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
     for joint in 3..6 {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
-            // With all the damping that it bears a joint that is pushed swings into its speed, and no longer.
+            // With the largest damping that it bears, a pushed joint swings until it has reached its speed, and no
+            // longer.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
             // 90 1/s times a fifth of 0.05 kg·m² at least, and the brake.
@@ -112,12 +114,12 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
         let push = 0.3 * Config::avena().joints[joint].torque_max;
         let it = braked(&Parameters::avena().model, 0.7, joint, push);
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
-        // A fifth of the rotors bears no more against three tenths of the torque limit.
+        // A fifth of the rotors does not bear more against three tenths of the torque limit.
         assert!((0.4..1.2).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }
 
-/// An arm file that gives no rotor inertia has drives with rotors all the same.
+/// Drives have rotors even if the arm file gives no rotor inertia.
 #[test]
 fn j25_a_joint_is_damped_where_no_rotor_inertia_is_given() {
     for joint in 3..6 {

@@ -72,7 +72,8 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // Fill the store to its last point; one more is refused, and segment 0 of another counts only its own.
+    // Fills the store to its last point. One more is refused, and segment 0 of another trajectory counts only its own
+    // points.
     for s in 0..8 {
         assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
     }
@@ -175,7 +176,7 @@ fn j33_pause_and_resume_follow_the_path() {
             path.push((t.joints[2].set_position, t.joints[5].set_position));
         }
     }
-    // The same with a pause.
+    // The same run with a pause.
     let mut rig = Rig::holding();
     rig.move_along(&points, 1400);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
@@ -214,7 +215,7 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
-/// Also in the last milliseconds, where the ramp would reach beyond the last point.
+/// Pauses and stops in the last milliseconds, too, when the ramp would reach beyond the last point.
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);
@@ -290,7 +291,7 @@ fn j34_commands_follow_the_table() {
             rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
         if trajectory == TrajectoryState::Finish {
-            // A closed path would be needed to run again: put the joints back to the start instead.
+            // A second run would need a closed path: the joints are put back to the start instead.
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig
@@ -358,7 +359,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
     rig.move_along(&motion(100, 10), 301);
     rig.exec(ExecCommand::Pause);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
-    // Somebody leans on it: a little, then too much.
+    // A person leans on the arm: a little, then too much.
     rig.follow = false;
     for (push, answer) in [(0.022, DataStatus::StartPositionMismatch), (-0.004, DataStatus::NoError)] {
         for _ in 0..20 {

@@ -125,7 +125,7 @@ fn j06_masses_and_inertias_reach_their_bounds() {
     assert!(with(|link| link.inertia[4] = -100.0) && !with(|link| link.inertia[4] = -100.1));
 }
 
-/// Friction against the motion is reported as positive; at rest there is no motion, and it is reported with its own sign.
+/// Friction against the motion is reported as positive; at rest, without a motion, it is reported with its own sign.
 #[test]
 fn j06_what_is_refused_is_told_with_its_value() {
     for (velocity, torque, value) in
@@ -140,7 +140,7 @@ fn j06_what_is_refused_is_told_with_its_value() {
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The bound of slow speeds, 100 N·m, is reached at so many steps, of which a sixteenth has sixteen.
+        // The bound of slow speeds, 100 N·m, is reached after `reached` steps; a sixteenth of the velocity limit has sixteen.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");

@@ -3,19 +3,19 @@
 /// Halvings of one curve on the way to its extremum: each takes the hull about four times closer to the curve.
 const DEPTH: usize = 6;
 
-/// Where a curve leaves its bounds.
+/// Place at which a curve leaves its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Leaves {
-    /// Where in the interval, 0..1.
+    /// Place in the interval, 0..1.
     pub at: f64,
-    /// The curve's value there or, where the halvings did not suffice, what it cannot be shown to keep below.
+    /// The curve's value there or, if the halvings did not suffice, the value that it cannot be shown to keep below.
     pub value: f64,
     /// The bound.
     pub bound: f64,
 }
 
-/// The first place found in which the curve leaves `low..=high`. Exact at its ends and wherever it is halved; where `halvings`
-/// are used up, the hull decides, so that nothing passes that leaves the bounds.
+/// Returns the first place found at which the curve leaves `low..=high`. The place is exact at the ends of the curve and at its halving
+/// points; if the `halvings` are used up, the hull decides, so that no curve passes that leaves the bounds.
 pub(super) fn leaves<const N: usize>(
     curve: [f64; N],
     low: f64,
@@ -55,7 +55,7 @@ pub(super) fn leaves<const N: usize>(
     None
 }
 
-/// The control point that is furthest outside, and the bound that it crosses.
+/// Returns the control point that is furthest outside, and the bound that it crosses.
 fn outside<const N: usize>(curve: &[f64; N], low: f64, high: f64) -> Option<(f64, f64)> {
     let lowest = curve.iter().fold(f64::INFINITY, |a, &b| a.min(b));
     let highest = curve.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
@@ -63,7 +63,7 @@ fn outside<const N: usize>(curve: &[f64; N], low: f64, high: f64) -> Option<(f64
     Some((furthest, bound_crossed(furthest, low, high)?))
 }
 
-/// The bound that `value` crosses.
+/// Returns the bound that `value` crosses.
 pub(super) fn bound_crossed(value: f64, low: f64, high: f64) -> Option<f64> {
     if value < low {
         Some(low)
@@ -110,7 +110,7 @@ mod tests {
         }
     }
 
-    /// Or a piece would be left out, and with it what it does.
+    /// Otherwise a piece would be left out, and with it its effect.
     #[test]
     fn j36_at_the_full_depth_the_hull_decides() {
         // Above 1 up to 0.006, less than half of the smallest piece.

@@ -1,15 +1,15 @@
 //! The quick part of the check: bounds on what happens around a point, in single precision and in steps of the wire.
 //!
-//! The control points of an interval (J-32) need the velocity and acceleration of one of its ends only, but for the one in the
-//! middle of the quintic's derivative. So six joints cost a few dozen operations each, and nearly every interval of a real path
-//! passes here. What does not is not refused: it is judged exactly.
+//! The control points of an interval (J-32) need the velocity and acceleration of one of its ends only, but for the one in the middle of
+//! the quintic's derivative. So six joints cost a few dozen operations each, and nearly every interval of a real path passes here. An
+//! interval that does not pass is not refused: it is judged exactly.
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
 use crate::remembered::remembered;
 
-/// What rounding in single precision may add, in steps of the position, and as a share of the speed limit.
+/// Addition by rounding in single precision, in steps of the position, and as a share of the speed limit.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
 /// Highest point of the quintic's derivative over the cubic, per share of way that the velocities leave unexplained.
@@ -67,7 +67,7 @@ impl Screen {
         }
     }
 
-    /// Point `b` and what lies between it and point `a` before it are certainly within every bound.
+    /// Returns `true` if point `b`, and the interval between it and point `a` before it, are certainly within every bound.
     pub fn passes(&self, a: &Steps, b: &Steps) -> bool {
         let (kv, ka) = (self.per_velocity, self.per_acceleration);
         let mut good = true;
@@ -134,7 +134,7 @@ mod tests {
     use crate::check::PathRange;
     use crate::config::Config;
 
-    /// Or what rounding does would let something pass that the exact check refuses.
+    /// Otherwise rounding would let an interval pass that the exact check refuses.
     #[test]
     fn j36_the_screen_keeps_a_distance_to_each_limit_that_is_more_than_its_rounding() {
         let mut config = Config::avena();
@@ -154,7 +154,7 @@ mod tests {
                 assert!(low >= -2.5 / POSITION_STEP - 0.91 && high <= 2.0 / POSITION_STEP + 0.91);
                 let way = f64::from(screen.speed[5]) * POSITION_STEP;
                 assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");
-                // But it is no other limit.
+                // But it is not another limit.
                 assert!(
                     way >= slowest * step * 0.999_99 - 0.2 * POSITION_STEP,
                     "{speed} {friction:?} {step}"

@@ -27,14 +27,15 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// What rounding may do to a position: a step of it, and in the middle of the quintic what a step of the velocity in both points does.
+/// Returns the effect of rounding on a position: a step of it, and in the middle of the quintic the effect of a step of the velocity in
+/// both points.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
     3.141592 / 32767.0 + interpolate(&a, &b, f64::from(step_ms) / 1000.0, 0.5).position[0]
 }
 
-/// The verdict on `b` and on what lies between `a`, the point before it, and `b`.
+/// Returns the verdict on `b` and on the interval between `a`, the point before it, and `b`.
 fn between(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> Result<(), Violation> {
     let check = TrajectoryCheck::new(config, step_ms, None);
     check.behind(1, *a, Passed::default()).take(b)
@@ -59,9 +60,9 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
-/// What is left to the limits of joint 0 around two points, whatever signs their velocities and accelerations have: by how much the
-/// hull of the positions keeps inside (rad, below and above), that of the velocities with the bump of the way that they leave
-/// unexplained less one step (rad/s), and the acceleration of `b` (rad/s²).
+/// Returns the margins to the limits of joint 0 around two points, for any signs of their velocities and accelerations: the margin of the
+/// hull of the positions (rad, below and above), of the hull of the velocities with the bump of the way that they leave unexplained less
+/// one step (rad/s), and of the acceleration of `b` (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
     let [a, b] = [a, b].map(|point| {
@@ -105,8 +106,7 @@ fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// Never passes what the samples see outside; never refuses what keeps a hundredth of the limits and of what happens
-    /// within the interval.
+    /// The check never passes a motion that the samples see outside, and never refuses a motion that keeps a margin of 0.01 to the limits.
     #[test]
     fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
         let config = config();
@@ -127,7 +127,7 @@ proptest! {
         }
     }
 
-    /// What the quick part passes, the exact part passes.
+    /// Each interval that the quick part passes, the exact part passes.
     #[test]
     fn j36_the_screen_passes_nothing_that_the_judge_refuses((step, a, b) in pair()) {
         let mut check = TrajectoryCheck::new(&config(), step, None);
@@ -137,8 +137,8 @@ proptest! {
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
     }
 
-    /// What keeps its whole hull within the limits passes without being judged, and nothing else does: of the cases half have their
-    /// hull within a step of a position limit.
+    /// An interval passes without being judged if and only if its whole hull is within the limits: half of the cases have their hull within
+    /// a step of a position limit.
     #[test]
     fn j36_the_screen_passes_what_has_its_hull_within_the_limits((step, a, b) in pair(), side in 0..4u8) {
         let (config, mut a, mut b) = (config(), a, b);
@@ -228,7 +228,7 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(inside_tables(&inside.speeds, &tables), Ok(()));
     let refused = with(high + 0.001).map_err(|v: Violation| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
-    // Loaded without a table: the same when it is asked later.
+    // Loaded without a table: the result is the same when it is asked later.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, -0.4, low - 0.001, low - 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -236,7 +236,7 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     let later =
         inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
-    // It is the first of the fastest points that is named, in both directions.
+    // The first of the fastest points is named, in both directions.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -253,13 +253,13 @@ fn j36_a_table_that_is_loaded_later_has_to_hold_what_lies_between_the_points() {
         panic!("no table")
     };
     let (low, high) = friction::velocities(&tables[3]);
-    // A third of what the acceleration does within the step is added to the velocity.
+    // A third of the effect of the acceleration within the step is added to the velocity.
     for (step, a) in [(100, 0.6), (300, 0.2)] {
         for (v, a) in [(high - 0.01, a), (high - 0.01, -a), (low + 0.01, -a), (low + 0.01, a)] {
             let later = |a: f64| {
                 let mut check = TrajectoryCheck::new(&config(), step, None);
                 for p in [point(3, 0.0, 0.0, 0.0), point(3, 0.0, v, a)] {
-                    // Whether such a motion keeps its other limits does not matter here.
+                    // The other limits of such a motion do not matter here.
                     let _ = check.take(&p);
                 }
                 inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.limit))
@@ -297,7 +297,8 @@ fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
     assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
 }
 
-/// Friction may be given between two segments. What was loaded before is asked again when it is executed, standstill with it.
+/// Friction may be given between two segments. Points that were loaded before are checked again when the path is executed, including
+/// standstill.
 #[test]
 fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
@@ -362,7 +363,7 @@ fn steps() -> impl Strategy<Value = (u16, u32)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
-    /// A path that keeps to its limits before it is rounded to the wire, and is on one of them for a while or at its end, is no fault.
+    /// A path passes that keeps to its limits before it is rounded to the wire, and is on one of them for a while or at its end.
     #[test]
     fn j36_a_path_that_ends_on_a_limit_passes(
         (step, count) in steps(), limit in -2.0..2.0f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -381,7 +382,7 @@ proptest! {
         prop_assert_eq!(verdict(&config, step, &points), Ok(()));
     }
 
-    /// A joint outside its limits is moved back in, or left where it is, at any speed that its limits allow.
+    /// A joint outside its limits is moved back in, or left at its position, at any speed that its limits allow.
     #[test]
     fn j36_a_path_that_begins_outside_and_goes_inwards_passes(
         (step, count) in steps(), out in 0.0..0.02f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -392,7 +393,7 @@ proptest! {
         prop_assert_eq!(verdict(&config(), step, &points), Ok(()), "{} to {}, step {} {}", from, to, step, count);
     }
 
-    /// It comes no further out in any interval, wherever that is, and by more than rounding may.
+    /// A path that comes further out by more than rounding may is refused, in any interval.
     #[test]
     fn j36_a_path_that_begins_outside_comes_no_further_out(
         (step, count) in steps(), out in 0.002..0.02f64, more in 0.0003..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -444,7 +445,7 @@ fn j36_the_tolerance_ends_with_the_working_area_of_the_drives() {
     for joint in &mut config.joints {
         (joint.position_min, joint.position_max) = (-2.9905, 2.9905);
     }
-    // Of the wire's positions 2.99048 is the last one inside, and 2.99058 is outside by less than a step.
+    // Among the wire's positions 2.99048 is the last one inside, and 2.99058 is outside by less than a step.
     for (raw, inside) in [(31_191, true), (31_192, false)] {
         for sign in [1, -1] {
             for keeps in [true, false] {
@@ -477,24 +478,24 @@ fn j36_a_path_begins_outside_by_the_start_tolerance_at_most() {
 #[test]
 fn j36_a_path_that_has_come_inside_stays_there() {
     let config = config();
-    // In by 10 mrad, out again to where it began.
+    // In by 10 mrad, out again to the position at the start.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.31, 10, 150).into_iter().skip(1));
     let violation = verdict(&config, 10, &points).unwrap_err();
     assert!(violation.point > 150 && violation.quantity == Quantity::Position, "{violation:?}");
     assert!((violation.value - 1.3001).abs() < 2e-4, "{violation:?}");
-    // It may come to the limit as any path may.
+    // The path may come to the limit like any path.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.3, 10, 150).into_iter().skip(1));
     assert_eq!(verdict(&config, 10, &points), Ok(()));
-    // Another joint that never was outside has nothing of it.
+    // A joint that was never outside has no such allowance.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.last_mut().unwrap().position[3] = (1.301 / POSITION_STEP) as i16;
     let violation = verdict(&config, 10, &points).unwrap_err();
     assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
 }
 
-/// Both points are outside, each further in than the one before: what lies between them counts as well.
+/// Both points are outside, each further in than the one before: the interval between them counts as well.
 #[test]
 fn j36_between_two_points_a_path_comes_no_further_out_either() {
     let after = |step, a: RawPoint, b: RawPoint| {
@@ -517,7 +518,7 @@ fn j36_between_two_points_a_path_comes_no_further_out_either() {
     assert_eq!(after(400, a, b), Ok(()));
 }
 
-/// Segments are checked one after the other: what the first one has left is known from its last point.
+/// Segments are checked one after the other: the state after the first one is known from its last point.
 #[test]
 fn j36_a_path_from_outside_goes_on_in_the_next_segment() {
     let config = config();

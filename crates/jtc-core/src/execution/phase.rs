@@ -4,12 +4,12 @@ use crate::path::PathClock;
 use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::{JOINTS, TrajectoryState};
 
-/// Where in Operate the controller is.
+/// Phase of the controller in Operate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Phase {
-    /// Waits until every joint is enabled, and for how long it has, ms.
+    /// Waits until every joint is enabled; `elapsed_ms`: time waited so far, ms.
     Waiting { elapsed_ms: u32 },
-    /// The approach: from where the arm is held to the first point, or to the one where the path was paused, in `length_ms`. Its time runs
+    /// The approach: from the held position to the first point, or to the point at which the path was paused, in `length_ms`. Its time runs
     /// on a clock of its own; `leave`: the state that follows at standstill.
     Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
@@ -56,15 +56,15 @@ impl Remembered for Phase {
 }
 
 impl Phase {
-    /// Nothing was waited for yet.
+    /// Begin of an execution, before any wait.
     pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
-    /// Sets out from where the arm is held, for so long.
+    /// Creates an approach from the held position, for this time.
     pub fn approach(from: [f64; JOINTS], length_ms: f64) -> Self {
         Self::Approaching { from, length_ms, clock: PathClock::start(1.0), leave: None }
     }
 
-    /// The control mode.
+    /// Returns the control mode.
     pub fn mode(&self) -> ControlMode {
         match self {
             Self::Waiting { .. } => ControlMode::Hold,
@@ -73,12 +73,12 @@ impl Phase {
         }
     }
 
-    /// Joints are still to be enabled.
+    /// Returns `true` if joints are still to be enabled.
     pub fn waits(&self) -> bool {
         matches!(self, Self::Waiting { .. })
     }
 
-    /// In motion, and no Pause or Stop has been accepted.
+    /// Returns `true` if the arm is in motion, and no Pause or Stop has been accepted.
     pub fn goes_on(&self) -> bool {
         match self {
             Self::Approaching { clock, leave, .. } => leave.is_none() && clock.time > 0.0,
@@ -87,7 +87,7 @@ impl Phase {
         }
     }
 
-    /// Rate of the time in which the arm moves: of the approach, or of the path.
+    /// Returns the rate of the time in which the arm moves: of the approach, or of the path.
     pub fn rate(&self, path: &PathClock) -> f64 {
         match self {
             Self::Approaching { clock, .. } => clock.rate,
@@ -95,7 +95,7 @@ impl Phase {
         }
     }
 
-    /// The state that an accepted Pause or Stop leads to.
+    /// Returns the state that an accepted Pause or Stop leads to.
     pub fn leave(&self) -> Option<TrajectoryState> {
         match self {
             Self::Approaching { leave, .. } | Self::Running { leave } => *leave,

@@ -10,14 +10,14 @@ fn braking(state: ControllerState, trajectory: TrajectoryState) -> Controller<[R
     controller
 }
 
-/// Sets out from `position` (rad), where the arm is held.
+/// Begins an approach from `position` (rad), at which the arm is held.
 fn begin_approach(controller: &mut Controller<[RawPoint; 4]>, position: [f64; JOINTS]) {
     controller.motion.set.begin_at(&position);
     let point = controller.path_point();
     controller.phase = controller.approach_to(&point).expect("an approach");
 }
 
-/// What braking excuses (J-43) it does not excuse for longer than the arm moves.
+/// Braking excuses errors (J-43) only as long as the arm moves.
 #[test]
 fn j33_braking_ends_where_the_arm_stands() {
     let mut stands = braking(ControllerState::HoldPos, TrajectoryState::Pause);
@@ -192,7 +192,7 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     }
 }
 
-/// On the approach to point 0 from this far, a Stop or Pause after so many ticks.
+/// On the approach to point 0 from this far, a Stop or Pause comes after `after_ms`.
 #[test]
 fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point() {
     for (way, after_ms) in [(0.02, 1), (0.02, 60), (0.02, 150), (-0.3, 60), (0.49, 60), (0.49, 250)] {
@@ -220,11 +220,11 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // At most what is left; and where a path would stop that still gets faster for half of the ramp.
+            // At most the rest of the way; and at most the way of a path that stops although it still gets faster for half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
-            // Nothing has moved that is not on its way.
+            // Joints that are not on their way have not moved.
             assert_eq!(controller.motion.set.point.position[1..], [0.0; JOINTS - 1]);
         }
     }
@@ -277,7 +277,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     }
 }
 
-/// What a finished path has left behind is no motion to hold back: a jog that is overloaded ends.
+/// A finished path is not a motion to hold back: a jog that is overloaded ends.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);

@@ -1,9 +1,9 @@
-//! What extension requests return: a frame that waits on each line (J-50).
+//! Answers to extension requests: a frame that waits on each line (J-50).
 use jtc_wire::{ANSWER_MAX, Answer};
 
 use crate::HOST_LINES;
 
-/// One line.
+/// Answer on one line.
 #[derive(Clone, Debug)]
 struct Line {
     /// Bytes that wait.
@@ -27,7 +27,7 @@ impl Answers {
         Self { lines, sent: 0, sent_len: 0 }
     }
 
-    /// An answer on this line has not been sent.
+    /// Returns `true` if an answer on this line has not been sent.
     pub fn waits(&self, line: usize) -> bool {
         self.lines.get(line).is_some_and(|line| line.len > 0)
     }
@@ -39,7 +39,7 @@ impl Answers {
         }
     }
 
-    /// The line whose answer is to be sent now, one after the other.
+    /// Returns the line whose answer must be sent now; the lines take turns.
     pub fn send(&mut self) -> Option<usize> {
         for offset in 1..=HOST_LINES {
             let n = (self.sent + offset) % HOST_LINES;
@@ -51,7 +51,7 @@ impl Answers {
         None
     }
 
-    /// The frame of that line.
+    /// Returns the frame of that line.
     pub fn frame(&self) -> &[u8] {
         self.lines.get(self.sent).and_then(|line| line.frame.get(..self.sent_len)).unwrap_or(&[])
     }

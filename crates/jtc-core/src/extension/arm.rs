@@ -1,4 +1,4 @@
-//! The arm as one thing (J-52, J-54): loaded, read, hashed, stored.
+//! The arm as a unit (J-52, J-54): loaded, read, hashed, stored.
 use jtc_wire::{Answer, ArmImage, DataStatus, FrictionImage, Hash, PAGE_BYTES, RawPoint, StoreState};
 
 use super::Extensions;
@@ -13,20 +13,20 @@ use crate::settings;
 pub(super) const IMAGE_PER_TICK: usize = 256;
 
 impl Extensions {
-    /// The arm in use has changed.
+    /// Forgets the hash, because the arm in use has changed.
     pub fn forget_hash(&mut self) {
         (self.hash, self.hashed) = (None, (0, Hash::new()));
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// The arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
-    /// parameters stay missing. For the board to call before the first tick. False when it is no arm that this controller takes: its
-    /// settings stay as they were, and the UseDefault frames are refused until an arm is stored.
+    /// Loads the arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
+    /// parameters stay missing. The board calls this before the first tick. Returns `false` if the image is not an arm that this controller
+    /// takes: its settings stay as they were, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // Its numbers are taken where they are used, not tried on the stack, which is no larger than it has to be.
+        // Its numbers are taken into their place of use, not tried on the stack, which is as small as possible.
         let loaded = arm.zip(config).is_some_and(|(arm, config)| {
             let taken = takes(&mut self.parameters, &arm, &config);
             if taken {
@@ -40,24 +40,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !loaded {
             self.parameters.begin(&self.config);
         }
-        // The host has to ask for them.
+        // The host must ask for them.
         self.parameters.forget();
         self.extensions.forget_hash();
         self.extensions.unusable = !loaded;
         loaded
     }
 
-    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] asks for it; empty where there is none.
+    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] asks for it; empty without a stored arm.
     pub fn stored_arm(&self) -> &[u8] {
         self.extensions.stored.bytes()
     }
 
-    /// What has become of the stored arm, and its number: for the board to call when that changes.
+    /// Sets the state of the stored arm, and its number; the board calls this when the state changes.
     pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // After the next start it would be another one: until then there is none.
+            // After the next start it would be another arm: until then no arm is stored.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }
@@ -67,7 +67,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
     }
 
-    /// Another part of the hash of the arm, where it is not known.
+    /// Computes another part of the hash of the arm, unless the hash is known.
     pub(crate) fn hash_arm(&mut self) {
         if self.extensions.hash.is_none() {
             self.hash_more();
@@ -91,7 +91,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
-    /// J-54: first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
+    /// Stores the arm (J-54): first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
     pub(super) fn store_arm(&mut self) -> SliceOutcome {
         let offset = match self.slice_progress {
             SliceProgress::Image(offset) => offset,
@@ -121,7 +121,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 }
 
-/// Takes gains, model and friction of an arm; false when they are not such as these settings take.
+/// Takes gains, model and friction of an arm; returns `false` if these settings do not take them.
 fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
     let friction = match arm.friction {
         FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),

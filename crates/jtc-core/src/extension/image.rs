@@ -1,4 +1,4 @@
-//! The arm in use as an image: one arm as one thing, for reading it back, hashing and storing it (J-52, J-54).
+//! The arm in use as an image: the arm as a unit, for reading it back, hashing and storing it (J-52, J-54).
 use jtc_wire::field::image as field;
 use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
 
@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::received::ReceivedParameters;
 use crate::settings;
 
-/// What an image is made of.
+/// Parts of an image.
 pub(crate) struct ImageSource<'a> {
     pub config: &'a Config,
     pub parameters: &'a ReceivedParameters,
@@ -14,23 +14,23 @@ pub(crate) struct ImageSource<'a> {
 }
 
 impl ImageSource<'_> {
-    /// Where the settings begin.
+    /// Returns the offset of the settings.
     fn settings(&self) -> usize {
         let table = self.parameters.friction_is_table;
         field::FRICTION + if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN }
     }
 
-    /// Where the name begins: what is in front of it decides how the arm moves.
+    /// Returns the offset of the name: the bytes before it decide how the arm moves.
     fn name(&self) -> usize {
         self.settings() + VALUE_LEN * settings::count(true)
     }
 
-    /// Bytes of the image.
+    /// Returns the number of bytes of the image.
     pub fn len(&self) -> usize {
         self.name() + NAME_LEN
     }
 
-    /// Reads the image from byte `offset` on; returns how many bytes there were.
+    /// Reads the image from byte `offset` on; returns the number of bytes.
     pub fn read(&self, offset: usize, out: &mut [u8]) -> usize {
         let (settings, name) = (self.settings(), self.name());
         let mut at = offset;
@@ -59,7 +59,7 @@ impl ImageSource<'_> {
         [a, b, c, d, field::VERSION, self.parameters.friction_is_table.into(), high, low]
     }
 
-    /// Number `i` of gains, model and friction.
+    /// Returns number `i` of gains, model and friction.
     fn float(&self, i: usize) -> f32 {
         const MODEL: usize = (field::MODEL.start - field::PID.start) / 4;
         const FRICTION: usize = (field::FRICTION - field::PID.start) / 4;
@@ -70,7 +70,7 @@ impl ImageSource<'_> {
         }
     }
 
-    /// Hashes up to `count` bytes from `offset` on; `None` when that was all.
+    /// Hashes up to `count` bytes from `offset` on. Returns the next offset and the hash.
     pub fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
         let mut bytes = [0; 256];
         let count = count.min(self.name().saturating_sub(offset));
@@ -79,7 +79,7 @@ impl ImageSource<'_> {
         (offset + read, hash.update(slice.get(..read).unwrap_or(&[])))
     }
 
-    /// All that counts was hashed.
+    /// Returns `true` if all bytes that count were hashed.
     pub fn hashed(&self, offset: usize) -> bool {
         offset >= self.name()
     }
@@ -96,7 +96,7 @@ impl Output<'_> {
         self.filled < self.out.len()
     }
 
-    /// As much of `bytes` from `from` on as there is room for; returns how much.
+    /// Writes as much of `bytes` from `from` on as fits; returns the number of bytes.
     fn part(&mut self, bytes: &[u8], from: usize) -> usize {
         let room = self.out.get_mut(self.filled..).unwrap_or(&mut []);
         let rest = bytes.get(from..).unwrap_or(&[]);
@@ -109,7 +109,7 @@ impl Output<'_> {
     }
 }
 
-/// The arm that the UseDefault frames mean, where there is one beside that which is built in: an image.
+/// Image of the arm that the UseDefault frames mean, if there is one besides the built-in arm.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredArm {
     bytes: [u8; IMAGE_MAX],
@@ -121,27 +121,27 @@ impl StoredArm {
         Self { bytes: [0; IMAGE_MAX], len: 0 }
     }
 
-    /// Its bytes.
+    /// Returns its bytes.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Its parts.
+    /// Returns its parts.
     pub fn arm(&self) -> Option<ArmImage<'_>> {
         ArmImage::parse(self.bytes())
     }
 
-    /// There is one.
+    /// Returns `true` if an arm is stored.
     pub fn is_there(&self) -> bool {
         self.len > 0
     }
 
-    /// There is none any more.
+    /// Removes the stored arm.
     pub fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// Takes another in its place; one that is too long leaves none.
+    /// Takes another image in its place; an image that is too long leaves none.
     pub fn set(&mut self, image: &[u8]) {
         self.len = match self.bytes.get_mut(..image.len()) {
             Some(place) => {
@@ -152,7 +152,7 @@ impl StoredArm {
         };
     }
 
-    /// Takes a part of the arm in use; returns where the next part begins. Until all of it is here there is none.
+    /// Takes a part of the arm in use; returns the offset of the next part. Until all parts are here no arm is stored.
     pub fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
         self.len = 0;
         let end = (offset + count).min(IMAGE_MAX);

@@ -246,7 +246,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     assert_eq!(Hash::of_image(&bench.image()), table);
 }
 
-/// What is asked while an answer waits is refused rather than lost.
+/// A request is refused while an answer waits, so that no answer is lost.
 #[test]
 fn j50_a_second_request_waits_for_the_first_answer() {
     let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! Gains against the inertia that they need, and what becomes of those on trial.
+//! Gains against the inertia that they need, and the result of gains on trial.
 use proptest::prelude::*;
 
 use super::*;
@@ -25,7 +25,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
         }
         assert!(poses[..n].iter().all(|other| other != pose), "pose {n}");
     }
-    // They fill the range of the first joint evenly: a quarter of them in each quarter.
+    // The poses fill the range of the first joint evenly: a quarter of them in each quarter.
     let (low, high) = config.position_range(0);
     for quarter in 0..4 {
         let inside = |q: f64| ((q - low) / (high - low) * 4.0) as i32 == quarter;
@@ -33,7 +33,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
     }
 }
 
-/// What docs/protocol-jtc.md says of the default arm.
+/// Values that docs/protocol-jtc.md gives for the default arm.
 #[test]
 fn j71_the_default_arm_feels_what_is_said() {
     let felt = least_felt_inertia(&Parameters::avena().model, &Config::avena());
@@ -70,7 +70,7 @@ fn j71_the_arm_bears_its_gains_and_not_twice_as_much() {
     assert!(!felt.bears(&given(), &Config { delay_ticks: 7, ..config.clone() }));
 }
 
-/// Without a rotor that of the known drives counts.
+/// Without a rotor inertia, that of the known drives counts.
 #[test]
 fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
     let model = Parameters::avena().model;
@@ -103,7 +103,7 @@ fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
 }
 
 proptest! {
-    /// Gains come in without a step, whatever came before them: no gain changes by more than a two-hundredth of the way in a millisecond.
+    /// Gains come in without a step, after any gains: no gain changes by more than a two-hundredth of the way in a millisecond.
     #[test]
     fn j71_gains_come_in_over_half_a_second(factors in prop::array::uniform3(0.05..1.5f64), again_ms in 0..900u16) {
         let [before, second, third] = factors.map(scaled);
@@ -145,7 +145,7 @@ proptest! {
     }
 }
 
-/// What becomes of gains whose arm fails after so many ms, with an unstable loop of joint 2 or otherwise.
+/// Returns the gains of an arm that fails after `ms`, with an unstable loop of joint 2 or otherwise.
 fn after(ms: u16, unstable: bool) -> Option<(StopKind, [PidGains; JOINTS])> {
     let mut trial = Trial::default();
     trial.begin(&scaled(0.5), &given());
@@ -184,7 +184,7 @@ fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     }
 }
 
-/// Somebody gives the gains again that held: they have nothing to prove.
+/// A host gives the gains again that held: they need no trial.
 #[test]
 fn j71_gains_that_held_are_not_on_trial() {
     let mut trial = Trial::default();

@@ -1,16 +1,16 @@
-//! Stop and Pause, which act before the frames in front of them have had their turn (J-04).
+//! Priority of Stop and Pause, which act before the frames in front of them have had their turn (J-04).
 use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 
 use crate::TrajectoryState;
 use crate::remembered::remembered;
 
-/// What became of the urgent commands of a line whose frames have not had their turn.
+/// State of the urgent commands of a line whose frames have not had their turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Overtaking {
     /// Stops and Pauses that were accepted and have no record yet.
     pub(super) stops: u8,
     pub(super) pauses: u8,
-    /// An Execute was cancelled by them.
+    /// The Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
     /// A Stop has arrived on either line, accepted or not: an upload that was begun before it is dropped (J-30). Holds until the first
     /// event that was received after it; the record of an earlier Stop does not end it.
@@ -20,13 +20,13 @@ pub(crate) struct Overtaking {
 remembered!(Overtaking { stops, pauses, cancelled, stopped });
 
 impl Overtaking {
-    /// So many urgent commands were accepted.
+    /// Counts urgent commands that were accepted.
     pub fn accept(&mut self, command: UrgentCommand, count: u8) {
         let accepted = self.accepted(command);
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Data status of an execution command that an urgent one has overtaken. A Stop or a Pause has acted: it was accepted, or
+    /// Returns the data status of an execution command that an urgent one has overtaken. A Stop or a Pause has acted: it was accepted, or
     /// it has cancelled an Execute, and the `trajectory` is in the commanded state.
     pub fn overtaken(&mut self, exec: ExecCommand, trajectory: TrajectoryState) -> Result<(), DataStatus> {
         let Some(command) = UrgentCommand::from_exec(exec) else {

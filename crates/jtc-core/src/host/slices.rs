@@ -1,7 +1,7 @@
-//! Frames that are too long for one tick: how far one has been executed, and what became of a slice of it (J-06).
+//! Frames that are too long for one tick: progress of such a frame, and outcome of a slice of it (J-06).
 use jtc_wire::DataStatus;
 
-/// How far a long frame has been executed, a slice in each tick.
+/// Progress of a long frame, a slice in each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SliceProgress {
     #[default]

@@ -1,4 +1,4 @@
-//! What single commands of the host do, and how much of a tick they take (J-04, J-21, J-23, J-36).
+//! Effects of single commands of the host, and their share of a tick (J-04, J-21, J-23, J-36).
 extern crate std;
 use std::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::{Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;
 
-/// Where a command comes from that is carried out at once.
+/// Origin of a command that is carried out at once.
 const ON_LINE_0: HostEvent<'_> =
     HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Noise(Response::NONE) };
 
@@ -21,7 +21,7 @@ fn holding() -> Bench {
     controller
 }
 
-/// How many of three frames like this are done in one tick.
+/// Returns the number of three such frames that are done in one tick.
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
@@ -40,12 +40,12 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
         (ClearCurrentErrors, &[1, 0x7F, 0, 0], 3),
         (ResetCanDevices, &[0x40, 0, 0, 0], 1),
         (PidParamUseDefault, &[], 1),
-        // What the state forbids has cost nothing.
+        // A command that the state forbids has cost nothing.
         (TrajSetExecStatus, &[3, 0, 0, 0], 3),
     ] {
         assert_eq!(done_of_three(&mut holding(), frame_type, body), done, "{frame_type:?} {body:?}");
     }
-    // Where the state of the controller changes, the next command depends on it.
+    // If the state of the controller changes, the next command depends on it.
     let mut teaching = holding();
     teaching.teaching = true;
     assert_eq!(done_of_three(&mut teaching, TeachingModeDisable, &[]), 1);

@@ -1,4 +1,4 @@
-//! Segments of a trajectory: which are taken (J-30), checked and copied in slices (J-36).
+//! Segments of a trajectory: accepted (J-30), checked and copied in slices (J-36).
 use jtc_wire::{Command, DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
@@ -15,7 +15,7 @@ const COPY_TICKS: usize = 10;
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
-/// What a line is to the upload that was begun on it last.
+/// State of a line for the upload that was begun on it last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LineUpload {
     /// Its segment 0 came on a plain line (J-51). `None` before the first, and after the Execute of one that did not.
@@ -25,7 +25,7 @@ pub(crate) struct LineUpload {
 remembered!(LineUpload { plain });
 
 impl LineUpload {
-    /// Whether the record of a `command` has plain words: as the segment 0 of its upload has, which a segment 0 decides.
+    /// Returns `true` if the record of a `command` has plain words, as decided by the segment 0 of its upload.
     pub fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
         match command {
             Command::Trajectory(segment) if segment.segment == 0 => *self.plain.insert(plain),
@@ -36,25 +36,26 @@ impl LineUpload {
         }
     }
 
-    /// A trajectory is executed. Another client that executes it once more is one that has not shown yet what it knows.
+    /// Takes note that a trajectory is executed. Another client that executes it once more has not shown yet what it knows.
     pub fn executed(&mut self) {
         self.plain = self.plain.filter(|plain| *plain);
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
+    /// Takes a segment (J-30, J-36): all points are checked before the first is copied, so that a refused segment changes nothing.
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // Its host repeats it until it is taken, and forwards no Stop meanwhile. Refused where it has stopped in this tick.
+            // Its host repeats the segment until it is taken, and forwards no Stop meanwhile. The segment is refused in the tick of this
+            // Stop.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
             // Also in the middle of a segment: the change of state has cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // It is older than a Stop that has acted.
+        // The segment is older than a Stop that has acted.
         let stopped =
             received.overtaken && self.overtaking.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {
@@ -74,7 +75,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Ok(()) => {
                     self.begin_check(segment);
                     match self.store.refused().filter(|_| !first) {
-                        // One is enough, and the first one is kept.
+                        // A single violation is enough, and the first one is kept.
                         Some(violation) => self.take_refused(segment, violation, stopped),
                         None => self.check_points(segment, 0, received.plain, stopped),
                     }
@@ -83,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Segment 0 begins a trajectory, others go on behind what was received.
+    /// Begins the check: segment 0 begins a trajectory, other segments go on after the received ones.
     fn begin_check(&mut self, segment: &Segment<'_>) {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
@@ -121,7 +122,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// The trajectory breaks J-36, and its host, on a plain line, survives no refused segment: it is taken, and is not executed.
+    /// Takes a segment of a trajectory that breaks J-36, whose host, on a plain line, survives no refused segment: the trajectory is not
+    /// executed.
     fn take_refused(&mut self, segment: &Segment<'_>, violation: Violation, stopped: bool) -> SliceOutcome {
         let outcome = self.begin_copy(segment, true, stopped);
         self.violation = Some(violation);

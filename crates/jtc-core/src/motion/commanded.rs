@@ -1,9 +1,9 @@
-//! Set values of the last ticks, so that a measurement is compared with the one of its own time (J-62).
+//! Set values of the last ticks, so that a measurement is compared with the set value of its own time (J-62).
 //!
-//! A measurement is late: the drive had read its encoder before it received the Move that it answered, and what the controller
-//! commands in answer to that acts later still. By this *delay* ([`Config::delay_ticks`](crate::Config)) the position that was
-//! commanded is looked up that a joint which follows exactly would measure now: the *due* one. What is left between the two is an
-//! error of the joint, and not the way that it has gone since.
+//! A measurement is late: the drive had read its encoder before it received the Move that it answered, and a command in answer to the
+//! measurement acts later still. The *due* position is the position that was commanded this *delay*
+//! ([`Config::delay_ticks`](crate::Config)) ago; a joint that follows exactly would measure it now. The difference between the measured and
+//! the due position is an error of the joint, not the distance that the joint has moved since.
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::remembered::remembered;
@@ -19,45 +19,45 @@ pub(crate) struct Commanded {
     position: [[f64; JOINTS]; SLOTS],
     /// rad/s.
     velocity: [[f64; JOINTS]; SLOTS],
-    /// Slot of the present tick; it wraps around.
+    /// Slot of the present tick; the number wraps around.
     now: u8,
 }
 
 remembered!(Commanded { position, velocity, now });
 
 impl Commanded {
-    /// The oldest set values that are kept, ticks ago.
+    /// Age of the oldest set values that are kept, ticks.
     pub const OLDEST: u8 = SLOTS as u8 - 1;
 
-    /// The next tick begins.
+    /// Begins the next tick.
     pub fn next_tick(&mut self) {
         self.now = self.now.wrapping_add(1);
     }
 
-    /// The set values of the present tick, as often as it changes them.
+    /// Stores the set values of the present tick, each time that the tick changes them.
     pub fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
     }
 
-    /// Positions (rad) that were commanded so many ticks ago: as many as there are slots, less one, at most.
+    /// Returns the positions (rad) that were commanded `ticks` ago, at most [`Self::OLDEST`].
     pub fn position(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.position[self.slot(ticks)]
     }
 
-    /// Velocities (rad/s) alike.
+    /// Returns the velocities (rad/s) that were commanded `ticks` ago.
     pub fn velocity(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.velocity[self.slot(ticks)]
     }
 
-    /// Velocities (rad/s) that are due in the measurement of this tick, before its set values are known: those of the last one at the
-    /// latest.
+    /// Returns the velocities (rad/s) that are due in the measurement of this tick, before its set values are known: at the latest those of
+    /// the last tick.
     pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// A joint begins anew: as if it had been commanded to move at `velocity` (rad/s) for ever, so as to be at `position` (rad) so
-    /// many ticks ago. What is measured there is where it is due then, whatever the delay, and in the ticks that follow.
+    /// Restarts a joint as if it had always been commanded to move at `velocity` (rad/s), and to be at `position` (rad) `ticks` ago. A
+    /// measurement of that position is then due, for any delay, and so are the measurements of the ticks that follow.
     pub fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
@@ -68,12 +68,12 @@ impl Commanded {
         }
     }
 
-    /// All joints begin anew, at rest.
+    /// Restarts all joints at rest.
     pub fn rest(&mut self, position: &[f64; JOINTS]) {
         (self.position, self.velocity) = ([*position; SLOTS], [[0.0; JOINTS]; SLOTS]);
     }
 
-    /// The set positions of a joint have sagged by `way` (rad): that is no motion, they have always been there.
+    /// Shifts all stored set positions of a joint that has sagged by `way` (rad): a sag is not a motion, so the older positions shift, too.
     pub fn shift(&mut self, joint: usize, way: f64) {
         for positions in &mut self.position {
             if let Some(position) = positions.get_mut(joint) {
@@ -101,7 +101,7 @@ mod tests {
     }
 
     proptest! {
-        /// Those of so many ticks ago are found again, wherever the ring begins, also where a tick puts them twice.
+        /// Set values of earlier ticks are found again for any start of the ring, also if a tick stores them twice.
         #[test]
         fn j62_the_last_set_values_are_kept(start in any::<u8>(), values in prop::collection::vec(-3.0..3.0f64, 8..300)) {
             let mut commanded = Commanded { now: start, ..Commanded::default() };
@@ -117,7 +117,8 @@ mod tests {
             }
         }
 
-        /// Where a joint is measured it is due, now and, if it goes on as it does, in the ticks that follow; other joints are as they were.
+        /// The measured position of a joint is due now and, if the joint keeps its velocity, in the ticks that follow. Other joints do not
+        /// change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -145,7 +146,7 @@ mod tests {
         }
     }
 
-    /// What sags has been there all the time, as in the errors that the PID controller remembers.
+    /// A sag applies to all stored positions, as in the errors that the PID controller remembers.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

@@ -15,49 +15,50 @@ use crate::teach::{LedJoint, Taught};
 use crate::yielding::{Joint, Yield, Yielded};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed below which what the integral finds in motion may be friction that the model has wrong, rad/s: no load is learned from it.
+/// Speed, rad/s, below which the torque that the integral finds in motion may be friction that the model has wrong: no load is learned from
+/// it.
 const CREEPS: f64 = 0.05;
 
-/// Share of a torque limit below which friction of the joint holds what is missing beside the load found.
+/// Share of a torque limit below which friction of the joint holds the torque that is missing besides the load found.
 const LITTLE: f64 = 0.04;
 
-/// Which parts of the control law act: the control mode.
+/// Control mode: the parts of the control law that act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ControlMode {
     /// Gravity and PID.
     Hold,
     /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration.
     Follow,
-    /// The same while the arm approaches the path. The limits of the path do not apply: the approach begins at the measured
-    /// position.
+    /// As `Follow`, while the arm approaches the path. The limits of the path do not apply: the approach begins at the measured position.
     Approach,
-    /// An arm that a hand has led comes to rest and is held: as `Hold`, with friction and inertia at the commanded velocity and acceleration.
+    /// An arm that a hand has led comes to rest and is held: as `Hold`, with friction and inertia at the commanded velocity and
+    /// acceleration.
     Rest,
-    /// Gravity, and what lets a hand lead the arm (J-25).
+    /// Gravity, and the torques that let a hand lead the arm (J-25).
     Teach,
 }
 
 impl ControlMode {
-    /// The arm is held, or comes to be.
+    /// Returns `true` if the arm is held, or comes to rest to be held.
     pub(crate) fn holds(self) -> bool {
         matches!(self, Self::Hold | Self::Rest)
     }
 
-    /// The commanded velocity and acceleration act.
+    /// Returns `true` if the commanded velocity and acceleration act.
     pub(crate) fn commands_motion(self) -> bool {
         self.moves() || self == Self::Rest
     }
 
-    /// A motion is commanded.
+    /// Returns `true` if a motion is commanded.
     pub(crate) fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
 }
 
-/// Longest time that the integral takes to give back what it had found for a payload that is given, ms.
+/// Longest time in which the integral gives back the torque that it had found for a payload that is now configured, ms.
 const UNWINDS_MS: u16 = 3_000;
 
-/// What a tick of the control law is given.
+/// Inputs of a tick of the control law.
 pub(crate) struct LawInputs<'a> {
     pub mode: ControlMode,
     /// The arm brakes with all the torque there is (J-33).
@@ -89,7 +90,7 @@ pub(crate) struct ControlLaw {
     /// Joints that yield (J-68, J-70).
     yields: [Option<Yield>; JOINTS],
     yielded: Yielded,
-    /// What each joint carries and the model lacks.
+    /// Load that each joint carries and the model lacks.
     loads: [Load; JOINTS],
     /// The joint whose load is observed in this tick.
     observed: u8,
@@ -100,7 +101,7 @@ pub(crate) struct ControlLaw {
 remembered!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms });
 
 impl ControlLaw {
-    /// No torque is remembered.
+    /// Forgets all torques.
     pub fn release(&mut self) {
         let Self { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
         (*unwinds_ms, *observed) = (0, 0);
@@ -113,24 +114,25 @@ impl ControlLaw {
         *loads = Default::default();
     }
 
-    /// The control mode changes among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model (J-44).
+    /// Prepares a change of the control mode among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model
+    /// (J-44).
     pub fn change_mode(&mut self) {
         self.transfer.change_mode();
     }
 
-    /// The same, without any step: the torque that decelerates an arm is part of the model's afterwards.
+    /// Like [`Self::change_mode`], without any step: the torque that decelerates an arm is part of the model's torque afterwards.
     pub fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
-    /// The model changes under the holding arm: bumpless transfer without any step.
+    /// Prepares a change of the model while the arm is held: bumpless transfer without any step.
     pub fn change_model(&mut self) {
-        // What was missing was missing in the last one, and the integral has to give it back.
+        // The missing torque was missing in the last model, and the integral must give it back.
         self.payload_comes();
         self.transfer.change_model();
     }
 
-    /// The gains become these: the integral keeps what torque it can, and what it cannot is blended out.
+    /// Changes the gains: the integral keeps the torque that it can, and the rest is blended out.
     pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         for j in 0..JOINTS {
             if !self.yields(j) {
@@ -140,7 +142,7 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// These gains hold what is held now (J-71).
+    /// Returns `true` if these gains hold the torque that is held now (J-71).
     pub fn hold_on(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         let holds = |j: usize| {
             let PidTorque { p, i, .. } = self.torque[j].pid;
@@ -149,12 +151,12 @@ impl ControlLaw {
         (0..JOINTS).all(holds)
     }
 
-    /// Forgets the loads: each joint has to find what it carries again.
+    /// Forgets the loads: each joint must find its load again.
     fn forget_loads(&mut self) {
         self.loads.iter_mut().for_each(Load::forget);
     }
 
-    /// Whatever comes next begins at rest, without a position error.
+    /// Resets the position controllers for a start at rest, without a position error, and forgets the loads.
     pub fn begin(&mut self) {
         for pid in &mut self.pid {
             pid.reset(0.0);
@@ -162,22 +164,22 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Joints that are not held any more, or not yet, begin anew.
+    /// Resets joints that have ended their position hold, or have not begun it.
     pub fn latch(&mut self, latched: &Latched) {
         for j in 0..JOINTS {
             if !latched.held[j] {
                 self.pid[j].reset(0.0);
                 self.loads[j].forget();
                 self.yields[j] = None;
-                // It has no integral that could give anything back.
+                // The joint has no integral that could give torque back.
                 self.unwinds_ms = 0;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// A joint yields from the next tick on, or lowers its load. `set`: where it was commanded to, rad; `inertia`: what it moves, kg·m²; `led`:
-    /// it comes to rest out of Teaching.
+    /// Makes a joint yield, or lower its load, from the next tick on. `set`: position that it was commanded to, rad; `inertia`: inertia
+    /// that it moves, kg·m²; `led`: the joint comes to rest after Teaching.
     // Inlined, so that its index is known to be that of a joint.
     #[inline(always)]
     pub fn begin_yield(
@@ -195,11 +197,11 @@ impl ControlLaw {
             }
             return;
         }
-        // What was commanded, not what was computed, is what the joint lets go of.
+        // The joint lets go of the commanded torque, not of the computed torque.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // The integral of a joint that was pushed has not found a load; that of one that was led has what Teaching carried.
+        // The integral of a joint that was pushed has not found a load; that of a joint that was led has the load that Teaching carried.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -211,43 +213,43 @@ impl ControlLaw {
         self.yields[joint] = Some(Yield::begin(lowers, stays, set, inertia, load));
     }
 
-    /// Whether the joint yields, or lowers a load.
+    /// Returns `true` if the joint yields, or lowers a load.
     pub fn yields(&self, joint: usize) -> bool {
         self.yields[joint].is_some()
     }
 
-    /// Whether any joint does.
+    /// Returns `true` if any joint yields, or lowers a load.
     pub fn any_yields(&self) -> bool {
         self.yields.iter().any(Option::is_some)
     }
 
-    /// A joint yields, and is not calm yet.
+    /// Returns `true` if a joint yields and is not calm yet.
     pub fn is_yielding(&self) -> bool {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
-    /// The host ends the reaction: joints that are calm are held again.
+    /// Ends the reaction for the host: joints that are calm are held again.
     pub fn end_yields(&mut self) {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
-    /// Drags the spring of a joint that yields along. Returns where it pulls to, rad; `None` for a joint that does not yield.
+    /// Drags the spring of a yielding joint along. Returns the position to which the spring pulls, rad; `None` if the joint does not yield.
     pub fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
 
-    /// Torque that the joint carries and the model lacks, N·m.
+    /// Returns the torque that the joint carries and the model lacks, N·m.
     pub fn load(&self, joint: usize) -> f64 {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
-    /// Torque by which the control law corrects that of the model and of the load, N·m: what a push has against it.
+    /// Returns the torque that corrects those of the model and of the load, N·m: the torque that opposes a push.
     pub fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))
     }
 
-    /// Ends the yield of joints that are calm. Returns them: they are held where they are.
+    /// Ends the yield of joints that are calm. Returns those joints: they are held at their present positions.
     pub fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
@@ -264,11 +266,11 @@ impl ControlLaw {
         ended
     }
 
-    /// What every joint that is held carries is known: Teaching can carry it. Beside that the position controller makes next to no torque: an
-    /// integral that is still on its way, or gives back what is in the model now, has not found the load, and a hand that leans on the arm will
-    /// let go.
+    /// Returns `true` if the load of every held joint is known, so that Teaching can carry it. In addition, the position controller must
+    /// make next to no torque: an integral that is still changing, or gives back torque that is now in the model, has not found the load,
+    /// and a hand that leans on the arm will let go.
     ///
-    /// Where a `contact` may be against the arm, what presses on it is not waited for, but a load that was known before has to be known again.
+    /// If a `contact` may be against the arm, its pressure is not waited for, but a load that was known before must be known again.
     pub fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -283,7 +285,7 @@ impl ControlLaw {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
-    /// Teaching begins: it carries the loads that were found (J-25), and nothing that may be a contact.
+    /// Begins Teaching: it carries the loads that were found (J-25), and no torque that may come from a contact.
     pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
@@ -296,21 +298,23 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// The payload of the arm comes into the model under the holding arm: what is missing says nothing until the integral has given
-    /// back what it had found for it (J-60).
+    /// Takes note that the payload of the arm comes into the model while the arm is held: the missing torque says nothing until the
+    /// integral has given back the torque that it had found for the payload (J-60).
     pub fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
-    /// The payload of the arm was given in Teaching, and the model takes over this mass (kg) with this tick (J-60).
+    /// Reduces the mass that Teaching had found by `mass` (kg), which the model takes over with this tick: the payload of the arm was
+    /// configured in Teaching (J-60).
     pub fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
         }
     }
 
-    /// Each tick of Teaching, which is so `late`, ms: what has come of the joints. Returns the speeds that their positions make, rad/s.
+    /// Takes the answers of the joints in each tick of Teaching, which is `late` by this time, ms. Returns the speeds that follow from
+    /// their positions, rad/s.
     pub fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
         let (q, mut speeds) = (nodes.positions(), [0.0; JOINTS]);
         let Some(taught) = &mut self.taught else { return speeds };
@@ -320,7 +324,7 @@ impl ControlLaw {
         speeds
     }
 
-    /// Teaching ends: the integral takes over what held each joint.
+    /// Ends Teaching: the integral takes over the torque that held each joint.
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let q = nodes.positions();
         if let Some(taught) = &self.taught {
@@ -332,14 +336,14 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// The set positions of joints have sagged, rad: that is no motion.
+    /// Shifts the position controllers by the sag of the set positions, rad: a sag is not a motion.
     pub fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
         }
     }
 
-    /// One tick: computes its torque, before any limit; returns joint errors found on the way (friction table).
+    /// Runs one tick: computes its torque, before any limit. Returns joint errors found on the way (friction table).
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -357,10 +361,10 @@ impl ControlLaw {
         }
         let q = nodes.positions();
         let v = nodes.velocities();
-        // J-62: what is measured is compared with what was due then.
+        // J-62: a measurement is compared with the set position that was due at its time.
         let due = set.due(config);
-        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts
-        // now: the measured position is taken to where the commanded motion has brought it since.
+        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts now, so the
+        // measured position is advanced by the commanded motion since the measurement.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {
@@ -424,17 +428,17 @@ impl ControlLaw {
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral gives back what is in the model now, it says nothing of a load.
+        // While the integral gives back torque that is now in the model, it says nothing about a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // An integral that is still on its way to what it has to hold has not found it.
+            // An integral that has not reached the torque that it must hold has not found it.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// What Teaching adds to the torque of the model (J-25). What changes slowly is computed in turns, and in the tick
-    /// that computes it the rest stays as it was. Returns whether all of it was computed.
+    /// Computes the torque that Teaching adds to the torque of the model (J-25). Parts that change slowly are computed in turns; in the
+    /// tick that computes such a part the rest stays as it was. Returns `true` if all of the torque was computed.
     #[inline(never)]
     fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
         let (q, v) = (nodes.positions(), nodes.velocities());
@@ -476,7 +480,7 @@ impl ControlLaw {
         true
     }
 
-    /// Brakes of Teaching use what the rest leaves of the limit, and not more: they are no overload.
+    /// Limits the brakes of Teaching to the torque that the other parts leave of the limit: brakes cause no overload.
     #[inline(never)]
     fn bound_brakes(&mut self, nodes: &Nodes, config: &Config) {
         for (j, torque) in self.torque.iter_mut().enumerate() {
@@ -488,14 +492,15 @@ impl ControlLaw {
     }
 }
 
-/// No joint yields. In place: an array of `None` would be made and copied with room for what it does not hold.
+/// Ends all yields, in place: an array of `None` would be made and copied, with space for values that it does not hold.
 fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
     for yields in yields {
         *yields = None;
     }
 }
 
-/// Torques that compensate friction at the commanded velocities, N·m, and joint errors: a velocity that the table has not (J-42).
+/// Returns the torques that compensate friction at the commanded velocities, N·m, and joint errors for velocities that the table lacks
+/// (J-42).
 #[inline]
 pub(super) fn compensation(
     inputs: &LawInputs<'_>,

@@ -5,36 +5,36 @@ use crate::limits::{self, Recent, Saturation, Turns};
 use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
-/// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
+/// Speed above which a torque at its limit that drives the joint on does not count as a catch, rad/s.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Share of its set velocity below which a joint that comes to rest out of Teaching is held up by something.
+/// Share of its set velocity below which a joint that comes to rest after Teaching is held up by an obstacle.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit from which on the feedback torque may be twice as high: friction and inertia that the model has wrong are no
-/// push, and what stands in the way of a fast motion exceeds that some milliseconds later.
+/// Share of the velocity limit from which on the feedback torque may be twice as high: friction and inertia that the model has wrong are
+/// not a push. An obstacle in the way of a fast motion takes the torque beyond the doubled share some milliseconds later.
 const FAST: f64 = 0.2;
-/// Of the last 100 ticks, more than which a feedback torque beyond its share makes a pushed joint (J-66).
+/// Number of ticks: a joint whose feedback torque was beyond its share in more than that of the last 100 ticks counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
-/// Share of its velocity limit by which a joint is faster than it was commanded to be, and way that it has come by that, rad: it is pushed,
-/// however weak its gains are. A light joint is at its over-speed before their torque says so.
+/// Share of its velocity limit by which a joint is faster than commanded, and distance that it has gained by that, rad. Beyond both the
+/// joint counts as pushed, however weak its gains are. A light joint is at its over-speed before the torque of such gains shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
-/// How often each joint's torque has been at its limit, and its feedback torque beyond its share.
+/// Counters of each joint's torque at its limit, and of its feedback torque beyond its share.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
     pushed: [Recent; JOINTS],
     turns: [Turns; JOINTS],
-    /// Ticks of this limiter.
+    /// Number of ticks of this limiter.
     tick: u32,
 }
 
 remembered!(Limiter { saturation, pushed, turns, tick });
 
-/// What a tick has found about a joint.
+/// Findings of a tick for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Found {
-    /// Limits of the set values that it is beyond, as joint errors; the bit of torque stands for a torque that is no number.
+    /// Limits of the set values that the joint exceeds, as joint errors; the torque bit stands for a torque that is not a number.
     pub errors: u16,
     /// Its computed torque was beyond the limit for too long (J-43).
     pub overloaded: bool,
@@ -42,37 +42,37 @@ pub(crate) struct Found {
     pub pushed: bool,
     /// The feedback torque is beyond its share.
     pub strained: bool,
-    /// It has settled since it was enabled.
+    /// The joint has settled since it was enabled.
     pub settled: bool,
     /// Its torque goes from limit to limit, or its swing grows: its position controller is unstable.
     pub unstable: bool,
 }
 
 impl Found {
-    /// There is something to react to.
+    /// Returns `true` if a reaction is needed.
     pub fn is_any(&self) -> bool {
         (self.errors != 0) | self.overloaded | self.pushed | self.unstable
     }
 }
 
-/// What is left of a torque within the limits, per joint.
+/// Torque that remains within the limits, per joint.
 #[derive(Default)]
 pub(crate) struct Limited {
     /// To command, N·m.
     pub torque: [f64; JOINTS],
-    /// What was found on the way; `None` where there is nothing to react to.
+    /// Findings of the limits; `None` if no reaction is needed.
     pub found: Option<[Found; JOINTS]>,
-    /// By how much the set positions of joints have sagged whose loads are being caught, rad; `None` where none is.
+    /// Sag of the set positions of joints whose loads are being caught, rad; `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,
 }
 
 impl Limiter {
-    /// The last torque of the joint was beyond the limit: its integral is held (J-41).
+    /// Returns the joints whose last torque was beyond the limit: their integrals are held (J-41).
     pub fn saturated(&self) -> [bool; JOINTS] {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
-    /// What was counted of a joint is forgotten.
+    /// Forgets the counts of a joint.
     #[inline(always)]
     pub fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
@@ -80,14 +80,14 @@ impl Limiter {
         self.turns[joint] = Turns::default();
     }
 
-    /// Torques from limit to limit count from now on, and not those before.
+    /// Forgets earlier torques from limit to limit; only those from now on count.
     pub fn forget_turns(&mut self) {
         self.turns = Default::default();
     }
 
-    /// One tick: the torque that the `law` has computed within its limits, and what is found of torque and set values. What braking with
-    /// all the torque there is does to the torque, and while a motion is commanded to position error and acceleration, is excused
-    /// (J-33). So is all but a torque that is no number of a joint that yields: its torque is bounded by construction.
+    /// Runs one tick: limits the torque that the `law` has computed, and checks torque and set values. Braking with all available torque
+    /// excuses its effects on the torque and, while a motion is commanded, on position error and acceleration (J-33). For a joint that
+    /// yields everything is excused except a torque that is not a number: its torque is bounded by construction.
     pub fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -101,7 +101,7 @@ impl Limiter {
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // Path time that slows down has its own acceleration, and what a hand has led any.
+            // Path time that slows down adds its own acceleration; an arm that a hand has led may have any acceleration.
             joint_error::ACCELERATION
         } else {
             0
@@ -123,7 +123,7 @@ impl Limiter {
             if parameters.on_trial && stands {
                 unstable |= set.catch[j].watch(v[j]);
             }
-            // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
+            // Torque that drives a joint on, instead of stopping it, is neither a catch nor a deceleration.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let excuses = braking || stopping || yields;
@@ -134,12 +134,12 @@ impl Limiter {
             }
             let settled = set.catch[j].settled();
             let (feedback, share) = (law.feedback(j), config.yield_torque_share * limits.torque_max);
-            // More for a fast motion.
+            // A fast motion may use more.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
-            // What brakes a joint is no push against it; what presses one that stands is.
+            // Feedback torque that brakes a joint is not a push against it; feedback torque on a joint that stands is.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // An arm that a hand has led meets somebody before it is at rest: the joint falls behind its set values.
+            // An arm that a hand has led meets a person before it is at rest: the joint lags its set values.
             let lags = || {
                 let set = set.point.velocity[j];
                 mode == ControlMode::Rest && feedback * set > 0.0 && v[j] * set.signum() < LAGS * set.abs()
@@ -151,7 +151,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The way first: hardly ever is there any.
+            // Distance first: it hardly ever exceeds its limit.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);

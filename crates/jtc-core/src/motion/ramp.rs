@@ -1,4 +1,4 @@
-//! What the arm can follow on a ramp of path time (J-33): slopes within its acceleration and torque limits.
+//! Bounds of a ramp of path time (J-33): slopes within the acceleration and torque limits of the arm.
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
@@ -14,9 +14,9 @@ use crate::{DT, JOINTS};
 /// a tick and for the controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the torque that is left for a stop of an arm that a hand has led: the position controller, which makes the torque, swings over.
+/// Share of the remaining torque for a stop of an arm that a hand has led: the position controller, which makes the torque, overshoots.
 const STOP_TORQUE: f64 = 0.5;
-/// Share of the torque limit that is used where hardly anything is left.
+/// Lowest share of the torque limit that is used if hardly any torque remains.
 const LEAST_LEFT: f64 = 0.1;
 
 /// The inertia of the arm at the start of a ramp.
@@ -29,7 +29,7 @@ pub(crate) struct PathRamp {
 remembered!(PathRamp { inertia });
 
 impl PathRamp {
-    /// A ramp of path time begins: its bounds need the inertia of the arm.
+    /// Begins a ramp of path time: its bounds need the inertia of the arm.
     pub fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.inertia = dynamics.mass_matrix(nodes.positions());
         for j in 0..JOINTS {
@@ -37,31 +37,31 @@ impl PathRamp {
         }
     }
 
-    /// Inertia that each joint moved at the begin of the ramp with the others held, kg·m².
+    /// Returns the inertia that each joint moved at the start of the ramp with the other joints held, kg·m².
     pub fn inertia(&self) -> [f64; JOINTS] {
         core::array::from_fn(|j| self.inertia[j][j])
     }
 
-    /// Inertia that joint `j` feels when joint `k` accelerates, kg·m².
+    /// Returns the inertia that joint `j` feels when joint `k` accelerates, kg·m².
     pub fn coupling(&self, j: usize, k: usize) -> f64 {
         self.inertia[j][k]
     }
 
-    /// Time that a smooth stop of all joints from these velocities (rad/s) takes at least, ms, where it uses [`STOP_TORQUE`] of what the last
-    /// torques of the `law` leave of the limits.
+    /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms, if the stop uses [`STOP_TORQUE`] of the
+    /// torque that the last torques of the `law` leave of the limits.
     pub fn shortest_stop_ms(&self, law: &ControlLaw, velocity: &[f64; JOINTS], config: &Config) -> f64 {
         let mut longest = 0.0_f64;
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
             let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
-            // What is held helps to stop the joint, or takes of what can.
+            // The holding torque helps to stop the joint, or uses up torque that could.
             let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
             longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
         }
         longest
     }
 
-    /// A tick of a clock on its way to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.
+    /// Runs a tick of a clock that changes to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.
     pub fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
@@ -76,14 +76,14 @@ impl PathRamp {
         }
     }
 
-    /// A tick of a clock that is held back by joints at their torque limits (J-75).
+    /// Runs a tick of a clock that is held back by joints at their torque limits (J-75).
     pub fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 
-    /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
-    /// has left is counted from the last torque of the `law`, with all its parts: a joint that already falls behind has less. Joints that
-    /// yield do not move along the path, and no pace of it changes their torque.
+    /// Returns slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of each
+    /// joint is computed from the last torque of the `law`, with all its parts: a joint that already lags has less. Joints that yield do
+    /// not move along the path, and the rate of path time does not change their torque.
     fn slope_bounds(
         &self,
         at: &SetPoint,
@@ -109,7 +109,7 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // No pace of the path helps a joint that does not move along it.
+            // No rate of path time helps a joint that does not move along the path.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },
@@ -119,7 +119,7 @@ impl PathRamp {
     }
 }
 
-/// Slopes with |`offset` + `factor`·slope| ≤ `limit`.
+/// Returns slopes with |`offset` + `factor`·slope| ≤ `limit`.
 fn within(offset: f64, factor: f64, limit: f64) -> Bounds {
     if factor.abs() <= 1e-9 {
         return (f64::NEG_INFINITY, f64::INFINITY);
@@ -150,8 +150,8 @@ mod tests {
     }
 
     proptest! {
-        /// Within its bounds a slope keeps the limits of acceleration and torque, outside it does not. What a joint that stands
-        /// has too much of is no reason not to let path time run on as it does.
+        /// Within its bounds a slope keeps the limits of acceleration and torque; outside them it does not. A joint that stands and is
+        /// beyond a limit does not prevent path time from running on at its present rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),
@@ -172,7 +172,7 @@ mod tests {
             let at = SetPoint { position: [0.0; JOINTS], velocity, acceleration };
             let SlopeBounds { easy, full } = ramp.slope_bounds(&at, &law, rate, slope, &config);
 
-            // What the arm needs for one more of slope.
+            // Torque that the arm needs per unit of slope.
             let zero = [0.0; JOINTS];
             let (moved, held) = (dynamics.inverse(&zero, &zero, &velocity), dynamics.inverse(&zero, &zero, &zero));
             let push = |j: usize| moved[j] - held[j] + config.joints[j].rotor_inertia * velocity[j];

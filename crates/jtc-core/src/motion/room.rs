@@ -1,5 +1,5 @@
-//! The room that the torque limits leave for a motion from where the arm is held: how soon it can be at the first point of a path (J-34), and
-//! how hard and how fast it can be jogged (J-58). Gravity and the load found are taken at both ends of the motion, friction at its top speed.
+//! Torque margin for a motion from the held position: how soon the arm can reach the first point of a path (J-34), and how hard and how
+//! fast it can be jogged (J-58). Gravity and the load found count at both ends of the motion, friction at its top speed.
 use jtc_dynamics::sqrt;
 
 use super::Motion;
@@ -8,9 +8,10 @@ use crate::{JOINTS, jog};
 
 /// Highest share of a torque limit that an approach asks for; the feedback of a fast one takes up to a fifth.
 const APPROACH_TORQUE: f64 = 0.8;
-/// Highest share of a torque limit that a jog takes: the rest is for the feedback, and for the way back out of a place that takes more to hold.
+/// Highest share of a torque limit that a jog uses: the rest is for the feedback, and for the return from a position that takes more torque
+/// to hold.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of what is left of a torque limit that a jog uses, and an approach where standing alone takes nearly all of the limit.
+/// Share of the remaining torque that a jog uses, and an approach if standing alone takes nearly all of the limit.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
@@ -18,13 +19,13 @@ const LONGER_MS: f64 = 2_000.0;
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
-/// Time in which a jogged joint can come to rest with its share of what is left, s.
+/// Time in which a jogged joint can come to rest with its share of the remaining torque, s.
 const REST_S: f64 = 0.3;
-/// Speed of a slow jog, rad/s: where friction leaves nothing of a limit at the wanted speed, it may leave some at this one.
+/// Speed of a slow jog, rad/s: if friction leaves no torque at the wanted speed, it may leave some at this speed.
 const CREEP: f64 = 0.02;
 /// Speed from which on a joint slides, so that the friction of the model is all there, rad/s.
 const SLIDES: f64 = 0.1;
-/// Highest speed that counts as none, rad/s.
+/// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
 /// Share of a torque limit that counts as left at least for a motion that unloads the joint.
 const UNLOADING: f64 = 0.01;
@@ -33,18 +34,19 @@ const LEAST_ROOM: f64 = 0.005;
 /// Lowest share of a jog's acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
-/// How a jog is limited by what is left of the torque limits.
+/// Limits of a jog that follow from the remaining torque.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JogRoom {
-    /// Velocities, rad/s: those that are wanted, or a share of them.
+    /// Velocities, rad/s: the wanted velocities, or a share of them.
     pub velocity: [f64; JOINTS],
     /// Highest accelerations, rad/s².
     pub acceleration: [f64; JOINTS],
 }
 
 impl Motion {
-    /// Time for the approach from where the arm is held to `to` (rad), ms: that of a ramp, or as long as velocity, acceleration and torque limits
-    /// ask; `None` where torque limits ask for more than 2 s beyond the others. For the inertia of a ramp that begins here.
+    /// Returns the time for the approach from the held position to `to` (rad), ms: the time of a ramp, or as long as the velocity,
+    /// acceleration and torque limits require. `None` if the torque limits require more than 2 s beyond the others. Uses the inertia of a
+    /// ramp that begins here.
     pub fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;
@@ -55,7 +57,7 @@ impl Motion {
             shortest = shortest.max(1_000.0 * sqrt(TOP_ACCELERATION * way.abs() / limits.acceleration_max));
         }
         let standing = [from, to].map(|q| self.standing(q, inputs));
-        // Long enough, if friction is that of an approach which takes `ms`.
+        // Time that is long enough if friction is that of an approach which takes `ms`.
         let enough = |ms: f64| {
             let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
             let times = (0..JOINTS).map(|j| {
@@ -77,13 +79,14 @@ impl Motion {
             times.fold(shortest, f64::max)
         };
         let longest = shortest + LONGER_MS;
-        // A slower approach has less friction: where the friction of the fastest leaves too little, that of the slowest decides.
+        // A slower approach has less friction. If the friction of the fastest approach leaves too little torque, the friction of the
+        // slowest decides.
         let time = enough(shortest);
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
 
-    /// Velocities and accelerations that the limits of torque and tool speed allow a jog at the `wanted` velocities (rad/s); `None` if a torque
-    /// limit allows no motion. For the inertia of a ramp that begins here.
+    /// Returns the velocities and accelerations that the limits of torque and tool speed allow a jog at the `wanted` velocities (rad/s);
+    /// `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins here.
     pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
         let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
@@ -101,7 +104,7 @@ impl Motion {
         }
         let velocity = wanted.map(|v| share * v);
         let hardest = |j: usize| jog::hardest(&config.joints[j]);
-        // What already moves may have to slow down.
+        // A joint that already moves may need torque to slow down.
         let moves = |j: usize| wanted[j] != 0.0 || self.set.point.velocity[j] != 0.0;
         let needed = |j: usize| {
             (0..JOINTS).filter(|&k| moves(k)).map(|k| self.ramp.coupling(j, k).abs() * hardest(k)).sum()
@@ -110,12 +113,12 @@ impl Motion {
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
     }
 
-    /// The `wanted` velocities (rad/s), or as much of them as the tool speed limit allows. What each joint adds to the speed of the flange is
-    /// summed up, because joints whose motions cancel out do not speed up alike; and joints that get faster have what those leave that are
-    /// to become slower, or go on.
+    /// Returns the `wanted` velocities (rad/s), reduced to fit the tool speed limit. The contributions of all joints to the speed of the
+    /// flange are summed up, because joints whose motions cancel out do not speed up alike. Joints that get faster share the speed that the
+    /// other joints leave; those become slower or go on as they are.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
-        // How far the flange is from the axis of each joint, m.
+        // Distance of the flange from the axis of each joint, m.
         let mut reach = [0.0; JOINTS];
         for j in 0..JOINTS {
             let mut turned = [0.0; JOINTS];
@@ -130,7 +133,8 @@ impl Motion {
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // Joints that are to be no faster than they are count with what they have. With less room for the others there may be more of them.
+        // Joints that are not to get faster count with their present speed. If less remains for the others, more joints may belong to
+        // this group.
         let mut rising = share;
         for _ in 0..JOINTS {
             let (mut slower, mut faster) = (0.0, 0.0);
@@ -150,7 +154,8 @@ impl Motion {
         })
     }
 
-    /// Share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of what is left there.
+    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of the torque that is
+    /// left there.
     fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
         let needed = |j: usize| {
             (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
@@ -158,7 +163,8 @@ impl Motion {
         self.least_share(wanted, needed, inputs)
     }
 
-    /// The share (0..1) of what is `needed` of each joint (N·m) that fits into its share of what a jog at `velocity` (rad/s) leaves of its limit.
+    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that fits into its share of the torque that a jog at `velocity`
+    /// (rad/s) leaves of its limit.
     fn least_share(
         &self,
         velocity: &[f64; JOINTS],
@@ -172,12 +178,12 @@ impl Motion {
         })
     }
 
-    /// What a jog at `velocity` (rad/s) leaves of each torque limit, here and where the joint would come to rest, N·m. Friction counts in both
-    /// directions: a joint that is lowered has to be raised again.
+    /// Returns the torque that a jog at `velocity` (rad/s) leaves of each torque limit, N·m, at the present position and at the position of
+    /// rest. Friction counts in both directions: a joint that is lowered must be raised again.
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
-        // It goes on as long as a command lasts, and then comes to rest.
+        // The jog goes on as long as a command lasts, and then comes to rest.
         let ahead_s = f64::from(jog::LASTS_MS) / 1_000.0 + 0.5 * REST_S;
         let rest = core::array::from_fn(|j| {
             let (low, high) = config.position_range(j);
@@ -191,7 +197,7 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that comes to where it takes less to hold moves as long as there is any torque for it.
+            // A joint that comes to a position with a lower holding torque moves as long as there is any torque for it.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;
@@ -199,8 +205,8 @@ impl Motion {
         })
     }
 
-    /// Torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While the integrals
-    /// give back a payload that the model has taken over, only gravity counts.
+    /// Returns the torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While
+    /// the integrals give back a payload that the model has taken over, only gravity counts.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {
@@ -214,7 +220,7 @@ impl Motion {
     }
 }
 
-/// The highest torque of a joint at the ends of a motion, N·m.
+/// Returns the highest torque of a joint at the ends of a motion, N·m.
 fn highest(torques: &[[f64; JOINTS]; 2], j: usize) -> f64 {
     torques.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()))
 }

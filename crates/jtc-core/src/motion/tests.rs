@@ -81,8 +81,8 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching finds what the arm carries while it is held; only an arm that may have a contact against it does not have to know for longer than
-/// it takes to find out.
+/// Teaching begins when the arm is held and its load is known. Only an arm that may have a contact against it needs no known load after
+/// `KNOWN_MS`.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     for (held, contact, waits_ms, known, may) in [
@@ -127,7 +127,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // Just enabled: it is latched where it is, and its load moves those of the others.
+        // Just enabled: the joint is latched at its measured position, and its load moves the loads of the others.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
         // Not enabled, or no longer: it is followed.
@@ -152,7 +152,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
-        // One that moves is enough for all.
+        // A single moving joint is enough for all.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
         motion.set.hold_measured(&nodes, 200.0, &Config::avena());
@@ -162,7 +162,7 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     }
 }
 
-/// What a hand has led comes to rest, and is caught as a load is; an arm that stands is held at once.
+/// An arm that a hand has led comes to rest, and is caught as a load is; an arm that stands is held at once.
 #[test]
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, moves) in [(0.0, false), (0.02, false), (0.3, true)] {

@@ -12,16 +12,16 @@ pub(crate) struct JointTorque {
     pub load: f64,
     /// Brakes of Teaching.
     pub brake: f64,
-    /// What is left of a step that is being blended out.
+    /// Remainder of a step that is being blended out.
     pub blend: f64,
 }
 
 remembered!(JointTorque { model, pid, friction, load, brake, blend });
 
 impl JointTorque {
-    /// All but the model.
+    /// Sum of all parts but the model.
     pub fn correction(&self) -> f64 {
-        // In two sums: shorter to wait for than one.
+        // Two partial sums: shorter to wait for than one.
         (self.pid.sum() + self.friction) + (self.load + self.brake + self.blend)
     }
 

@@ -6,15 +6,15 @@ use crate::interpolation::smooth;
 use crate::nodes::Nodes;
 use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 
-/// Time within which the torque of a joint falls that begins to yield, ms.
+/// Time within which the torque of a joint that begins to yield falls, ms.
 const FALL_MS: u16 = 10;
 
-/// Which part of the last torque the next one continues.
+/// Part of the last torque that the next torque continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
     /// All but the model.
     Correction,
-    /// All of it.
+    /// All parts.
     Everything,
 }
 
@@ -27,7 +27,7 @@ impl Continued {
     }
 }
 
-/// The last torque where the next one has to continue it.
+/// Last torque, if the next one must continue it.
 pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 
 /// Steps that are being blended out.
@@ -36,15 +36,15 @@ pub(super) struct Transfer {
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
-    /// It is blended out within [`FALL_MS`].
+    /// The step is blended out within [`FALL_MS`].
     falls: [bool; JOINTS],
-    /// Time left until nothing is left of any of them, ms.
+    /// Time left until all steps are blended out, ms.
     left_ms: u16,
     /// Joints that yield from this tick on: what their torque loses is gone soon.
     yields: [bool; JOINTS],
     /// Joints that were latched in this tick: their torque starts from that of the model.
     just_enabled: [bool; JOINTS],
-    /// The next torque has to continue the last one.
+    /// Part of the last torque that the next one must continue.
     next: Option<Continued>,
 }
 
@@ -84,7 +84,7 @@ impl Transfer {
         self.just_enabled = just_enabled;
     }
 
-    /// Before the torque is computed anew: what of the last one it has to continue, if anything.
+    /// Prepares the computation of the next torque. Returns the part of the last torque that the next one must continue, if any.
     pub fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
         self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
     }
@@ -101,7 +101,7 @@ impl Transfer {
         if let Some((continued, before)) = before {
             for j in 0..JOINTS {
                 let step = before[j] - continued.of(&torque[j]);
-                // One that falls already goes on falling when another joint begins to yield.
+                // A torque that already falls continues to fall when another joint begins to yield.
                 let falling = self.falls[j] && self.step_ms[j] < FALL_MS;
                 let yields = core::mem::take(&mut self.yields[j]) || falling;
                 let falls = yields && step * before[j] > 0.0;
@@ -127,7 +127,7 @@ impl Transfer {
         }
     }
 
-    /// A step of a joint is to be blended out from now on.
+    /// Begins to blend out a step of a joint.
     fn begin_step(&mut self, j: usize, step: f64, falls: bool, config: &Config) {
         (self.step[j], self.step_ms[j], self.falls[j]) = (step, 0, falls);
         self.left_ms = config.blend_ms.max(FALL_MS);
@@ -148,7 +148,7 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// What is blended out in a tick after a change of state in which the last torque was `last`.
+    /// Returns the torque that is blended out in a tick after a change of state in which the last torque was `last`.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);

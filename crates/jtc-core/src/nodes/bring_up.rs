@@ -1,4 +1,4 @@
-//! The frame of each tick: Move, or what brings a node up in its place (J-12, J-20).
+//! The frame of each tick: Move, or a frame in its place that brings a node up (J-12, J-20).
 use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
@@ -7,11 +7,11 @@ use crate::{JOINTS, NODES};
 
 /// Ticks between two frames that take the place of Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
-/// The same while torque is on and only the gripper is in want of such a frame.
+/// Like [`MOVES_BETWEEN`], while torque is on and only the gripper needs such a frame.
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
-    /// The frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
+    /// Creates the frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
     pub fn frame(
         &mut self,
         config: &Config,
@@ -54,7 +54,7 @@ impl Nodes {
             && self.gripper_answers(config)
             && self.gripper_node().is_some_and(Node::wants_configuration);
         if goal == Goal::Enabled && self.moves < MOVES_ASIDE && all_unchanged(&target[..JOINTS]) {
-            // What the gripper alone is in want of leaves the arm its torque in nearly every tick (J-23).
+            // A frame that only the gripper needs leaves the arm its torque in nearly every tick (J-23).
             return None;
         }
         // Nodes that are enabled refuse their configuration and should not be: they come first.
@@ -75,7 +75,7 @@ impl Nodes {
         change.then_some(Request::ChangeFsm { target })
     }
 
-    /// The requested state of each node.
+    /// Returns the requested state of each node.
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
@@ -88,7 +88,7 @@ impl Nodes {
         target
     }
 
-    /// The requested state of the gripper: it is brought up in any state with torque as well, on the side (J-23).
+    /// Returns the requested state of the gripper: it is brought up in any state with torque as well, on the side (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

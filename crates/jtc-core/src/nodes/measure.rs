@@ -1,14 +1,13 @@
-//! Measured position and velocity of a joint, and what stands for them while its answers are missing (J-35, J-63).
+//! Measured position and velocity of a joint, and their substitutes while its answers are missing (J-35, J-63).
 //!
-//! Terms: an answer is *usable* when its position is one that the joint can have reached since the last usable one. A tick
-//! without a usable answer takes the *prediction*: the last one, carried on at the rate at which the joint moved, and the
-//! change of the commanded velocity since. The first usable answer after missing ones differs from the prediction by an
-//! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
-//! A *late* answer ([`Lateness`]) is one of the time at which it was due: it is compared with what was predicted for then, and the
-//! prediction goes on from it. Where it is about where it was predicted it is used as it is, like one in time: offsets that fade
-//! in each tick would be a filter in the position loop, which makes it swing.
-//! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
-//! stays closed however often answers are lost.
+//! Terms: an answer is *usable* if the joint can have reached its position since the last usable answer. A tick without a usable answer
+//! takes the *prediction*: the last usable answer, carried on at the rate at which the joint moved, and the change of the commanded
+//! velocity since. The first usable answer after missing ones differs from the prediction by an *offset*, which fades, so that neither the
+//! loss nor the return makes a step of position, nor of the derivative of its error. A *late* answer ([`Lateness`]) belongs to the time at
+//! which it was due: it is compared with the prediction for that time, and the prediction goes on from it. A late answer that is close to
+//! its prediction is used as it is, like one in time: offsets that fade in each tick would be a filter in the position loop, which makes it
+//! swing. The offset has no part in the prediction: the prediction depends on answers and commands alone, so that the position loop stays
+//! closed however often answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -26,26 +25,28 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
+/// Speed, in velocity limits, that no joint has: an answer that is further from the prediction than that counts as no answer (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
 /// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
 /// the joint of an encoder that jumps has not moved.
 const UNEXPECTED: f64 = 0.1;
-/// Steps of the encoder that a late answer may be from where it was predicted: positions and the rate carried on are as coarse as that.
+/// Steps of the encoder by which a late answer may differ from its prediction: positions and the rate carried on are as coarse as that.
 const IN_ITS_PLACE: f64 = 2.0;
-/// The coarsest encoder for which that counts, rad: what is used as it is may be a step of so much.
+/// Coarsest encoder for which [`IN_ITS_PLACE`] counts, rad: an answer that is used as it is may make a step of that size.
 const COARSEST: f64 = 1e-4;
-/// Distance from the prediction, as a share of the implausible one, within which an answer is without what its encoder has jumped by.
+/// Distance from the prediction, as a share of the implausible one, within which an answer must be after the jump of its encoder is taken
+/// off.
 const NEAR: f64 = 0.5;
-/// Most that the rate carried on differs from the reported velocity, rad/s.
+/// Highest difference between the rate carried on and the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// What the velocity of the last 5 ms differs by over what the reported mean of 10 ms does, at most; of an even acceleration it is twice as much.
+/// Highest ratio of two deviations from the due velocity: that of the last 5 ms to that of the reported mean of 10 ms; with an even
+/// acceleration it is 2.
 const YOUNGER: f64 = 2.5;
-/// Most that is carried on, in velocity limits.
+/// Highest rate that is carried on, in velocity limits.
 const FASTEST: f64 = 1.2;
 /// Double pole of a fading offset times the setting: a fifth is left when that is over, a fiftieth after twice as long.
 const FADING: f64 = 3.0;
-/// What is left of it when it ends, rad or rad/s.
+/// Remainder at which an offset ends, rad or rad/s.
 const FADED: f64 = 1e-9;
 
 /// Position and velocity.
@@ -60,13 +61,13 @@ pub(crate) struct Reading {
 /// The measurements of a joint in a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
-    /// What the joint answered, if it did.
+    /// Answer of the joint, if there is one.
     pub answer: Option<Reading>,
     /// A Move asked for an answer.
     pub expected: bool,
     /// That Move was acknowledged.
     pub asked: bool,
-    /// Answers of this tick: those before the last were late.
+    /// Number of answers of this tick: those before the last were late.
     pub answers: u8,
     /// Commanded velocity, rad/s.
     pub commanded: f64,
@@ -80,25 +81,25 @@ pub(crate) struct Tick {
     pub joint: usize,
 }
 
-/// What came of a tick.
+/// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// The answer is usable.
     Used,
-    /// It is not, or there is none.
+    /// The answer is not usable, or is missing.
     Predicted,
-    /// It is usable, and has shown that the encoder has jumped (J-35).
+    /// The answer is usable, and has shown that the encoder has jumped (J-35).
     Jumped,
 }
 
-/// An answer that is far from where it was expected.
+/// An answer that is far from its expected position.
 struct Unexpected {
     answer: Reading,
-    /// How far the prediction is beyond it, rad.
+    /// Distance of the prediction beyond the answer, rad.
     off: f64,
     /// The implausible distance, rad.
     reach: f64,
-    /// When it was due, ms.
+    /// Time at which the answer was due, ms.
     at_ms: u32,
     /// The encoder may have jumped.
     looked_at: bool,
@@ -113,14 +114,14 @@ pub(crate) struct Late {
     pub ms: u32,
     /// Velocity that was commanded when it was due, rad/s.
     pub commanded: f64,
-    /// Way that was commanded since, rad.
+    /// Distance that was commanded since, rad.
     pub commanded_way: f64,
 }
 
-/// What is known of a joint's motion.
+/// Known motion of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measurement {
-    /// What the control law uses.
+    /// Position and velocity that the control law uses.
     used: Reading,
     /// There is a last usable answer.
     known: bool,
@@ -128,13 +129,13 @@ pub(crate) struct Measurement {
     clock_ms: u32,
     /// The last usable answer, its position carried on since.
     answer: Reading,
-    /// When it came.
+    /// Time at which the answer came.
     answered_ms: u32,
     /// Commanded velocity then, rad/s.
     commanded: f64,
     /// Rate of the answered positions then, rad/s.
     rate: f64,
-    /// That rate as far as the reported velocity bears it out, rad/s: what a prediction carries on.
+    /// That rate as far as the reported velocity confirms it, rad/s: the rate that a prediction carries on.
     carried: f64,
     /// The last usable answers.
     history: History,
@@ -147,12 +148,12 @@ pub(crate) struct Measurement {
     /// Prediction less answer, as much as has not faded.
     position_offset: Fading,
     velocity_offset: Fading,
-    /// Something of them is left.
+    /// At least one of the offsets has not faded.
     fading: bool,
 }
 
-/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. It goes on fading
-/// whatever is added to it; where it began anew instead, it would never fade while every other answer is lost.
+/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. The offset goes on fading when
+/// more is added to it; if it restarted instead, it would never fade while every other answer is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
     /// rad or rad/s.
@@ -182,7 +183,7 @@ remembered!(Measurement {
 });
 
 impl Fading {
-    /// One tick.
+    /// Runs one tick.
     fn step(&mut self, elapsed_ms: u32, config: &Config) {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
@@ -196,20 +197,20 @@ impl Fading {
         }
     }
 
-    /// As much of it goes as is opposite to `by`.
+    /// Removes the part of the offset that is opposite to `by`.
     fn take_back(&mut self, by: f64) {
         let left = self.left + by;
         self.left = if self.left > 0.0 { left.max(0.0).min(self.left) } else { left.min(0.0).max(self.left) };
     }
 }
 
-/// How far from where it was predicted a late answer is in its place, rad.
+/// Returns the distance from its prediction within which a late answer is in its place, rad.
 fn place(config: &Config) -> f64 {
     config.encoder_step.min(COARSEST) * IN_ITS_PLACE
 }
 
 impl Late {
-    /// An answer of this joint that is so many ticks late, as far as what was commanded is known.
+    /// Creates a late answer of this joint that is `ticks` late, as far back as the commanded motion is known.
     #[cold]
     pub fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
         let now = config.delay_ticks.max(1);
@@ -222,49 +223,49 @@ impl Late {
         }
     }
 
-    /// Way of a joint since, whose rate then was `carried` (rad/s), rad.
+    /// Returns the distance that a joint has moved since, rad, if its rate was `carried` (rad/s) then.
     fn way(&self, carried: f64) -> f64 {
         self.commanded_way + (carried - self.commanded) * (f64::from(self.ms) * DT)
     }
 }
 
 impl Measurement {
-    /// Position and velocity that the control law uses.
+    /// Returns the position and velocity that the control law uses.
     pub fn used(&self) -> Reading {
         self.used
     }
 
-    /// Speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities are not
-    /// trusted alone: their full scale depends on the drive (J-11).
+    /// Returns the speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities
+    /// are not trusted alone: their full scale depends on the drive (J-11).
     pub fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Velocity over the last 5 ms, rad/s, which is younger than the reported one. It differs from what is `due` (rad/s) in the direction in which
-    /// the reported one does, and not by much more, or else an encoder has jumped, and not the joint moved.
+    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported one. It differs from the `due` velocity (rad/s)
+    /// in the same direction as the reported one, and not by much more; otherwise an encoder has jumped, and the joint has not moved.
     pub fn young_velocity(&self, due: f64) -> f64 {
-        // Without what fades of an offset: that is older still.
+        // Without the part of an offset that still fades: that part is older still.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }
 
-    /// What is taken off an answer, because the encoder has jumped by it, rad.
+    /// Returns the jump of the encoder that is taken off an answer, rad.
     pub fn taken_off(&self) -> f64 {
         self.jumps.taken_off()
     }
 
-    /// What of the two encoders does not fit, since the drive was configured: a jump and its size (rad), or the factor of a speed.
+    /// Returns the misfit of the two encoders since the drive was configured: a jump and its size (rad), or the factor of a speed.
     pub fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
 
-    /// Positions move `factor` times as fast as the speed says.
+    /// Stores that positions move `factor` times as fast as the speed says.
     pub fn find_factor(&mut self, factor: f32) {
         self.jumps.find_factor(factor);
     }
 
-    /// The ways of an answer of this tick; `None` where there is none, or nothing is known of them.
+    /// Returns the ways of an answer of this tick; `None` without an answer, or if nothing is known of its ways.
     pub fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
@@ -272,17 +273,18 @@ impl Measurement {
         Ways::of(&Reading { position, ..self.answer }, from, config)
     }
 
-    /// The next answer is taken as it is.
+    /// Takes the next answer as it is.
     pub fn forget(&mut self) {
         self.known = false;
     }
 
-    /// What is commanded is from now on relative to this velocity, rad/s.
+    /// Makes this velocity, rad/s, the reference of the commanded velocity from now on.
     pub fn go_on_moving(&mut self, commanded: f64) {
         self.commanded = commanded;
     }
 
-    /// One tick. The answer is without what the encoder has jumped by. `past`: what was commanded since so many ticks ago.
+    /// Runs one tick. The jump of the encoder is already taken off the answer. `past`: commanded motion since the given number of ticks
+    /// ago.
     pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
@@ -292,7 +294,7 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Nearly always every answer is in time. What that needs is compiled on its own.
+        // Nearly always every answer is in time. The code that this needs is compiled on its own.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -300,7 +302,7 @@ impl Measurement {
         }
     }
 
-    /// The rest of a tick whose answer may be late. `tick` is a copy: where it is in memory, every tick is slower.
+    /// Runs the rest of a tick whose answer may be late. `tick` is a copy: with a `tick` in memory, every tick is slower.
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
@@ -312,7 +314,7 @@ impl Measurement {
         self.take(&tick, late, config)
     }
 
-    /// The answer of a tick, if it has one that is usable. Inlined: without a late answer half of it falls away.
+    /// Takes the answer of a tick, if the answer is usable. Inlined: without a late answer half of the code falls away.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -320,7 +322,7 @@ impl Measurement {
         let at_ms = self.clock_ms.wrapping_sub(late.map_or(0, |late| late.ms));
         let age_ms = at_ms.wrapping_sub(self.answered_ms);
         let reach = (IMPLAUSIBLE * DT) * tick.velocity_max * f64::from(age_ms);
-        // Where a late answer has led meanwhile.
+        // Distance that the joint has moved since a late answer was due.
         let since = |carried: f64| late.map_or(0.0, |late| late.way(carried));
         let way = since(self.carried);
         let off_of = |answer: &Reading| predicted.position - (answer.position + way);
@@ -355,7 +357,7 @@ impl Measurement {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            // What was taken for a jump, and was none, leaves a difference like a missing answer.
+            // A suspected jump that was not a jump leaves a difference like a missing answer.
             self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -369,12 +371,12 @@ impl Measurement {
         outcome
     }
 
-    /// What is to be made of an answer that is far from where it was expected.
+    /// Decides how to use an answer that is far from its expected position.
     #[cold]
     #[inline(never)]
     fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
         let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
-        // A position less its jump may be on the other side of where the drive's positions wrap around.
+        // A position less its jump may be on the other side of the point at which the positions of the drive wrap around.
         let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
         let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
         let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
@@ -384,7 +386,7 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // Without the jump it is where the motion leads. Otherwise its speed is wrong, too.
+        // Less the jump, the position must be near the prediction of the motion. Otherwise its speed is wrong, too.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -400,8 +402,8 @@ impl Measurement {
         }
     }
 
-    /// What the answer of this tick differs by from what was `predicted` is not to be a step. One that is in its place makes none;
-    /// it takes back what is left of others, where it can, or else they would add up.
+    /// Bridges the difference between the answer of this tick and `predicted`, which must not be a step. An answer in its place makes no
+    /// step; it takes back what is left of earlier differences, as far as it can, because they would add up otherwise.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -416,7 +418,7 @@ impl Measurement {
         }
     }
 
-    /// What was commanded since the answer of this tick was due: so many ticks ago as it is counted.
+    /// Returns the motion that was commanded since the answer of this tick was due: the counted `ticks` ago.
     fn late(&mut self, ticks: u8, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Option<Late> {
         let answer = tick.answer?;
         let counted = past(ticks);
@@ -427,7 +429,7 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // Fast joints show at once that an answer was lost: those behind it are where later ones are due.
+        // Fast joints show at once that an answer was lost: the answers after it are at the positions of answers that are less late.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -435,16 +437,16 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// The rate at an answer, since the youngest one that is old enough. It is of answers alone: a rate that came from
-    /// predictions would carry itself on, whatever the joint does, while every other answer is lost. `as_predicted`: the answer
-    /// was about where the motion so far had led. Inlined for the sake of the ticks without a late answer.
+    /// Takes the rate at an answer, since the youngest answer that is old enough. The rate comes from answers alone: a rate that came from
+    /// predictions would carry itself on, for any motion of the joint, while every other answer is lost. `as_predicted`: the answer was
+    /// close to the motion so far. Inlined for the sake of the ticks without a late answer.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;
         let answered = Answered { position, at_ms };
         let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
-        // Where a joint has jumped on the way, its own report counts alone.
+        // If a joint has jumped on the way, its own report counts alone.
         let carried = match rate {
             Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
             _ => velocity,

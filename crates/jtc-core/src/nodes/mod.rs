@@ -1,5 +1,5 @@
-//! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
-//! which frame each tick sends (J-12).
+//! The seven nodes on the joint bus: their reports, their bring-up (J-20), their errors (J-14, J-16), and the frame that each tick sends
+//! (J-12).
 use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
 use jtc_wire::{StopKind, can_flag};
 
@@ -25,14 +25,14 @@ use speed_check::SpeedCheck;
 pub(crate) const GRIPPER: usize = 6;
 /// CAN flag of the gripper's receive timeout.
 const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
-/// Frames looked at in one tick.
+/// Highest number of frames that one tick looks at.
 pub(crate) const FRAMES_MAX: usize = 32;
 
 /// All nodes and the order of frames to them.
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     nodes: [Node; NODES],
-    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 where they do not count yet.
+    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 until they count.
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
@@ -56,7 +56,7 @@ pub(crate) struct Nodes {
     /// Moves since the last frame that took the place of one.
     moves: u8,
     configured_last: bool,
-    /// Whether positions and speeds of the drives fit (J-35).
+    /// Check that positions and speeds of the drives fit (J-35).
     speed_check: SpeedCheck,
     /// Joints whose two encoders were found in this tick not to fit (J-35): a mask.
     misfits: u8,
@@ -84,7 +84,7 @@ remembered!(Nodes {
 });
 
 impl Nodes {
-    /// Every node is to be reset once (J-20).
+    /// Creates the nodes; each of them must be reset once (J-20).
     pub fn new(config: &Config) -> Self {
         let mut node = Node::default();
         node.restart(config);
@@ -126,19 +126,19 @@ impl Nodes {
         nodes
     }
 
-    /// The same, but the joint with this index is ready only.
+    /// Like [`Self::enabled_at`], but the joint with this index is ready only.
     #[cfg(test)]
     pub fn with_torque_off(mut self, joint: usize) -> Self {
         self.nodes[joint].report.state = NodeState::READY;
         self
     }
 
-    /// Nodes that are there: the gripper can be configured as absent.
+    /// Returns the number of nodes that are there: the gripper can be configured as absent.
     fn present(&self) -> usize {
         if self.gripper { NODES } else { JOINTS }
     }
 
-    /// Those nodes.
+    /// Returns the nodes that are there.
     fn all(&self) -> &[Node] {
         if self.gripper { &self.nodes } else { &self.nodes[..JOINTS] }
     }
@@ -147,7 +147,7 @@ impl Nodes {
         &self.nodes[..JOINTS]
     }
 
-    /// The gripper, if there is one.
+    /// Returns the gripper, if there is one.
     fn gripper_node(&self) -> Option<&Node> {
         self.nodes.get(GRIPPER).filter(|_| self.gripper)
     }
@@ -156,19 +156,19 @@ impl Nodes {
         self.gripper_node().is_some_and(|node| node.silent < config.missed_moves_max)
     }
 
-    /// The gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
+    /// Returns `true` if the gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
     pub fn gripper_keeps_part(&self, config: &Config) -> bool {
         !config.pump_off_on_error
             && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
-    /// The gripper left OperationEnable or lost its configuration in this tick: a pump that was commanded before does not
+    /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick: a pump that was commanded before does not
     /// start again by itself (J-23).
     pub fn gripper_lost(&self) -> bool {
         self.gripper_lost
     }
 
-    /// CAN flags of a gripper that does not answer: they are shown, and no error (J-14, J-23).
+    /// Returns the CAN flags of a gripper that does not answer: they are shown, but are not an error (J-14, J-23).
     pub fn gripper_flags(&self, config: &Config) -> u32 {
         if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }
@@ -178,38 +178,38 @@ impl Nodes {
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
-    /// Measured positions, rad, predicted where answers are missing (J-63); those that do not count yet are 0.
+    /// Returns the measured positions, rad, predicted while answers are missing (J-63); positions that do not count yet are 0.
     pub fn positions(&self) -> &[f64; JOINTS] {
         &self.position
     }
 
-    /// The positions, once that of every joint counts.
+    /// Returns the positions, once those of all joints count.
     pub fn known_positions(&self) -> Option<&[f64; JOINTS]> {
         (!self.fallen_back()).then_some(&self.position)
     }
 
-    /// Joints whose two encoders were found in this tick not to fit (J-35): a mask.
+    /// Returns the joints whose two encoders were found in this tick not to fit (J-35): a mask.
     pub fn misfits(&self) -> u8 {
         self.misfits
     }
 
-    /// What of the two encoders of the joint with this index does not fit, since its drive was configured, with the size of a jump (rad) or the
-    /// factor of a speed (J-35).
+    /// Returns the misfit of the two encoders of the joint with this index, since its drive was configured, with the size of a jump (rad)
+    /// or the factor of a speed (J-35).
     pub fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
 
-    /// Joints of which something does not fit, until their drives are configured again (J-35): a mask.
+    /// Returns the joints with a misfit, until their drives are configured again (J-35): a mask.
     pub fn untrusted(&self) -> u8 {
         (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
 
-    /// Measured velocities, rad/s, alike.
+    /// Returns the measured velocities, rad/s, like [`Self::positions`].
     pub fn velocities(&self) -> &[f64; JOINTS] {
         &self.velocity
     }
 
-    /// Takes in what came over the bus since the last tick. `commanded`: the set values of the ticks so far.
+    /// Takes the frames that came over the bus since the last tick. `commanded`: the set values of the ticks so far.
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
@@ -266,7 +266,7 @@ impl Nodes {
         }
     }
 
-    /// J-53: what stands for the joints that are set absent, and whether their drives answer all the same.
+    /// Sets the substitutes of the joints that are set absent, and finds drives of such joints that answer all the same (J-53).
     #[inline(never)]
     fn stand_in(&mut self, config: &Config) {
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
@@ -287,14 +287,14 @@ impl Nodes {
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
-            // It may go anywhere when it becomes accurate.
+            // The position may be anywhere when it becomes accurate.
             node.measured.forget();
         }
         node.report = *report;
         node.seen = true;
         if node.starting() {
             if !before.is_starting() || report.state == NodeState::START {
-                // Fallen back: the configuration is lost and has to be accepted again.
+                // The node has fallen back: its configuration is lost and must be accepted again.
                 node.lose_configuration();
             }
             if report.state != NodeState::START_TO_INIT {
@@ -306,7 +306,8 @@ impl Nodes {
         }
     }
 
-    /// Joints were found in motion or at rest, and what is commanded began with it (rad/s): that is no change of their motion (J-63).
+    /// Takes the `commanded` velocities (rad/s) of joints that were found in motion or at rest as a new reference: a restart of the set
+    /// values is not a change of the motion (J-63).
     pub fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
@@ -315,7 +316,7 @@ impl Nodes {
         }
     }
 
-    /// Positions and velocities from the nodes that `answered`; returns those whose answers are usable.
+    /// Takes positions and velocities from the nodes that `answered`. Returns the nodes whose answers are usable.
     fn measure(&mut self, inputs: &Inputs<'_>, answered: u8, commanded: &Commanded, config: &Config) -> u8 {
         let elapsed_ms = 1 + u32::from(inputs.missed_ticks);
         let asked = self.sent_move && inputs.bus_state.acknowledged;
@@ -354,12 +355,12 @@ impl Nodes {
         usable
     }
 
-    /// The arm stands, or moves slowly, and its drives have rested: joints may be enabled (J-16).
+    /// Returns `true` if the arm stands, or moves slowly, and its drives have rested: joints may be enabled (J-16).
     fn may_enable(&self, config: &Config) -> bool {
         self.still_ms >= config.enable_still_ms && self.rest_ms == 0
     }
 
-    /// Node init word: bit n set while node n is not initialised, or the gripper does not answer.
+    /// Returns the node init word: bit n is set while node n is not initialised, or the gripper does not answer.
     pub fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
@@ -372,12 +373,12 @@ impl Nodes {
         word
     }
 
-    /// A joint has lost its configuration or fallen back to Start or Init (J-20).
+    /// Returns `true` if a joint has lost its configuration or fallen back to Start or Init (J-20).
     pub fn fallen_back(&self) -> bool {
         self.joints().iter().any(Node::fallen_back)
     }
 
-    /// Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
+    /// Returns `true` when Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
     pub fn all_ready(&self, config: &Config) -> bool {
         let ready = |node: &Node| node.report.state == NodeState::READY;
         self.init_word(config) == 0
@@ -385,9 +386,9 @@ impl Nodes {
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
-    /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
-    /// An error that has merely occurred is cleared only while the torque is off: it is no reason to drop the arm. Returns whether any
-    /// has something to clear.
+    /// Executes ClearCurrentErrors for the nodes in `mask`: nodes with an error to clear are commanded to Init until they follow. An error
+    /// that has merely occurred is cleared only while the torque is off: it is not a reason to drop the arm. Returns `true` if any node has
+    /// an error to clear.
     pub fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
@@ -401,7 +402,7 @@ impl Nodes {
         any
     }
 
-    /// ResetCanDevices for the nodes in `mask` (J-23).
+    /// Executes ResetCanDevices for the nodes in `mask` (J-23).
     pub fn reset(&mut self, mask: u8) {
         let present = self.present();
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
@@ -411,8 +412,8 @@ impl Nodes {
 }
 
 impl Nodes {
-    /// Other settings count from now on, in a state without torque: where they are sent to the nodes, these are configured anew, and
-    /// it returns true.
+    /// Applies other settings from now on, in a state without torque. Returns `true` if these settings are sent to the nodes, which are
+    /// then configured again.
     pub fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         self.some_absent = config.absent.contains(&true);
@@ -424,7 +425,7 @@ impl Nodes {
                 node.stand_in();
                 (self.position[j], self.velocity[j]) = (config.absent_position[j], 0.0);
             } else if before.absent[j] {
-                // It is brought up like any other.
+                // The joint is brought up like any other.
                 node.restart(config);
             }
         }

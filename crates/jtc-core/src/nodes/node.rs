@@ -1,4 +1,4 @@
-//! One node: what it last reported, how far its bring-up is, and which state is requested of it (J-16, J-20).
+//! State of a node: its last report, the progress of its bring-up, and the state that is requested of it (J-16, J-20).
 use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
@@ -8,7 +8,7 @@ use crate::remembered::remembered;
 /// Ticks after a reset in which a late answer of the node does not count.
 const DEAF_AFTER_RESET: u8 = 20;
 
-/// Where the nodes are wanted.
+/// Goal of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Goal {
     /// Configured and ready to operate: Init.
@@ -19,7 +19,7 @@ pub(crate) enum Goal {
     Down,
 }
 
-/// One node.
+/// State of one node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub report: JointReport,
@@ -37,21 +37,21 @@ pub(crate) struct Node {
     pub(super) missed: u8,
     /// Position and velocity, once they count.
     pub(super) measured: Measurement,
-    /// Ticks of silence that are no error yet.
+    /// Ticks of silence that are not an error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
     /// The node is commanded to Init to clear its errors, until it has followed (J-21).
     pub(super) clear: bool,
-    /// A reset frame is to be sent.
+    /// A reset frame must be sent.
     pub(super) reset: bool,
     /// Reported OperationEnable while that was wanted.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
-    /// A usable answer came in since the last tick: the measurement is no prediction.
+    /// A usable answer came in since the last tick: the measurement is not a prediction.
     pub(super) fresh: bool,
     /// Its joint is set absent (J-53).
     pub(super) absent: bool,
-    /// State that it reported while it was not listened to.
+    /// State that the node reported while its answers did not count.
     pub(super) unasked: Option<NodeState>,
     /// Answers that came in since the last tick: all but the last were late.
     pub(super) answers: u8,
@@ -82,22 +82,22 @@ remembered!(Node {
 });
 
 impl Node {
-    /// Its measurement came in since the last tick.
+    /// Returns `true` if the measurement came in since the last tick.
     pub fn fresh(&self) -> bool {
         self.fresh
     }
 
-    /// [`Measurement::young_velocity`], rad/s.
+    /// Returns [`Measurement::young_velocity`], rad/s.
     pub fn young_velocity(&self, due: f64) -> f64 {
         self.measured.young_velocity(due)
     }
 
-    /// Its joint is set absent (J-53).
+    /// Returns `true` if the joint is set absent (J-53).
     pub fn absent(&self) -> bool {
         self.absent
     }
 
-    /// State that it reports; Start where its joint is absent, unless it reports all the same.
+    /// Returns the reported state; Start for an absent joint, unless its drive reports all the same.
     pub fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }
@@ -110,31 +110,31 @@ impl Node {
         self.report.state.is_starting()
     }
 
-    /// Lost its configuration, or back in Start or Init (J-20).
+    /// Returns `true` if the node lost its configuration, or is back in Start or Init (J-20).
     pub fn fallen_back(&self) -> bool {
         !self.valid || self.starting()
     }
 
-    /// Reports an error. A gripper has no warnings.
+    /// Returns `true` if the node reports an error. A gripper has no warnings.
     pub fn faulty(&self) -> bool {
-        // Drives set this warning also before they are configured, whatever the line is.
+        // Drives set this warning also before they are configured, for any state of the line.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }
 
-    /// Reports a fault of its own.
+    /// Returns `true` if the node reports a fault of its own.
     pub fn in_fault(&self) -> bool {
         let r = &self.report;
         self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
     }
 
-    /// The node has restarted: nothing of what was known of it holds.
+    /// Restarts the node: all knowledge of it is discarded.
     pub fn restart(&mut self, config: &Config) {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
-    /// The node of an absent joint (J-53), as it is in every tick: configured, ready and silent. So nothing is asked of it, and nothing
-    /// waits for it. A drive that answers is an error: either it or the setting is wrong.
+    /// Sets the node of an absent joint (J-53), in every tick: configured, ready and silent. So the controller requests nothing of the
+    /// node, and does not wait for it. A drive that answers is an error: either the drive or the setting is wrong.
     pub fn stand_in(&mut self) {
         let unasked = self.unasked;
         *self = Self {
@@ -149,17 +149,17 @@ impl Node {
         self.report.state = NodeState::READY;
     }
 
-    /// The configuration has to be accepted again, and until then position and velocity do not count.
+    /// Discards the configuration: it must be accepted again, and until then position and velocity do not count.
     pub fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
         self.measured = Measurement::default();
     }
 
-    /// State requested of the node (J-16).
+    /// Returns the state requested of the node (J-16).
     pub fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {
-            // J-53: an absent joint has no torque, even where it is there.
+            // J-53: an absent joint has no torque, even if its drive is there.
             let powered = self.absent && self.unasked == Some(NodeState::ENABLED);
             return if powered { Target::Ready } else { Target::NoChange };
         }
@@ -187,7 +187,8 @@ impl Node {
         }
     }
 
-    /// It is configured and enabled, and neither to be cleared nor reset: no change is requested of it for [`Goal::Enabled`].
+    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset: no change is requested of it for
+    /// [`Goal::Enabled`].
     pub fn wants_nothing_enabled(&self) -> bool {
         self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)
     }
@@ -204,7 +205,7 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// The short way says what the long one does.
+    /// The short check agrees with the long one.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {

@@ -1,7 +1,7 @@
-//! Whether the positions and the speed that a drive reports fit (J-35).
+//! Check that the positions and the speed that a drive reports fit (J-35).
 //!
-//! They come from two encoders, so either shows what is wrong with the other. A full scale that is set wrong makes all speeds wrong by a
-//! factor. An encoder that slips, or has stopped, moves where the motor does not, or stands where it does.
+//! Positions and speed come from two encoders, so either shows a fault of the other. A full scale that is set wrong makes all speeds wrong
+//! by a factor. An encoder that slips, or has stopped, moves while the motor does not, or stands while the motor moves.
 use super::measure::Ways;
 use super::node::Node;
 use crate::JOINTS;
@@ -13,25 +13,25 @@ use crate::remembered::remembered;
 const PERIOD: u8 = 10;
 /// Looks, one after the other, at which the two differ in the same direction when they do not fit.
 const LOOKS: u8 = 5;
-/// So many times the largest twist of the gear, the two differ by together then: by less a hand or a wall may twist it.
+/// Multiple of the largest twist of the gear that the two must differ by together: a hand or a wall may twist the gear by less.
 const TWISTS: f64 = 2.0;
-/// One of them stands where the other one goes so many times as far.
+/// Ratio of the two ways above which the encoder with the shorter way counts as standing.
 const STANDS: f32 = 10.0;
 
 /// A joint whose position and speed have differed at each of the last looks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Differs {
     looks: u8,
-    /// Way of its positions in the windows of these looks, rad.
+    /// Distance of its positions in the windows of these looks, rad.
     measured: f32,
-    /// Way that its speed stands for, rad.
+    /// Distance that its speed stands for, rad.
     reported: f32,
 }
 
-/// How often and how far the two have differed.
+/// Number and size of the differences between the two encoders.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SpeedCheck {
-    /// Whose turn it is.
+    /// Index of the joint whose turn it is.
     turn: u8,
     differs: [Differs; JOINTS],
     /// Reported torque at the last look, N·m.
@@ -42,8 +42,7 @@ remembered!(Differs { looks, measured, reported });
 remembered!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
-    /// One tick. Returns the joint whose speed is found to have another scale, as a mask; one of whose encoders only one moves has
-    /// misbehaved.
+    /// Runs one tick. Returns the joint whose speed has another scale, as a mask; a joint of which only one encoder moves has misbehaved.
     #[inline(always)]
     pub fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;
@@ -68,7 +67,7 @@ impl SpeedCheck {
 }
 
 impl Differs {
-    /// The two differ. Returns whether that shows another scale of the speed. `before`: torque at the last look, N·m.
+    /// Takes a difference of the two. Returns `true` if it shows another scale of the speed. `before`: torque at the last look, N·m.
     #[cold]
     fn differ(
         &mut self,
@@ -78,7 +77,7 @@ impl Differs {
         limits: &JointConfig,
         config: &Config,
     ) -> bool {
-        // How far the gear may have been twisted since.
+        // Possible twist of the gear since.
         let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
         if ways.unexplained().abs() <= ways.tolerance(config) + twist {
             self.looks = 0;

@@ -1,4 +1,4 @@
-//! What of the nodes is an error: missing answers (J-14, J-35), joints that leave OperationEnable or do not reach it (J-16).
+//! Errors of the nodes: missing answers (J-14, J-35), joints that leave OperationEnable or do not reach it (J-16).
 use jtc_bus::{NodeState, warning};
 use jtc_wire::can_flag;
 
@@ -43,12 +43,12 @@ impl Nodes {
             }
             let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
             if node.silent == config.missed_moves_max && !enabled_gripper {
-                // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that
-                // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
+                // The node may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that by its
+                // state when it answers again; if the gripper is still enabled, it has held its part meanwhile.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: its answers have impossible positions. Or too few of its Moves were acknowledged to decide
-                // whether it answers: for longer than this it is not to be predicted (J-63).
+                // J-35: its answers have impossible positions. Or too few of its Moves were acknowledged to decide if it answers: it must
+                // not be predicted for longer than this (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();
@@ -56,7 +56,7 @@ impl Nodes {
         }
     }
 
-    /// Sees joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
+    /// Detects joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
     pub(super) fn watch(&mut self, config: &Config, goal: Goal) {
         let may_enable = self.may_enable(config);
         for node in self.nodes.iter_mut().take(JOINTS) {
@@ -83,7 +83,7 @@ impl Nodes {
         }
     }
 
-    /// CAN flags of this tick that are errors: transmit timeout or bus-off, and the receive timeouts of the joints.
+    /// Returns the CAN flags of this tick that are errors: transmit timeout or bus-off, and the receive timeouts of the joints.
     pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let transmit = inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max;
         let mut flags = can_flag::TRANSMIT_TIMEOUT * u32::from(transmit);
@@ -93,17 +93,19 @@ impl Nodes {
         flags
     }
 
-    /// A joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not count.
+    /// Returns `true` if a joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not
+    /// count.
     pub fn external_error(&self, powered: bool) -> bool {
         self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
-    /// A joint reports a fault that only a clear of its own ends, and none has been sent. Its safety-line warning ends by itself.
+    /// Returns `true` if a joint reports a fault that only a clear of its own ends, and none has been sent. Its safety-line warning ends by
+    /// itself.
     pub fn fault_stays(&self) -> bool {
         self.joints().iter().any(|node| !node.clear && node.in_fault())
     }
 
-    /// A joint is still being cleared: the cause of its error is not gone.
+    /// Returns `true` if a joint is still being cleared: the cause of its error is not gone.
     pub fn clearing(&self) -> bool {
         self.joints().iter().any(|node| node.clear)
     }

@@ -1,4 +1,4 @@
-//! What one tick makes of a node, state by state (J-14, J-16, J-20, J-21, J-23).
+//! Effect of one tick on a node, state by state (J-14, J-16, J-20, J-21, J-23).
 use jtc_bus::{Frame, GripperReport, Request, Target};
 
 use super::*;
@@ -11,7 +11,7 @@ mod missing;
 const SCALE: Scale = Scale { velocity: 2.0 };
 const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
 
-/// What a tick finds on the bus, and nothing else.
+/// Returns the inputs of a tick that finds these frames on the bus, and nothing else.
 fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
     Inputs { bus, bus_state, ..Inputs::QUIET }
 }

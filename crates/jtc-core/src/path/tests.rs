@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
 
-/// One tick with bounds ±`easy` and ±`full`.
+/// Runs one tick with bounds ±`easy` and ±`full`.
 fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     clock.advance(1e9);
     if clock.halting() {
@@ -15,7 +15,7 @@ fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     }
 }
 
-/// Ticks from full speed to standstill, in each of which the bounds are those of `bounds`.
+/// Returns the ticks from full speed to standstill; `bounds` gives the bounds of each tick.
 fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
     let mut clock = PathClock::start(1.0);
     clock.halt();
@@ -55,7 +55,7 @@ fn j33_a_ramp_takes_its_length() {
 
 #[test]
 fn j33_margins_give_way_before_a_stop_comes_late() {
-    // Nothing within the margins, all that it takes within the torque limits; then less and less of that.
+    // No slope within the margins, all that is needed within the torque limits; then less and less of that.
     for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
         for most in [2.6, 4.0, 10.0, f64::INFINITY] {
             let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
@@ -105,7 +105,7 @@ fn j33_time_for_a_stop_runs_from_the_first_one() {
     }
 }
 
-/// One tick of a stop along ramps of 200 ms, whose slope changes by at most 0.1125 1/s in a tick, or eight times that in a hurry.
+/// Each tick of a stop along ramps of 200 ms, whose slope changes by at most 0.1125 1/s in a tick, or eight times that in a hurry.
 #[test]
 fn j33_each_tick_of_a_stop() {
     let (rounded, hurried) = (4.5 / 0.04 * DT, 8.0 * (4.5 / 0.04 * DT));
@@ -116,13 +116,13 @@ fn j33_each_tick_of_a_stop() {
         (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
         (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
-        // Within its margins, and just in time: that is no hurry.
+        // Within its margins, and just in time: that is not a hurry.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
-        // At full speed it does not get any faster, whatever the arm does.
+        // At full speed path time does not get any faster, for any motion of the arm.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
         // The last step: it stands, and does not slow down any more.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
-        // What is left is nothing, although the limits leave no slope for it.
+        // The remaining rate counts as zero, although the limits leave no slope for it.
         (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
     ] {
         let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
@@ -217,7 +217,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
         (rest, enough, true),
         (rest, 0.99 * enough, false),
         (rest, FREE.1, true),
-        // Nothing that a bound could hold back.
+        // A rest that is too small for a bound to hold back.
         (0.9e-9, 0.0, true),
         (1.1e-9, 0.0, false),
     ] {
@@ -231,7 +231,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
 fn j33_the_rest_of_the_way_flattens_the_slope_out() {
     let ramp = Ramp::of(200.0);
     for ticks in [1.0, 2.0, 7.0, 40.0] {
-        // From so many times the change of a tick on down to one: the sum of them.
+        // From `ticks` times the change of a tick down to one: the sum of them.
         let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
         assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
     }
@@ -267,7 +267,7 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
 }
 
 proptest! {
-    /// Whatever speeds are set and when: path time gets there by itself, within what was wanted before, and its slope never steps.
+    /// For any speeds at any times: path time gets there by itself, within the rates wanted before, and its slope never steps.
     #[test]
     fn j57_path_time_gets_to_every_speed_along_the_ramp(
         start in 0.05..1.0f64,
@@ -284,7 +284,7 @@ proptest! {
                 if clock.ramping() {
                     clock.change_pace(200.0, FREE);
                 }
-                // Nothing that was wanted so far is left, but for what a slope that is taken out needs.
+                // The rate stays within the rates wanted so far, except for the change that removes a slope.
                 let (least, most) = wanted.iter().fold((1.0f64, 0.0f64), |(l, m), w| (l.min(*w), m.max(*w)));
                 prop_assert!(clock.rate >= least - 1e-9 && clock.rate <= most + 1e-9, "{clock:?}");
                 prop_assert!((clock.slope - before.slope).abs() <= REVERSAL * round + 1e-9, "{before:?} {clock:?}");
@@ -296,7 +296,7 @@ proptest! {
     }
 }
 
-/// A pause is a pause, whatever speed is wanted meanwhile; it takes no longer from a lower one.
+/// A pause stays a pause, for any speed that is wanted meanwhile; it takes no longer from a lower speed.
 #[test]
 fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     let mut clock = PathClock::start(0.5);

@@ -1,4 +1,4 @@
-//! The parameters as they come in frames: numbers in the order of the wire, refused when one is none (J-06).
+//! The parameters as they come in frames: numbers in the order of the wire, refused if one is not a finite number (J-06).
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{DataStatus, Floats};
 
@@ -77,7 +77,7 @@ fn read_model(floats: &Floats<'_>) -> Result<ArmModel, DataStatus> {
     Ok(model)
 }
 
-/// Float `i`, refused when it is NaN, infinite or not there (J-06).
+/// Returns float `i`; refuses it if it is NaN, infinite or not there (J-06).
 fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
     floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
 }

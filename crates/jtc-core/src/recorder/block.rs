@@ -1,27 +1,27 @@
 //! A block of the flight recorder's memory, as it lies there (J-56).
 //!
-//! A block has a head of [`HEAD`] words and bits behind it. Its *commit* word has the number of bits and their check, and is written once
-//! a tick, last: what a cut tick has left behind the committed bits is not read. Memory that was never written, or has been damaged, fails
-//! the check and reads as no block.
+//! A block has a head of [`HEAD`] words, followed by bits. Its *commit* word has the number of bits and their check, and is written once a
+//! tick, last: bits that a cut tick has left after the committed bits are not read. Memory that was never written, or has been damaged,
+//! fails the check and does not read as a block.
 use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
-/// "JTCF" and the version of the layout, to be raised with each change of what is written, a list of `remembered!` among it.
+/// "JTCF" and the version of the layout, which must be raised with each change of the written data, including a list of `remembered!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
 /// Words in front of the bits.
 pub(super) const HEAD: usize = 5;
 /// Bits of a block.
 pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
 
-/// Where the words of the head are.
+/// Indices of the words of the head.
 pub(super) mod head {
     pub const MAGIC: usize = 0;
     /// Number of the block.
     pub const SEQUENCE: usize = 1;
     /// Bits (low half) and their check.
     pub const COMMIT: usize = 2;
-    /// Where the first snapshot begins (low half, [`super::NONE`]: nowhere) and the complement.
+    /// Begin of the first snapshot (low half, [`super::NONE`]: nowhere) and the complement.
     pub const SNAPSHOT: usize = 3;
     /// State of the log (low half) and the complement.
     pub const FLAGS: usize = 4;
@@ -32,7 +32,7 @@ pub(super) const NONE: u16 = 0xFFFF;
 
 /// The controller has had torque since the log was begun.
 pub(super) const POWERED: u16 = 0x100;
-/// The next block goes on where this one ends.
+/// The next block continues this one.
 pub(super) const CLOSED: u16 = 0x200;
 
 /// A number with its complement above it.
@@ -40,7 +40,7 @@ pub(super) const fn doubled(value: u16) -> u32 {
     value as u32 | (!value as u32) << 16
 }
 
-/// The number, if the complement is right.
+/// Returns the number, if the complement is right.
 fn halved(word: u32) -> Option<u16> {
     let value = word as u16;
     (doubled(value) == word).then_some(value)
@@ -50,7 +50,7 @@ pub(super) fn mix(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
 }
 
-/// The commit word for so many bits, the last of them in `rest`.
+/// Returns the commit word for this number of `bits`, the last of them in `rest`.
 pub(super) fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
     let hash = mix(hash, rest);
     bits | (hash ^ hash << 16) & 0xFFFF_0000
@@ -62,9 +62,9 @@ pub(super) struct Whole<'a> {
     pub sequence: u32,
     /// Bits that are committed.
     pub bits: u32,
-    /// The next block goes on behind them.
+    /// The next block continues these bits.
     pub closed: bool,
-    /// Where the first snapshot begins.
+    /// Begin of the first snapshot.
     pub snapshot: Option<u32>,
     pub state: LogState,
     pub powered: bool,
@@ -72,7 +72,7 @@ pub(super) struct Whole<'a> {
 }
 
 impl<'a> Whole<'a> {
-    /// `None` for memory that holds no block.
+    /// Parses a block; returns `None` for memory that holds no block.
     pub fn parse(block: &'a Block) -> Option<Self> {
         let (head, words) = block.split_first_chunk::<HEAD>()?;
         let bits = head[head::COMMIT] & 0xFFFF;
@@ -94,7 +94,7 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// A block with these bits, as the recorder writes it: for tests of what reads a log.
+/// Creates a block with these bits, as the recorder writes it: for tests of the code that reads a log.
 #[doc(hidden)]
 pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
     let mut block = [0; BLOCK_WORDS];
@@ -115,7 +115,7 @@ pub(super) fn flags(state: LogState, powered: bool) -> u16 {
     state as u16 | if powered { POWERED } else { 0 }
 }
 
-/// The block has this number; what is in it is not looked at.
+/// Returns `true` if the block has this number; its content is not looked at.
 pub(super) fn in_place(block: &Block, sequence: u32) -> bool {
     block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
 }

@@ -1,7 +1,7 @@
-//! The inputs of a tick against those before: whole words for what is new in each tick, which take little time to write, and bits for
-//! the rest, in front of which a bit of the first word says whether there is any.
+//! The inputs of a tick against those before: whole words for values that are new in each tick, which take little time to write, and bits
+//! for the rest, which a bit of the first word announces.
 //!
-//! Writer and reader keep the same [`Reference`]; a snapshot begins it anew on both sides.
+//! Writer and reader keep the same [`Reference`]; a snapshot restarts it on both sides.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentCommand, UrgentCommands};
 
@@ -16,16 +16,16 @@ use crate::{JOINTS, NODES};
 pub const HOST_BYTES: usize = 48;
 /// Bytes of frames of hosts that are recorded, on average in a tick and at once.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// Bytes that an event counts for beside its own: it takes 15 to 20 bits.
+/// Bytes that an event counts for in addition to its own: it takes 15 to 20 bits.
 const EVENT_BYTES: u16 = 2;
 
-/// What the next inputs are written against.
+/// Reference for writing the next inputs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
     /// The last answers to a Move: lengths, and words by [`words`]; velocity and torque as they were when something else had changed.
     pub(super) len: [u8; NODES],
     pub(super) words: [Words; NODES],
-    /// How many nodes answer.
+    /// Number of nodes that answer.
     pub(super) expected: u8,
     /// Bytes of frames of hosts that may still be recorded.
     allowance: u16,
@@ -34,7 +34,7 @@ pub(super) struct Reference {
 /// Words of a payload.
 pub(super) type Words = [u32; MAX_LEN / 4];
 
-/// The words of an answer as they are in memory, but for the position, which is a number.
+/// Returns the words of an answer as they are in memory, except the position, which is a number.
 #[inline]
 fn words(frame: &Frame) -> Words {
     let mut words = frame.words();
@@ -56,13 +56,13 @@ impl Default for Reference {
 /// Word of an answer that holds the position, and the one with velocity and torque.
 pub(super) const POSITION: usize = 0;
 pub(super) const RATES: usize = 1;
-/// Bits of a joint's way in a tick, in steps of a 16-bit encoder, where all joints have moved so little.
+/// Bits of a joint's way in a tick, in steps of a 16-bit encoder, if all joints have moved little enough.
 const WAY_BITS: u32 = 5;
-/// The same as a mask, and half of it.
+/// Mask of [`WAY_BITS`], and half of its range.
 const WAY: u32 = (1 << WAY_BITS) - 1;
 const WAY_HALF: u32 = 1 << (WAY_BITS - 1);
 
-/// Where a joint is that was at `before`, by the ways of all of them.
+/// Returns the position of a joint that was at `before`, by the ways of all of them.
 pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
     let way = (ways >> (WAY_BITS * n as u32) & WAY).wrapping_sub(WAY_HALF);
     before.wrapping_add(way << 16)
@@ -71,26 +71,26 @@ pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
 /// The first word of a tick. Bit 0 is a 1 in front of a snapshot.
 pub(super) mod head {
     pub const STATUS_FREE: u32 = 1 << 1;
-    /// Nothing came but answers.
+    /// Only answers came.
     pub const QUIET: u32 = 1 << 2;
     /// Each node that is expected has answered, in order: words with what the joints have moved follow.
     pub const ORDERED: u32 = 1 << 3;
-    /// The way of a joint is no small number of steps: the words hold all positions.
+    /// The way of a joint is not a small number of steps: the words hold all positions.
     pub const FAR: u32 = 1 << 4;
     /// More than the motion has changed.
     pub const CHANGED: u32 = 1 << 5;
-    /// Where the check of what came out begins.
+    /// First bit of the check of the outputs.
     pub const CHECK: u32 = 16;
 }
 
-/// What the joints have moved, of answers that came in order.
+/// Motion of the joints, from answers that came in order.
 struct Answers {
     positions: [u32; JOINTS],
     rates: [u32; JOINTS],
-    /// What the joints have moved, and bits that are set where one has moved far.
+    /// Ways of the joints, and bits that are set if a joint has moved far.
     ways: u32,
     far: u32,
-    /// Bits of other words that have.
+    /// Bits of other words that have changed.
     changed: u32,
 }
 
@@ -110,7 +110,7 @@ fn is_move_answer(frame: &Frame) -> bool {
 }
 
 impl Reference {
-    /// Writes a tick: what came in, and a check of what came out. Returns whether all of it is there (a replay of this tick gives the
+    /// Writes a tick: its inputs, and a check of its outputs. Returns `true` if all inputs are written (a replay of this tick gives the
     /// same).
     ///
     /// Drives send other positions in each tick, and the rest of their answers changes seldom: as a rule a tick is eight words.
@@ -152,7 +152,7 @@ impl Reference {
         (quiet && !changed) || self.write_more(head, inputs, done, to)
     }
 
-    /// The motion, if each node that is expected has answered, in order.
+    /// Returns the motion, if each node that is expected has answered, in order.
     #[inline]
     fn ordered(&self, bus: &[Frame]) -> Option<Answers> {
         if bus.len() != usize::from(self.expected) {
@@ -183,7 +183,7 @@ impl Reference {
         (misplaced == 0).then_some(answers)
     }
 
-    /// What a tick has beside motion, as its first word says.
+    /// Writes the inputs of a tick besides motion, as its first word says.
     #[inline(never)]
     fn write_more<P, const N: usize>(
         &mut self,
@@ -210,7 +210,7 @@ impl Reference {
         whole
     }
 
-    /// Frames in any order.
+    /// Writes frames in any order.
     #[inline(never)]
     fn write_frames<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
         to.put(bus.len() as u32, 6);
@@ -238,14 +238,14 @@ impl Reference {
         self.expect(answers);
     }
 
-    /// Which nodes are expected from now on.
+    /// Sets the nodes that are expected from now on.
     pub(super) fn expect(&mut self, answers: u32) {
         if answers == 0x3F || answers == 0x7F {
             self.expected = answers.count_ones() as u8;
         }
     }
 
-    /// An answer of node `n` to a Move, of the length that is known.
+    /// Writes an answer of node `n` to a Move, of the length that is known.
     fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
         let Some(before) = self.words.get_mut(n) else { return };
         let now = words(frame);
@@ -256,7 +256,7 @@ impl Reference {
         }
     }
 
-    /// What is not as ever, but for the joint bus.
+    /// Writes the inputs that are not as usual, except the joint bus.
     #[inline(never)]
     fn write_rest<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
         to.put(inputs.safety_input.into(), 1);
@@ -273,7 +273,7 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // Those that were done, and the one that was worked on or had no turn; as many as there is room for.
+        // Events that were done, and the event that was worked on or had no turn; as many as there is room for.
         let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
         let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
         let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));
@@ -297,7 +297,7 @@ impl Reference {
         rest.is_some()
     }
 
-    /// One event; false when its bytes were left out.
+    /// Writes one event; returns `false` if its bytes were left out.
     fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);
@@ -328,18 +328,19 @@ impl Reference {
     }
 }
 
-/// Segment 0 of a trajectory.
+/// Returns `true` for segment 0 of a trajectory.
 fn begins_upload(frame: FrameRef<'_>) -> bool {
     frame.frame_type == FrameType::Trajectory
         && Segment::parse(frame.body()).is_some_and(|segment| segment.segment == 0)
 }
 
-/// The frame is recorded with its bytes. Parameters change the arm, whatever their length: a snapshot after them says which it is.
+/// Returns `true` if the frame is recorded with its bytes. Parameters change the arm, at any length: a snapshot after them says which arm
+/// it is.
 fn has_bytes(frame: FrameRef<'_>) -> bool {
     frame.bytes.len() <= HOST_BYTES && !changes_arm(frame.frame_type)
 }
 
-/// Frames that change the parameters, which a log has by hash only.
+/// Returns `true` for frames that change the parameters, which a log has by hash only.
 fn changes_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     frame_type.is_default() || matches!(frame_type, FrictionTable | PidParam | ArmModel | FrictionPolynomial)

@@ -7,7 +7,7 @@ use super::block::{CLOSED, HEAD, MAGIC, NONE, Whole, commit, doubled, flags, hea
 use super::{BLOCK_WORDS, Block};
 use crate::remembered::BitSink;
 
-/// Where a block is.
+/// Place of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Place {
     piece: usize,
@@ -24,7 +24,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         self.pieces.iter().map(|piece| piece.as_ref().len() as u32).sum()
     }
 
-    /// The block of this number.
+    /// Returns the block of this number.
     fn block(&self, sequence: u32) -> Option<&Block> {
         let mut at = sequence.checked_rem(self.len())? as usize;
         for piece in &self.pieces {
@@ -36,7 +36,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         None
     }
 
-    /// Where the block of this number is: its piece, and its place in that.
+    /// Returns the place of the block of this number: its piece, and its place in that piece.
     fn place(&self, sequence: u32) -> Place {
         let mut at = sequence.checked_rem(self.len()).unwrap_or(0) as usize;
         for (piece, blocks) in self.pieces.iter().enumerate() {
@@ -54,12 +54,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         self.pieces.get_mut(place.piece)?.as_mut().get_mut(place.block)
     }
 
-    /// The block of this number, if it is there and whole.
+    /// Returns the block of this number, if it is there and whole.
     fn whole(&self, sequence: u32) -> Option<Whole<'_>> {
         self.block(sequence).and_then(Whole::parse).filter(|whole| whole.sequence == sequence)
     }
 
-    /// The newest block.
+    /// Returns the newest block.
     fn newest(&self) -> Option<u32> {
         // By their heads first: the memory is slow, and drives wait for the first frame after a reset.
         let mut below = None;
@@ -89,7 +89,7 @@ pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
     /// Number of the open block; `None` before the first.
     open: Option<u32>,
-    /// Where it is.
+    /// Place of the open block.
     place: Place,
     /// Number of the next block.
     next: u32,
@@ -107,7 +107,7 @@ pub(super) struct Writer<P, const N: usize> {
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
-    /// Whatever the memory holds.
+    /// Creates a writer, for any content of the memory.
     pub fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();
@@ -140,12 +140,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         &self.ring.pieces
     }
 
-    /// The block of this number.
+    /// Returns the block of this number.
     pub fn block(&self, sequence: u32) -> Option<&Block> {
         self.ring.block(sequence)
     }
 
-    /// Nothing is in the memory.
+    /// Returns `true` if the memory holds no log.
     pub fn is_empty(&self) -> bool {
         self.open.is_none()
     }
@@ -156,12 +156,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         (self.open, self.state, self.powered) = (None, LogState::Recording, false);
     }
 
-    /// What follows begins in a block of its own, with a snapshot.
+    /// Begins a new block, which starts with a snapshot.
     pub fn begin(&mut self) {
         self.open_block();
     }
 
-    /// A snapshot begins here. Until it is committed it lies behind the bits, where there is none.
+    /// Marks the begin of a snapshot here. Until the snapshot is committed, the mark points past the committed bits, which hold no
+    /// snapshot.
     pub fn mark_snapshot(&mut self) {
         if !self.marked {
             self.marked = true;
@@ -170,7 +171,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// The controller has torque.
+    /// Records that the controller has torque.
     pub fn set_powered(&mut self) {
         self.powered = true;
         self.set_head(head::FLAGS, doubled(flags(self.state, true)));
@@ -183,7 +184,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Bits of the open block.
+    /// Returns the number of bits of the open block.
     fn bits(&self) -> u32 {
         ((self.word - HEAD) * 32) as u32 + self.fill
     }
@@ -205,7 +206,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.hash = mix(MAGIC, sequence);
     }
 
-    /// Everything that was put counts from now on.
+    /// Commits everything that was put.
     #[inline]
     pub fn commit(&mut self) {
         let (rest, bits, hash, word) = (self.rest, self.bits(), self.hash, self.word);
@@ -223,13 +224,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// The log ends here, for this reason.
+    /// Ends the log here, for this reason.
     pub fn freeze(&mut self, state: LogState) {
         self.state = state;
         self.set_head(head::FLAGS, doubled(flags(state, self.powered)));
     }
 
-    /// Numbers of the oldest block and of the one behind the newest.
+    /// Returns the numbers of the oldest block and of the block after the newest.
     pub fn range(&self) -> (u32, u32) {
         let Some(newest) = self.open else { return (self.next, self.next) };
         let mut oldest = newest;
@@ -243,7 +244,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         (oldest, newest.wrapping_add(1))
     }
 
-    /// Bytes of a block from `offset` on, little-endian words; returns how many there were.
+    /// Reads bytes of a block from `offset` on, little-endian words; returns the number of bytes.
     pub fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
         let Some(block) = self.ring.block(sequence).filter(|block| in_place(block, sequence)) else {
             return 0;
@@ -257,7 +258,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         read
     }
 
-    /// What follows begins at a whole word.
+    /// Fills up the present word: the next data begins at a whole word.
     pub fn align(&mut self) {
         if self.fill != 0 {
             let word = core::mem::take(&mut self.rest);
@@ -266,7 +267,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Appends whole words behind whole words, in one block.
+    /// Appends whole words after whole words, in one block.
     #[inline]
     pub fn append<const K: usize>(&mut self, words: [u32; K]) {
         if self.word + K > BLOCK_WORDS {
@@ -284,7 +285,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// A word is full; what `rest` and `fill` hold follows it.
+    /// Writes a full word; the bits in `rest` and `fill` follow it.
     #[inline]
     fn full(&mut self, word: u32) {
         if let Some(place) = self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word)) {
@@ -303,7 +304,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     #[cold]
     #[inline(never)]
     fn next_block(&mut self) {
-        // What is there counts as it is: its end may be in the middle of a tick, whose rest follows.
+        // The bits so far count as they are: their end may be in the middle of a tick, whose rest follows.
         self.commit();
         self.set_head(head::FLAGS, doubled(flags(self.state, self.powered) | CLOSED));
         self.open_block();
@@ -320,7 +321,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             return;
         }
         let word = self.rest;
-        // What did not fit; nothing where all of it did.
+        // Bits that did not fit; none if all of them did.
         let used = 32 - self.fill;
         (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
         self.full(word);
@@ -331,12 +332,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         let fill = self.fill;
         if value != 0 {
             let (low, high) = (value as u32, (value >> 32) as u32);
-            // Behind a bit that is set: 65 bits.
+            // After a bit that is set: 65 bits.
             let (a, b, c) = (low << 1 | 1, low >> 31 | high << 1, high >> 31);
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];
             self.rest = over(b) | c << fill;
-            // Two at once where neither is the last of the block.
+            // Two words at once if neither is the last of the block.
             let place =
                 self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..BLOCK_WORDS - 1));
             match place.and_then(|place| place.first_chunk_mut()) {

@@ -15,34 +15,34 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// From bit `bit` of the first of `blocks` on.
+    /// Reads from bit `bit` of the first of `blocks` on.
     pub fn new(blocks: &'a [Block], bit: u32) -> Self {
         let current = blocks.first().and_then(Whole::parse);
         Self { blocks, block: 0, bit, current, damaged: false }
     }
 
-    /// To the next whole word.
+    /// Moves to the next whole word.
     pub fn align(&mut self) {
         self.bit = self.bit.next_multiple_of(32);
     }
 
-    /// The next bit, which is read once more.
+    /// Returns the next bit, which is read once more.
     pub fn peek(&self) -> bool {
         self.clone().take(1) != 0
     }
 
-    /// Block in the list that is read.
+    /// Returns the block in the list that is read.
     pub fn block(&self) -> usize {
         self.block
     }
 
-    /// Nothing is left, or the next bits are in a block that does not follow.
+    /// Returns `true` if nothing is left, or the next bits are in a block that does not follow.
     pub fn at_end(&mut self) -> bool {
         self.advance();
         self.current.is_none_or(|whole| self.bit >= whole.bits)
     }
 
-    /// To the next block where this one is used up and another follows.
+    /// Moves to the next block if this one is used up and another follows.
     fn advance(&mut self) {
         let Some(whole) = self.current else { return };
         if self.bit < whole.bits || !whole.closed {

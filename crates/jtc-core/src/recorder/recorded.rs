@@ -17,15 +17,15 @@ use crate::response_queue::HOST_LINES;
 pub struct RecordedEvent {
     /// Line.
     pub line: usize,
-    /// An urgent command has overtaken it (J-04).
+    /// An urgent command has overtaken the event (J-04).
     pub overtaken: bool,
-    /// It came on a plain line (J-51).
+    /// The event came on a plain line (J-51).
     pub plain: bool,
-    /// Type byte, 0 where unknown.
+    /// Type byte, 0 if unknown.
     pub frame_type: u8,
-    /// What it was.
+    /// Kind of the event.
     pub kind: RecordedKind,
-    /// It was segment 0 of a trajectory, whose bytes are not in the log.
+    /// The event was segment 0 of a trajectory, whose bytes are not in the log.
     begins_upload: bool,
     bytes: [u8; HOST_BYTES],
     len: usize,
@@ -59,13 +59,13 @@ impl RecordedEvent {
         len: 0,
     };
 
-    /// The bytes of a recorded frame.
+    /// Returns the bytes of a recorded frame.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// As the controller gets it. In place of a frame that was not recorded: one that changes nothing; of segment 0 of a trajectory, one
-    /// without points, which does in Operate what any segment 0 does (J-30).
+    /// Returns the event as the controller gets it. In place of a frame that was not recorded: one that changes nothing; of segment 0 of a
+    /// trajectory, one without points, which does in Operate what any segment 0 does (J-30).
     pub fn event(&self) -> HostEvent<'_> {
         let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
             (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
@@ -126,22 +126,22 @@ pub struct RecordedInputs {
 }
 
 impl RecordedInputs {
-    /// Frames of the joint bus.
+    /// Returns the frames of the joint bus.
     pub fn bus(&self) -> impl Iterator<Item = Frame> + '_ {
         self.bus.iter().map_while(|frame| *frame)
     }
 
-    /// What hosts sent, as far as it was looked at.
+    /// Returns the events of hosts, as far as the controller looked at them.
     pub fn host(&self) -> &[RecordedEvent] {
         self.host.get(..self.host_len).unwrap_or(&[])
     }
 
-    /// Every input is there: a replay of this tick does what the controller did.
+    /// Returns `true` if every input is there: a replay of this tick does what the controller did.
     pub fn is_whole(&self) -> bool {
         !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
     }
 
-    /// A tick, and the check of what came out of it.
+    /// Reads a tick, and the check of its outputs.
     pub(super) fn read(reference: &mut Reference, from: &mut Reader<'_>) -> (Self, u16) {
         let head = from.take(32);
         let mut inputs = Self {
@@ -192,15 +192,15 @@ impl RecordedInputs {
     }
 }
 
-/// How positions were written.
+/// Form in which positions were written.
 enum Way {
-    /// What all joints have moved.
+    /// Ways of all joints.
     Moved(u32),
-    /// Where each is.
+    /// Position of each joint.
     Far([u32; JOINTS]),
 }
 
-/// What the joints have moved.
+/// Motion of the joints.
 struct Motion {
     rates: [u32; JOINTS],
     way: Way,
@@ -214,7 +214,7 @@ impl Motion {
         Self { rates, way }
     }
 
-    /// Position of joint `n`, which was at `before`.
+    /// Returns the position of joint `n`, which was at `before`.
     fn position(&self, n: usize, before: u32) -> u32 {
         match &self.way {
             Way::Moved(ways) => moved(n, before, *ways),
@@ -279,7 +279,7 @@ impl Reference {
     }
 }
 
-/// An answer that has changed, and is as it was before where it has not.
+/// Reads an answer that has changed; words that have not changed stay as they were.
 fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
     if from.take(1) != 0 {
         for word in words {
@@ -290,7 +290,7 @@ fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
     }
 }
 
-/// An answer of node `n` to a Move.
+/// Returns an answer of node `n` to a Move.
 fn answer(n: usize, len: u8, words: &Words) -> Option<Frame> {
     let mut bytes = [0; MAX_LEN];
     for (at, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).enumerate() {

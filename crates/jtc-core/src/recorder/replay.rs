@@ -14,7 +14,7 @@ use crate::nodes::FRAMES_MAX;
 use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::telemetry::Telemetry;
 
-/// What a log has of a moment.
+/// A record of a log.
 // A snapshot is large, and there are few.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
@@ -23,36 +23,36 @@ pub enum Record {
     Snapshot(Snapshot),
     /// A tick.
     Tick {
-        /// What went in.
+        /// Inputs of the tick.
         inputs: RecordedInputs,
-        /// Check of what came out of all ticks since the last snapshot.
+        /// Check of the outputs of all ticks since the last snapshot.
         check: u16,
     },
 }
 
-/// A log: blocks in the order of their numbers. Reading is total: whatever the blocks hold, it gives the records of those that are whole,
-/// from the first snapshot on.
+/// A log: blocks in the order of their numbers. Reading is total: for any content of the blocks, it gives the records of those that are
+/// whole, from the first snapshot on.
 #[derive(Clone, Debug)]
 pub struct Log<'a> {
     blocks: &'a [Block],
-    /// Where the next snapshot is looked for.
+    /// Block from which on the next snapshot is looked for.
     next: usize,
     reader: Option<Reader<'a>>,
     reference: Reference,
 }
 
 impl<'a> Log<'a> {
-    /// From the oldest block on.
+    /// Reads from the oldest block on.
     pub fn new(blocks: &'a [Block]) -> Self {
         Self { blocks, next: 0, reader: None, reference: Reference::default() }
     }
 
-    /// Why the log ends, and number and state of its newest block; `None` when no block is whole.
+    /// Returns the number of the newest block and its state, which says why the log ends; `None` if no block is whole.
     pub fn end(&self) -> Option<(u32, LogState)> {
         self.blocks.iter().rev().find_map(Whole::parse).map(|whole| (whole.sequence, whole.state))
     }
 
-    /// The next snapshot behind what was read.
+    /// Returns a reader at the next snapshot after the blocks that were read.
     fn find(&mut self) -> Option<Reader<'a>> {
         while let Some(rest) = self.blocks.get(self.next..).filter(|rest| !rest.is_empty()) {
             self.next += 1;
@@ -98,28 +98,27 @@ impl Iterator for Log<'_> {
     }
 }
 
-/// How a tick of a replay compares with the log.
+/// Comparison of a tick of a replay with the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// What came out is what came out then.
+    /// The outputs are those of the log.
     Same,
-    /// It is not.
+    /// The outputs differ from those of the log.
     Differs,
-    /// What came out may differ, until the next snapshot, and why.
+    /// The outputs may differ, until the next snapshot, for this reason.
     Unsure(Unsure),
 }
 
-/// Why a replay may differ from what was.
+/// Reason why a replay may differ from the recorded ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsure {
-    /// Something that went in is not in the log: a long frame, parameters, more frames than it has room for, or the memory that a
-    /// StoreArm is for.
+    /// An input is not in the log: a long frame, parameters, more frames than it has room for, or the memory that a StoreArm is for.
     Input,
     /// The arm is not the one of that time.
     Arm,
     /// The points of the trajectory of that time are not known.
     Points,
-    /// There was no snapshot yet.
+    /// No snapshot came yet.
     NoSnapshot,
 }
 
@@ -130,11 +129,11 @@ pub struct Step {
     pub telemetry: Telemetry,
     /// Starts of the device.
     pub boots: u32,
-    /// What went in; `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
+    /// Inputs; `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
     pub inputs: Option<RecordedInputs>,
-    /// What came out; `None` alike.
+    /// Outputs; `None` for a snapshot.
     pub outputs: Option<Outputs>,
-    /// How it compares.
+    /// Comparison with the log.
     pub outcome: Outcome,
 }
 
@@ -146,32 +145,32 @@ pub struct Replay<'a, M> {
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
-    /// Something that went in is not in the log, and what came out is the same all the same.
+    /// An input is not in the log, and the outputs are the same all the same.
     follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,
 }
 
 impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
-    /// Of this log, by a controller that has an arm and, in its memory, the points of this hash.
+    /// Creates a replay of this log, by a controller that has an arm and, in its memory, the points of this hash.
     pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
         // In many more parts than an image has.
         for _ in 0..IMAGE_MAX {
             controller.hash_arm();
         }
         let arm = controller.extensions.hash;
-        // It takes the requests that a device with a recorder has taken.
+        // The controller takes the requests that a device with a recorder has taken.
         controller.extensions.log = LogState::Recording;
         let outcome = Outcome::Unsure(Unsure::NoSnapshot);
         Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
     }
 
-    /// The points of this hash are in memory.
+    /// Returns `true` if the points of this hash are in memory.
     fn knows(&self, points_hash: u32) -> bool {
         self.points_hash == Some(points_hash)
     }
 
-    /// What a replay from this snapshot on is worth.
+    /// Returns the outcome of a replay from this snapshot on.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -183,17 +182,17 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         }
     }
 
-    /// Hash of the arm that the controller has.
+    /// Returns the hash of the arm that the controller has.
     pub fn arm(&self) -> Option<u64> {
         self.arm
     }
 
-    /// The controller after the last step.
+    /// Returns the controller after the last step.
     pub fn controller(&self) -> &Controller<M> {
         &self.controller
     }
 
-    /// What differs in the state stays the same until a snapshot sets it right.
+    /// Takes a snapshot. A difference in the state stays until a snapshot corrects it.
     fn snapshot(&mut self, snapshot: &Snapshot) -> Option<Step> {
         let follows = self.boots == Some(snapshot.origin.boots)
             && self.controller.observed.tick == snapshot.tick()
@@ -258,7 +257,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == recorded_check;
-        // Here is no memory that lasts: a device that has one takes some ticks for a StoreArm which is refused here at once.
+        // A replay has no memory that lasts: a device that has one takes some ticks for a StoreArm which is refused here at once.
         let stores = |event: &RecordedEvent| event.frame_type == FrameType::StoreArm as u8;
         let repeatable = recorded.is_whole() && !recorded.host().iter().any(stores);
         if !repeatable && self.outcome == Outcome::Same {
@@ -272,7 +271,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // What is missing may have changed nothing: as long as the same comes out, it has not.
+        // A missing input may have changed nothing: as long as the outputs are the same, it has not.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)

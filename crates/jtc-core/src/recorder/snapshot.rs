@@ -1,7 +1,7 @@
 //! The state of the controller in a snapshot: all that decides how the arm moves and what is reported of it, without the arm and the
 //! points of the trajectory, which a log names by hash.
 //!
-//! The link's own bookkeeping (records that wait, frames to be sent, how far a long frame has been executed) is no part of it: a replay
+//! The link's own bookkeeping (records that wait, frames to be sent, how far a long frame has been executed) is not part of it: a replay
 //! gives the same frames on the joint bus and the same states, not the same bytes on the lines.
 use jtc_dynamics::Payload;
 use jtc_wire::RawPoint;
@@ -24,26 +24,26 @@ use crate::store::StoreState;
 use crate::telemetry::Observed;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// Which log, device and arm a snapshot is of.
+/// Log, device and arm of a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// Starts of the device.
     pub boots: u32,
     /// Hash of the firmware's version and revision (FNV-1a, 64 bits).
     pub firmware: u64,
-    /// Hash of the arm in use (J-52); `None` where it was not known yet.
+    /// Hash of the arm in use (J-52); `None` if it was not known yet.
     pub arm: Option<u64>,
     /// Gains, model and friction polynomial are the built-in ones: these have more digits than the arm image carries.
     pub built_in: [bool; 3],
     /// Hash of the points of the trajectory in memory, and how many there are.
     pub points_hash: u32,
-    /// How many points that is.
+    /// Number of those points.
     pub points: u32,
 }
 
 remembered!(Origin { boots, firmware, arm, built_in, points_hash, points });
 
-/// Settings that are no part of the arm.
+/// Settings that are not part of the arm.
 #[derive(Clone, Copy, Debug)]
 struct LiveSettings {
     speed: f64,
@@ -123,7 +123,7 @@ remembered!(Dynamic {
 /// The controller after a tick, as a log has it.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// What it is of.
+    /// Log, device and arm of the snapshot.
     pub origin: Origin,
     pub(crate) dynamic: Dynamic,
 }
@@ -131,29 +131,29 @@ pub struct Snapshot {
 remembered!(Snapshot { origin, dynamic });
 
 impl Snapshot {
-    /// Ticks since the start of the device.
+    /// Returns the ticks since the start of the device.
     pub fn tick(&self) -> u64 {
         self.dynamic.observed.tick
     }
 
-    /// State of the controller.
+    /// Returns the state of the controller.
     pub fn state(&self) -> ControllerState {
         self.dynamic.state
     }
 
-    /// Time since the first point along the path, ms, and ms between points.
+    /// Returns the time since the first point along the path, ms, and the ms between points.
     pub fn path_ms(&self) -> (f64, u16) {
         (self.dynamic.clock.time, self.dynamic.store.step_ms())
     }
 
-    /// A trajectory is being executed, or is paused.
+    /// Returns `true` if a trajectory is being executed, or is paused.
     pub fn needs_points(&self) -> bool {
         matches!(self.dynamic.trajectory, TrajectoryState::Execute | TrajectoryState::Pause)
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// What a snapshot is of.
+    /// Returns the log, device and arm of a snapshot.
     pub(crate) fn origin(&self) -> Origin {
         let (points_hash, points) = self.store.points_hash();
         Origin {
@@ -168,7 +168,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Appends the state in the order of [`Dynamic`].
     pub(crate) fn write_state<S: BitSink>(&self, to: &mut S) {
-        // Every field is named: a new one has to be decided upon.
+        // Every field is named: a new field needs a decision.
         let Self {
             config,
             state,
@@ -222,7 +222,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         extensions.jogs_refused_ms.write(to);
     }
 
-    /// Goes on from a snapshot: this controller has the arm and, where it executes one, the trajectory of that time.
+    /// Goes on from a snapshot: this controller has the arm of that time and, if it executes a trajectory, that trajectory.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let Dynamic {
             state,
@@ -263,17 +263,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.jogs_refused_ms = jogs_refused_ms;
     }
 
-    /// Hash of the points of a trajectory in memory.
+    /// Returns the hash of the points of a trajectory in memory.
     pub fn points_hash(&self) -> u32 {
         self.store.points_hash().0
     }
 
-    /// The points of a trajectory in memory.
+    /// Returns the points of a trajectory in memory.
     pub fn points(&self) -> &[RawPoint] {
         self.store.held_points(0)
     }
 
-    /// Points of a trajectory from number `first` on, in the memory of a controller that replays a log.
+    /// Puts points of a trajectory from number `first` on into the memory of a controller that replays a log.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         self.store.put_points(first, points);
     }
@@ -288,7 +288,7 @@ mod tests {
     use crate::remembered::tests::Bits;
     use crate::settings::{self, TABLE};
 
-    /// What the hash of the arm does not name is in the snapshot, each setting of it.
+    /// Each setting that the hash of the arm does not name is in the snapshot.
     #[test]
     fn j56_every_setting_that_is_no_part_of_the_arm_is_remembered() {
         let points = || [RawPoint::default(); 4];

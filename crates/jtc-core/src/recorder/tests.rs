@@ -1,4 +1,4 @@
-//! Whatever comes on the bus is read back as it was.
+//! Any frames on the bus are read back as they were.
 extern crate std;
 use std::vec;
 use std::vec::Vec;
@@ -13,18 +13,18 @@ use super::{BLOCK_WORDS, Block, RecordedInputs};
 use crate::NODES;
 use crate::io::Inputs;
 
-/// What becomes of the answers from one tick to the next.
+/// Change of the answers from one tick to the next.
 #[derive(Clone, Debug)]
 enum Change {
     /// Each joint moves a little.
     Motion(Vec<(i32, i16, i16)>),
     /// A byte of an answer is another.
     Byte { node: usize, at: usize, to: u8 },
-    /// A node answers with so many bytes, or not at all.
+    /// A node answers with this number of bytes, or not at all.
     Length { node: usize, len: usize },
     /// Two answers come in the other order.
     Swap { first: usize, second: usize },
-    /// A frame that is no answer to a Move comes in front.
+    /// A frame that is not an answer to a Move comes first.
     Other { id: u16, len: usize },
 }
 

@@ -1,6 +1,5 @@
-//! The table of settings: number on the wire, name, unit, range, meaning, and where each is (J-53). Docs, arm files and
-//! `jtc arm show` are made from it. No number is used a second time: 59 to 63
-//! belonged to an earlier Teaching.
+//! The table of settings: number on the wire, name, unit, range, meaning, and place of each (J-53). Docs, arm files and `jtc arm show` are
+//! made from it. No number is used a second time: 59 to 63 belonged to an earlier Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 
@@ -29,7 +28,7 @@ macro_rules! settings {
             }
         }
 
-        /// Writes it; false when there is no such joint.
+        /// Writes the value; `false` if the joint does not exist.
         pub(super) fn set(config: &mut Config, number: u8, joint: usize, value: f64) -> bool {
             match number {
                 $($number => settings!(@set $kind config joint value $($place)+),)+

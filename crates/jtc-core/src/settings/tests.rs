@@ -11,7 +11,7 @@ fn j53_every_setting_is_read_and_set_and_its_default_is_in_its_range() {
     let all: Vec<_> = values(&config, 0, false).collect();
     assert_eq!(all.len(), count(false));
     assert_eq!(with_values(&config, all.iter().copied()), Ok(config.clone()));
-    // Each alone changes what it is, and nothing else.
+    // Each value alone changes its setting, and nothing else.
     for value in &all {
         let row = setting(value.setting).expect("it is in the table");
         let half = 0.5 * (row.low + row.high);
@@ -83,14 +83,14 @@ fn j53_what_is_out_of_range_is_refused_and_named() {
         }
     }
     assert_eq!(set(200, 0, 1.0), Err(SettingError::Unknown { setting: 200, joint: 0 }));
-    // Together they are no arm.
+    // Together they are not valid for any arm.
     assert!(matches!(set(1, 1, 2.98), Err(SettingError::Config(ConfigError::Range { joint: 1, .. }))));
     assert!(matches!(set(8, 2, 9.0), Err(SettingError::Config(ConfigError::TorqueScale { joint: 2, .. }))));
     assert!(matches!(set(3, 4, 5.0), Err(SettingError::Config(ConfigError::SpeedScale { joint: 4, .. }))));
 }
 
 proptest! {
-    /// Whatever is taken is a configuration that passes its check, and reads back as it was set.
+    /// Settings that are taken make a configuration that passes its check, and read back as they were set.
     #[test]
     fn j53_what_is_taken_reads_back(
         changes in prop::collection::vec((0usize..200, 0.0..1.0f64), 1..20),

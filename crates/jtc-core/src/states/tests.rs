@@ -19,7 +19,7 @@ const STATES: [ControllerState; 6] = [
     ControllerState::Error,
 ];
 
-/// A condition, and what the diagram calls it where it holds and where it does not.
+/// A condition, and its names in the diagram if it holds and if it does not.
 type Named = (fn(&Conditions) -> bool, &'static str, &'static str);
 const NAMES: [Named; 6] = [
     (|c| c.error, "an error", "errors cleared"),
@@ -44,7 +44,7 @@ fn all_conditions() -> impl Iterator<Item = Conditions> {
     })
 }
 
-/// What becomes of teaching and of a loaded trajectory when the host sends this in a state that HoldPos has changed into.
+/// Returns the conditions of teaching and of a loaded trajectory after the host sends this in a state that HoldPos has changed into.
 fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditions {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     controller.state = ControllerState::HoldPos;
@@ -63,7 +63,7 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     Conditions { teaching, execute, ..Conditions::default() }
 }
 
-/// The conditions that a state can find: some only come about where the host's command is accepted.
+/// Returns the conditions that a state can find: some need a command that the host sends and the state accepts.
 fn possible(state: ControllerState) -> Vec<Conditions> {
     // The host is not served in Start, so that every parameter is missing.
     let start = state == ControllerState::Start;
@@ -78,8 +78,8 @@ fn possible(state: ControllerState) -> Vec<Conditions> {
         .collect()
 }
 
-/// The conditions that an arrow needs: those that hold whenever it is taken, but for what only keeps a state away that comes
-/// before it in any case.
+/// Returns the conditions that an arrow needs: those that hold whenever the arrow is taken, except conditions that only keep a state away
+/// that comes before it in any case.
 fn label(from: ControllerState, to: ControllerState) -> Option<String> {
     let all = possible(from);
     let taken: Vec<_> = all.iter().filter(|c| next_state(from, c) == to).collect();
@@ -142,7 +142,7 @@ fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
     }
 }
 
-/// The arm moves, or goes soft, out of HoldPos only, and from there by an order of the host.
+/// The arm moves, or becomes compliant, from HoldPos only, and only on a command of the host.
 #[test]
 fn j24_j25_no_state_but_holdpos_leads_to_motion_or_teaching() {
     for (from, conditions) in STATES.iter().flat_map(|from| possible(*from).into_iter().map(|c| (*from, c))) {

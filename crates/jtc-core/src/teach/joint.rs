@@ -9,22 +9,22 @@ use crate::yielding::SPRING_RATE;
 
 /// Speed of a joint, rad/s, from which on its damping grows, and from which on it does not grow any more.
 const FAST: (f64, f64) = (0.4, 0.8);
-/// Highest rate at which it reduces a speed, 1/s, of a joint whose others are free to move. Measured speeds are about 8 ms old; joints that move
-/// each other lower what they bear.
+/// Highest rate at which the damping reduces a speed, 1/s, of a joint whose others are free to move. Measured speeds are about 8 ms old;
+/// joints that move each other lower the damping that they bear.
 pub(super) const DAMPING_RATE: f64 = 90.0;
-/// Speed, rad/s, at which the damping of a joint balances what it carries, where its inertia bears so much damping.
+/// Speed, rad/s, at which the damping of a joint balances the load that it carries, if its inertia bears that much damping.
 const SINKS: f64 = 0.5;
-/// What it grows to, as a multiple of the torque limit, s/rad.
+/// Value to which the damping grows, as a multiple of the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds, rad/s, between which a brake comes beside the damping, and the deceleration that it makes, rad/s²: too little to turn a joint round
-/// before that is measured. Over-speed would release the arm.
+/// Speeds, rad/s, between which a brake is added to the damping, and the deceleration of that brake, rad/s²: too little to turn a joint
+/// round before that is measured. Over-speed would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
 /// Speed, rad/s, and share of the speed of its release (J-35) above which a joint is not taught any more but brought to rest.
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
-/// Time constant with which that speed is taken from positions, s: drives report a mean over 10 ms.
+/// Time constant of the speed that is computed from positions, s: drives report a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of a rotor inertia that counts: it may be a proposal that nobody has measured. Where none is given, it is that of the proposal: the
+/// Share of a rotor inertia that counts: it may be a proposal that was not measured. If none is configured, it is that of the proposal: the
 /// torque limit over this acceleration, rad/s².
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
@@ -32,49 +32,50 @@ const PROPOSED: f64 = 200.0;
 const CERTAIN_FRICTION: f64 = 0.7;
 /// Part of the damping that the friction which is taken away may use up: that friction may not be there.
 const USED_UP: f64 = 0.5;
-/// Time constant with which the dry friction comes and goes, s.
+/// Time constant of the dry friction as it comes and goes, s.
 const GRIP_S: f64 = 0.1;
 /// Speed below which a joint always stands, rad/s.
 const STANDING: f64 = 0.01;
 /// Highest speed up to which the dry friction is whole, rad/s.
 const SLOW: f64 = 0.3;
-/// Longest stretch of the spring that holds a joint where it stands, rad.
+/// Longest stretch of the spring that holds a standing joint, rad.
 const STRETCH: f64 = 0.005;
 /// Speed around zero in which the sign of the friction that is taken away is smoothed, rad/s.
 const SIGN_WIDTH: f64 = 0.1;
 /// Speed from which on less of the friction is taken away, rad/s, and from which on nothing.
 const COMPENSATED: (f64, f64) = (0.3, 0.6);
-/// Missing answers after which first the springs go, then damping and friction, each within so many ticks.
+/// Missing answers after which first the springs go, then damping and friction, each within [`LETS_GO`] ticks.
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Speed above which a joint ends Teaching, rad/s, as its positions have it: a position controller stops what a damper cannot, and over-speed would release the arm.
+/// Returns the speed, from positions, above which a joint ends Teaching, rad/s: a position controller stops a joint that a damper cannot
+/// stop, and over-speed would release the arm.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
 
-/// Rotor inertia that a joint has at least, kg·m².
+/// Returns the rotor inertia that a joint has at least, kg·m².
 pub(super) fn rotor(limits: &JointConfig) -> f64 {
     let given = limits.rotor_inertia;
     ROTOR * if given > 0.0 { given } else { limits.torque_max / PROPOSED }
 }
 
-/// What Teaching remembers of a joint. Single precision, because the flight recorder keeps it.
+/// State of a joint in Teaching. Single precision, because the flight recorder keeps it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtJoint {
-    /// Where the spring of the dry friction is fixed, rad, and its share that acts.
+    /// Anchor of the spring of the dry friction, rad, and its share that acts.
     anchor: f32,
     pub(super) grip: f32,
-    /// How far inside a soft end the joint began, rad: a spring that acts from there on moves nothing by itself.
+    /// Depth inside a soft end at which the joint began, rad: a spring that acts from there on moves nothing by itself.
     begun: f32,
     /// Friction of the joint as its parameters have it, N·m: the Coulomb part, and all of it at the speed of a while ago.
     coulomb: f32,
     rubs: f32,
     /// Least inertia that the joint moves, kg·m².
     inertia: f32,
-    /// What damping and friction had against the last motion, N·m.
+    /// Torque of damping and friction against the last motion, N·m.
     against: f32,
-    /// Position that follows that of the joint, rad: the faster it is, the further behind.
+    /// Position that follows that of the joint, rad: the faster the joint is, the more this position lags.
     behind: f32,
     /// Answers of the joint that are missing now, and how far springs and damping have gone because of that: 2 · [`LETS_GO`] is wholly.
     missing: u8,
@@ -94,10 +95,10 @@ pub(crate) struct LedJoint<'a> {
     pub range: (f64, f64),
 }
 
-/// What Teaching adds to the torque of a joint, N·m.
+/// Torque that Teaching adds to a joint, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtTorque {
-    /// Of the load found.
+    /// Torque of the load found.
     pub load: f64,
     /// Damping, dry friction and soft ends.
     pub brake: f64,
@@ -110,27 +111,28 @@ pub(crate) struct TaughtTorque {
 pub(crate) struct Bears {
     /// Share of it that the damping balances at [`SINKS`].
     pub balanced: f64,
-    /// How far the joint is inside a soft end beyond where it began, rad, with the sign of [`soft_end::depth`].
+    /// Depth of the joint inside a soft end beyond the depth at which it began, rad, with the sign of [`soft_end::depth`].
     pub compressed: f64,
 }
 
 impl TaughtJoint {
-    /// Teaching begins in a joint at rest at `position` (rad).
+    /// Begins Teaching of a joint at rest at `position` (rad).
     pub fn begin(position: f64, limits: &JointConfig, range: (f64, f64)) -> Self {
         let begun = soft_end::depth(position, range).abs() as f32;
         let (anchor, inertia) = (position as f32, rotor(limits) as f32);
         Self { anchor, behind: anchor, grip: 1.0, begun, inertia, ..Self::default() }
     }
 
-    /// The joint moves at least this inertia, kg·m². One that cannot be computed changes nothing.
+    /// Sets the inertia that the joint moves at least, kg·m². An inertia that cannot be computed changes nothing.
     pub fn set_inertia(&mut self, inertia: f64) {
         if inertia.is_finite() {
             self.inertia = inertia as f32;
         }
     }
 
-    /// Each tick, which is so `late`, ms: whether the joint has answered, and with which `position`, rad. Without an answer its speed is an old one, and its springs
-    /// pull to where it was. Returns the speed that its positions make, rad/s.
+    /// Takes the answer of the joint in each tick, which is `late` by this time, ms: `fresh` if the joint has answered, with this
+    /// `position`, rad. Without an answer its speed is an old one, and its springs pull to its old position. Returns the speed that follows
+    /// from its positions, rad/s.
     #[inline(always)]
     pub fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
         // A tick that is late shows as an answer that is missing.
@@ -155,7 +157,7 @@ impl TaughtJoint {
         way / time
     }
 
-    /// Shares of the springs, and of damping and friction, that act.
+    /// Returns the shares of the springs, and of damping and friction, that act.
     fn heard(&self) -> (f64, f64) {
         if self.lost == 0 {
             return (1.0, 1.0);
@@ -164,12 +166,12 @@ impl TaughtJoint {
         (share(self.lost.min(LETS_GO)), share(self.lost.saturating_sub(LETS_GO)))
     }
 
-    /// Its Coulomb friction, and its friction at the present speed, N·m.
+    /// Sets the Coulomb friction, and the friction at the present speed, N·m.
     pub fn set_friction(&mut self, coulomb: f64, moving: f64) {
         (self.coulomb, self.rubs) = (coulomb as f32, (moving.abs() as f32).max(coulomb as f32));
     }
 
-    /// What damping and friction had against the last motion, N·m.
+    /// Returns the torque of damping and friction against the last motion, N·m.
     pub fn against(&self) -> f64 {
         self.against.into()
     }
@@ -179,14 +181,14 @@ impl TaughtJoint {
         self.against = torque as f32;
     }
 
-    /// Damping at low speed, and what it grows to, N·m·s/rad.
+    /// Returns the damping at low speed, and the damping that it grows to, N·m·s/rad.
     fn dampings(&self, load: f64, limits: &JointConfig) -> (f64, f64) {
         let most = DAMPING_RATE * f64::from(self.inertia);
         let damping = limits.teach_damping.max(load.abs() / SINKS).min(most);
         (damping, damping.max(most.min(GROWN * limits.torque_max)))
     }
 
-    /// A tick of a joint that carries this `load`, N·m; `haste`: how far the flange is above the tool speed limit, 0 to 1.
+    /// Runs a tick of a joint that carries this `load`, N·m; `haste`: excess of the flange speed over the tool speed limit, 0 to 1.
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -201,7 +203,7 @@ impl TaughtJoint {
         let depth = soft_end::depth(position, range);
         let begun = f64::from(self.begun).min(depth.abs());
         self.begun = begun as f32;
-        // It grows with the speed of the joint and of the flange, and towards a position limit.
+        // The damping grows with the speed of the joint and of the flange, and towards a position limit.
         let fast =
             if velocity.abs() > FAST.0 { smooth((velocity.abs() - FAST.0) / (FAST.1 - FAST.0)) } else { 0.0 };
         let compressed = depth - begun.copysign(depth);
@@ -223,13 +225,13 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Torque of the dry friction, N·m: less where the joint has friction of its own.
+    /// Returns the torque of the dry friction, N·m: less if the joint has friction of its own.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Dry friction of a joint that is slow. It fades out from the speed that its torque gives the damped joint to three times that: so
-    /// any torque below it is stopped, and damping and dry friction together never fall with the speed.
+    /// Returns the dry friction of a slow joint. The friction fades out from the speed that its torque gives the damped joint to three
+    /// times that speed. So any torque below it is stopped, and damping and dry friction together never fall with the speed.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -248,25 +250,26 @@ impl TaughtJoint {
             if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
-        // The spring slips where it is stretched by its whole torque; of a joint that moves it only follows.
+        // The spring slips when its whole torque stretches it; in a joint that moves the spring only follows.
         let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
         self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
         self.dry_spring(position, limits, config)
     }
 
-    /// Stretch at which the spring of the dry friction slips, rad.
+    /// Returns the stretch at which the spring of the dry friction slips, rad.
     fn stretch(&self, breakaway: f64) -> f64 {
         STRETCH.max(breakaway / (SPRING_RATE * SPRING_RATE * f64::from(self.inertia)).max(f64::MIN_POSITIVE))
     }
 
-    /// Torque of the spring at `position` (rad), N·m.
+    /// Returns the torque of the spring at `position` (rad), N·m.
     pub fn dry_spring(&self, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         let breakaway = self.breakaway(limits, config);
         let way = f64::from(self.anchor) - position;
         f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)
     }
 
-    /// Friction of the joint that is taken away, N·m. At standstill it grows with the speed half as fast as the damping at most.
+    /// Returns the friction of the joint that is taken away, N·m. At standstill it grows with the speed at most half as fast as the
+    /// damping.
     fn compensation(&self, velocity: f64, damping: f64, config: &Config) -> f64 {
         let torque = config.teach_friction * f64::from(self.coulomb);
         let slope = (torque / SIGN_WIDTH).min(USED_UP * damping);

@@ -1,4 +1,4 @@
-//! What Teaching carries of the loads that were found (J-25).
+//! Tests of the found loads that Teaching carries (J-25).
 use proptest::prelude::*;
 
 use super::*;
@@ -14,7 +14,7 @@ fn begun(loads: [f64; JOINTS], q: &[f64; JOINTS]) -> Taught {
     taught
 }
 
-/// What is carried at `q` (rad) by an arm that stands there, N·m.
+/// Returns the torques that an arm carries which stands at `q` (rad), N·m.
 fn carried(taught: &mut Taught, q: &[f64; JOINTS]) -> [f64; JOINTS] {
     taught.unit = dynamics().flange_torque(q).map(|u| u as f32);
     core::array::from_fn(|j| taught.carried[j].torque(f64::from(taught.mass * taught.unit[j])))
@@ -50,7 +50,7 @@ fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
 
 #[test]
 fn j25_friction_never_becomes_a_great_mass() {
-    // Stretched along the vertical, a mass at the flange loads nothing; nearly so it would have to be enormous.
+    // Stretched along the vertical, a mass at the flange loads no joint; near that pose the mass would need to be enormous.
     assert!(begun([8.0; JOINTS], &[0.0; JOINTS]).mass.abs() < 0.2);
     for k in 0..200 {
         let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
@@ -75,8 +75,8 @@ proptest! {
         }
     }
 
-    /// Whatever was found, at rest or in motion, also while it was lowered: nothing pushes a joint out at its position limit, the spring of the
-    /// soft end is stronger there, and never more is carried than was found or may be found.
+    /// For any load that was found, at rest or in motion, also while it was lowered: no load pushes a joint out at its position limit, the
+    /// spring of the soft end is stronger there, and the carried torque never exceeds the torque that was found or may be found.
     #[test]
     fn j25_at_a_position_limit_no_load_pushes_outwards(load in -180.0..180.0f64, by_mass in -180.0..180.0f64, velocity in -0.5..0.5f64) {
         let limits = Config::avena().joints[1];
@@ -92,7 +92,7 @@ proptest! {
         }
     }
 
-    /// What acts of a load falls with the speed that it makes, is whole again at rest, and goes nowhere.
+    /// The acting part of a load falls with the speed that the load makes, is whole again at rest, and is not lost.
     #[test]
     fn j25_a_load_acts_the_less_the_faster_it_drives(load in 1.0..54.0f64, balanced in 0.0..1.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)]) {
         let limits = Config::avena().joints[1];
@@ -128,8 +128,8 @@ impl Driven {
         Self { taught: begun(dynamics().flange_torque(&q).map(|u| 2.0 * u), &q), q }
     }
 
-    /// It moves for `ms` at `velocity` (rad/s, along the load). `against`: what damping and friction have against that, as a share of what acts.
-    /// Returns the share of the mass that is left.
+    /// Moves joint 2 for `ms` at `velocity` (rad/s, along the load). `against`: torque of damping and friction against that motion, as a
+    /// share of the torque that acts. Returns the share of the mass that is left.
     fn moves(&mut self, against: f64, velocity: f64, ms: usize) -> f32 {
         let along = velocity * f64::from(self.taught.unit[1]).signum();
         for _ in 0..ms / usize::from(JUDGED_MS) {
@@ -160,7 +160,7 @@ fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();
     let gone = driven.moves(1.0, 0.3, 4_000);
     assert!(gone < 0.2, "{gone}");
-    // What is gone acts on the joint as what acted drove it: that many times what is left.
+    // The lost torque acts on the joint as the acting torque drove it: this multiple of the torque that is left.
     let sinking = f64::from((1.0 - gone) / gone);
     for (against, velocity, ms) in
         [(sinking, -0.05, 1_000), (sinking, -0.2, 90), (sinking, 0.2, 1_000), (0.5 * sinking, -0.2, 1_000)]

@@ -1,19 +1,19 @@
-//! The swing of a joint that is lighter than its inertia in the arm file: what brakes it is too hard for it, because measured speeds are late.
+//! The swing of a joint that is lighter than its inertia in the arm file: its brake is too hard for it, because measured speeds are late.
 use crate::remembered::remembered;
 
 /// A half of a swing ends within this time, ms, and has at least this speed, rad/s.
 const HALF_MS: u8 = 80;
 const HALF_SPEED: f32 = 0.15;
-/// A swing is two halves in turn. The second has at least this share of the speed of the first: a shove and the return of the spring are two
-/// halves as well, but the second is slow.
+/// A swing is two halves in turn. The second has at least this share of the speed of the first: a shove and the return of the spring are
+/// two halves as well, but the second is slow.
 const LASTS: f32 = 0.5;
-/// Each swing makes the joint softer by this factor, until it is as soft as the second says.
+/// Each swing makes the joint softer by this factor, down to the second factor.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
 /// Time without a swing after which the joint is harder again by a step, and time between further steps, ms.
 const HARDENS_MS: (u16, u16) = (300, 100);
 
-/// Whether a joint swings, and how much softer it yields for that.
+/// Swing of a joint, and the factor that makes the joint softer because of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
     /// Highest speed in this direction, rad/s, signed, and since when the joint moves so, ms.
@@ -31,7 +31,7 @@ remembered!(Swing { peak, half_ms, before, soft, soft_ms });
 impl Swing {
     pub const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
 
-    /// A tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
+    /// Runs a tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
     pub fn step(&mut self, velocity: f64) -> f64 {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
@@ -60,8 +60,8 @@ impl Swing {
 mod tests {
     use super::*;
 
-    /// A joint that comes back fast, again and again, becomes softer each time, and harder again when it does not; one that a push has moved and
-    /// a spring takes back does not.
+    /// A joint that comes back fast, again and again, becomes softer each time, and harder again when it does not; a joint that a push has
+    /// moved and a spring takes back does not become softer.
     #[test]
     fn j68_what_swings_becomes_softer_for_a_while() {
         let swing = |half_ms: usize, speeds: [f64; 2]| {

@@ -11,7 +11,7 @@ fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// The brake is no torque in the first tick of a yield, whole soon, and against the motion.
+/// The brake has no torque in the first tick of a yield, soon all of its torque, and always acts against the motion.
 #[test]
 fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
     let limits = limits();
@@ -48,8 +48,8 @@ fn tick(yields: &mut Yield, joint: &Joint<'_>) -> PidTorque {
 }
 
 proptest! {
-    /// Whatever the joint does: the spring never exceeds the share, and with the damper only where the damper alone does; the damper
-    /// only takes energy out.
+    /// For any motion of the joint, the spring never exceeds the share; together with the damper it does so only if the damper alone does.
+    /// The damper only takes energy out.
     #[test]
     fn j68_a_slow_push_has_the_share_against_it_and_a_shove_the_limit(
         set in -3.0..3.0f64,
@@ -158,7 +158,7 @@ fn j68_at_the_end_of_its_range_a_joint_is_pushed_back() {
     }
 }
 
-/// How many ticks of this speed (rad/s) it takes until the joint is held again.
+/// Returns the number of ticks at this speed (rad/s) until the joint is held again.
 fn over_after(velocity: f64) -> Option<usize> {
     let limits = limits();
     let mut yields = Yield::begin(false, false, 0.0, INERTIA, 0.0);
@@ -179,7 +179,7 @@ fn j68_a_joint_that_is_calm_for_200_ms_is_held_again() {
     assert!(stays.is_calm() && !stays.is_over(), "the host decides");
     stays.clear();
     assert!(stays.is_over());
-    // A motion begins the time anew.
+    // A motion restarts the time.
     tick(&mut stays, &at(&limits, 0.0, 0.2, 0.0));
     assert!(!stays.is_calm());
 }
@@ -209,7 +209,7 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// It comes to rest where the limit holds it, and is then held; nearly all of the limit is left to the damper.
+/// A lowered load comes to rest if the limit holds it, and is then held; nearly all of the limit is left to the damper.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
     let limits = limits();
@@ -245,20 +245,21 @@ fn j68_the_third_time_within_ten_seconds_each_is_too_often() {
     assert!(!yielded.count(2));
 }
 
-/// The joint moves for so long at `velocity`, rad/s; its load becomes this, N·m.
+/// Moves the joint for `ms` at `velocity`, rad/s. Returns its load afterwards, N·m.
 fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     let limits = limits();
     let mut position = yields.set;
     for _ in 0..ms {
         position += velocity * DT;
-        // The model is against the load: gravity does not pull where it sinks.
+        // The model is against the load: gravity does not pull in the direction in which the joint sinks.
         tick(yields, &at(&limits, position, velocity, -40.0));
     }
     yields.load()
 }
 
-/// Spring and damper have 40 N·m against a joint that nobody pushes: its load does that, and was a lean. It goes within a second, and comes
-/// back where the joint sinks. A hand that leads the joint faster, or against its load, says nothing of it.
+/// Spring and damper have 40 N·m against a joint that nobody pushes: its own load drives it, so that load was a person leaning on the arm.
+/// The load goes within a second, and comes back if the joint sinks. A hand that leads the joint faster, or against its load, says nothing
+/// about the load.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);

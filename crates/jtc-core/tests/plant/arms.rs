@@ -1,4 +1,4 @@
-//! Arms for the plant: the default one, and others as `jtc arm import` makes them of their descriptions.
+//! Arms for the plant: the default arm, and others as `jtc arm import` creates them from their descriptions.
 use jtc_core::{Config, Friction, Parameters, PidGains};
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{DataStatus, FrameType};
@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::{LuGre, Random, highest, loaded, shares_of};
 use crate::rig::{Rig, floats, model_body};
 
-/// An arm: what its controller is given.
+/// An arm, with the data that its controller gets.
 #[derive(Clone)]
 pub struct ArmFile {
     pub name: &'static str,
@@ -37,7 +37,7 @@ impl ArmFile {
         Self::parse("z1", Z1)
     }
 
-    /// The UR5 with friction in its joints and in its file.
+    /// Returns the UR5 with friction in its joints and in its file.
     pub fn rough_ur5() -> Self {
         let friction = [(8.0, 20.0), (8.0, 20.0), (6.0, 15.0), (2.0, 5.0), (2.0, 5.0), (2.0, 5.0)];
         Self {
@@ -47,17 +47,18 @@ impl ArmFile {
         }
     }
 
-    /// The arm without friction, neither in truth nor in its file.
+    /// Returns the arm without friction, both in reality and in its file.
     pub fn slick(self) -> Self {
         Self { polynomial: [[0.0; 6]; 6], ..self }
     }
 
-    /// Shares of its torque limits.
+    /// Returns shares of its torque limits.
     pub fn shares(&self, torque: &[f64; 6]) -> [f64; 6] {
         shares_of(torque, &self.config)
     }
 
-    /// A pose inside the ranges, rad, in which standing with a payload at the flange (kg) takes less than `most` of each limit, and what it takes.
+    /// Returns a pose inside the ranges, rad, in which the torque to stand with a payload at the flange (kg) is less
+    /// than `most` of each limit, and that torque.
     pub fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {
@@ -72,7 +73,8 @@ impl ArmFile {
         }
     }
 
-    /// Friction of its joints at the temperature of the rig, times `factor`; stiction is a fifth more than Coulomb friction.
+    /// Returns the friction of its joints at the temperature of the rig, times `factor`; stiction is a fifth more than
+    /// Coulomb friction.
     pub fn friction(&self, factor: f64) -> [LuGre; 6] {
         self.polynomial.map(|c| {
             if c[0] == 0.0 && c[1] == 0.0 {
@@ -90,7 +92,7 @@ impl ArmFile {
         })
     }
 
-    /// Gives its parameters to the controller of a rig.
+    /// Sends its parameters to the controller of a rig.
     pub fn give(&self, rig: &mut Rig) {
         rig.send(FrameType::FrictionPolynomial, &floats(self.polynomial.iter().flatten().map(|c| *c as f32)));
         let gains = self.pid.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max]);

@@ -1,5 +1,5 @@
-//! An arm of metal behind the [`Rig`]: rigid bodies, rotors, rigid or elastic gears, LuGre friction, and drives with a coarse encoder and a
-//! late speed.
+//! A simulated physical arm connected to the [`Rig`]: rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
+//! drives with a coarse encoder and a late speed.
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
@@ -12,12 +12,12 @@ pub use arms::ArmFile;
 
 /// rad of one step of the drives' 16-bit encoder.
 pub const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
-/// rad of one step of the motor's encoder behind the gear, from which the drives take the speed.
+/// rad of one step of the motor's encoder, at the output side of the gear. The drives take the speed from this encoder.
 const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
 /// Integration steps in a millisecond: the bristles are stiff.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
-/// kg·m² that turn with the link behind an elastic gear, beside the link: the gear's own output side.
+/// kg·m² of the output side of an elastic gear, which turns with the link.
 const GEAR_OUTPUT: f64 = 0.01;
 /// s: damping of an elastic gear, N·m·s/rad, for each N·m/rad of its stiffness.
 const GEAR_DAMPING: f64 = 5e-4;
@@ -29,7 +29,7 @@ pub struct LuGre {
     pub coulomb: f64,
     /// N·m at which it breaks away.
     pub stiction: f64,
-    /// rad/s around which stiction has gone.
+    /// rad/s above which stiction has mostly disappeared.
     pub stribeck: f64,
     /// N·m/rad of the bristles.
     pub stiffness: f64,
@@ -88,9 +88,9 @@ impl LuGre {
 struct Gears {
     /// N·m/rad.
     stiffness: f64,
-    /// Of the motors, rad.
+    /// Angles of the motors, rad.
     q: [f64; 6],
-    /// Of the motors, rad/s.
+    /// Speeds of the motors, rad/s.
     v: [f64; 6],
 }
 
@@ -117,7 +117,7 @@ impl Random {
     }
 }
 
-/// Poses of the arm, rad: bent, and stretched out, where 4 kg are more than joint 2 can hold, and two more.
+/// Poses of the arm, rad: bent, stretched out (joint 2 cannot hold 4 kg there), and two more.
 pub const POSES: [[f64; 6]; 4] = [
     [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
     [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
@@ -130,7 +130,7 @@ pub fn shares(torque: &[f64; 6]) -> [f64; 6] {
     shares_of(torque, &Config::avena())
 }
 
-/// The same of the arm of `config`.
+/// Returns the shares of the torque limits of the arm of `config`.
 pub fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
     core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
@@ -150,28 +150,28 @@ pub fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
 }
 
-/// The arm as it really is.
+/// The true arm.
 pub struct Plant {
     dynamics: Dynamics,
     pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
     bristles: [f64; 6],
-    /// Rigid gears, if there are none.
+    /// Elastic gears; `None` for rigid ones.
     gears: Option<Gears>,
     pub q: [f64; 6],
     pub v: [f64; 6],
     /// Torque of a hand or a collision, N·m.
     pub push: [f64; 6],
-    /// Nothing moves before that many more milliseconds: a stand.
+    /// Speeds of the motors in the last ten milliseconds, rad/s.
     pub speeds: [[f64; 10]; 6],
     /// Joints that a brake holds while their drive is not enabled.
     pub brakes: bool,
-    /// What the drives report for a speed, as a multiple of it.
+    /// Factor between the true speed and the speed that the drives report.
     pub speed_scale: f64,
     ticks: usize,
 }
 
-/// `model` with `mass` kg at the flange.
+/// Returns `model` with `mass` kg at the flange.
 pub fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
     let flange = model.joints[6].xyz;
     let link = &mut model.links[6];
@@ -183,7 +183,7 @@ pub fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
     model
 }
 
-/// `model` with every mass times `factor`.
+/// Returns `model` with every mass times `factor`.
 pub fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
     for link in &mut model.links {
         link.mass *= factor;
@@ -211,7 +211,7 @@ impl Plant {
         }
     }
 
-    /// The same of another arm, with this true model.
+    /// Creates a plant for another arm, with this true model.
     pub fn of(arm: &ArmFile, model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
         Self {
             dynamics: Dynamics::new(model, arm.config.gravity),
@@ -229,7 +229,7 @@ impl Plant {
         self
     }
 
-    /// A rig that holds another arm.
+    /// Returns a rig that holds another arm.
     pub fn holding_arm(&mut self, arm: &ArmFile) -> Rig {
         let mut rig = Rig::with_speeds(arm.config.clone());
         rig.follow = false;
@@ -240,14 +240,15 @@ impl Plant {
         rig
     }
 
-    /// One millisecond of both. What the controller measures in a tick was so in the tick before, of whose torque it knows nothing.
+    /// Advances both by one millisecond. The controller measures the state of the tick before, which does not depend on
+    /// that tick's torque.
     pub fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
         self.report(rig);
     }
 
-    /// The same, but what the rig's drives answer is that they are at `seen` (rad).
+    /// Like [`Self::tick`], but the drives of the rig answer that they are at `seen` (rad).
     pub fn tick_seen_at(&mut self, rig: &mut Rig, seen: &[f64; 6]) {
         self.report(rig);
         for (node, q) in rig.nodes.iter_mut().zip(seen) {
@@ -263,7 +264,7 @@ impl Plant {
         }
     }
 
-    /// A rig that holds this arm.
+    /// Returns a rig that holds this arm.
     pub fn holding(&mut self, config: Config) -> Rig {
         let mut rig = Rig::with_speeds(config);
         rig.follow = false;
@@ -309,8 +310,8 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// What joint `j` does to its link, N·m, if its drive gives `drive`: all that the drive leaves beside its friction, or what an elastic
-    /// gear transmits, whose motor it turns on by a step.
+    /// Returns the torque of joint `j` on its link, N·m, if its drive gives `drive`: the drive torque minus friction,
+    /// or the torque of an elastic gear. With an elastic gear, also advances its motor by a step.
     fn joint_torque(&mut self, j: usize, drive: f64, braked: bool) -> f64 {
         let speed = *self.motor_speed(j);
         let friction = self.friction[j].step(&mut self.bristles[j], speed, DT);
@@ -325,7 +326,7 @@ impl Plant {
         torque
     }
 
-    /// Angles, rad, and speeds, rad/s, of the motors.
+    /// Returns the angles, rad, and speeds, rad/s, of the motors.
     pub fn motors(&self) -> ([f64; 6], [f64; 6]) {
         self.gears.as_ref().map_or((self.q, self.v), |gears| (gears.q, gears.v))
     }
@@ -343,7 +344,7 @@ impl Plant {
     }
 }
 
-/// What the encoder reads at `q`, rad.
+/// Returns the reading of the encoder at `q`, rad.
 fn read(q: f64) -> f64 {
     (q / ENCODER_STEP).floor() * ENCODER_STEP
 }

@@ -1,4 +1,4 @@
-//! A bench without physics: nodes that answer at once and joints that are where the test puts them.
+//! A bench without physics: nodes that answer at once, and joints at the positions that the test sets.
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::recorder::{Block, Recorder};
@@ -27,13 +27,13 @@ pub struct Rig {
     pub pump: bool,
     pub torque: [f64; 6],
     pub safety_input: bool,
-    /// Ticks that do not come before the next one.
+    /// Ticks that are missing before the next one.
     pub missed_ticks: u16,
     pub acknowledged: bool,
     pub bus_off: bool,
     /// Positions follow the commanded ones.
     pub follow: bool,
-    /// But not those of these joints.
+    /// Joints that do not follow the commanded positions.
     pub apart: [bool; 6],
     /// Frames sent by the controller, by tick.
     pub sent: Vec<Request>,
@@ -49,11 +49,11 @@ pub struct Rig {
     host: std::collections::VecDeque<Sent>,
     /// The flight recorder, in sessions that have one.
     pub recorder: Option<Recorder<Vec<Block>, 2>>,
-    /// What hosts send from now on comes on plain lines (J-51).
+    /// `true` if the next frames of hosts come on plain lines (J-51).
     pub plain: bool,
 }
 
-/// What a host has sent, not done yet.
+/// Frame that a host has sent and that is not done yet.
 struct Sent {
     line: usize,
     overtaken: bool,
@@ -79,12 +79,13 @@ impl Sent {
 }
 
 impl Rig {
-    /// The joints of the bench have no speed unless a test gives them one: it is not compared with their positions (J-35).
+    /// Creates a bench whose joints have no speed unless a test sets one: speeds are not compared with positions
+    /// (J-35).
     pub fn new(config: Config) -> Self {
         Self::with_speeds(Config { drive_speed_window_ms: 0, ..config })
     }
 
-    /// For joints whose speeds fit their positions.
+    /// Creates a bench for joints whose speeds fit their positions.
     pub fn with_speeds(config: Config) -> Self {
         let last = Outputs {
             bus: None,
@@ -119,7 +120,7 @@ impl Rig {
         }
     }
 
-    /// In HoldPos with every joint enabled and the default parameters.
+    /// Returns a rig in HoldPos with every joint enabled and the default parameters.
     pub fn holding() -> Self {
         Self::holding_with(Config::avena())
     }
@@ -128,7 +129,7 @@ impl Rig {
         Self::held_at(config, [0.0; 6])
     }
 
-    /// The same in a pose, rad.
+    /// Returns a held rig in this pose, rad.
     pub fn held_at(config: Config, pose: [f64; 6]) -> Self {
         let mut rig = Self::new(config);
         rig.follow = false;
@@ -136,7 +137,7 @@ impl Rig {
             node.report.position = position;
         }
         rig.defaults();
-        // Until what the arm carries is known: teaching waits for that.
+        // Runs until the load of the arm is known, because Teaching waits for that.
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
@@ -144,7 +145,7 @@ impl Rig {
         rig
     }
 
-    /// In HoldPos while the drive of joint 3 takes its time to be enabled.
+    /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive takes long.
     pub fn with_a_slow_drive(config: Config) -> Self {
         let mut rig = Self::new(config);
         rig.nodes[2].slow_enable = true;
@@ -172,7 +173,7 @@ impl Rig {
         self.controller.telemetry().errors
     }
 
-    /// The current status as the host would see it.
+    /// Returns the current status as the host would see it.
     pub fn status(&mut self) -> Status {
         let before = self.statuses.len();
         while self.statuses.len() == before {
@@ -185,7 +186,7 @@ impl Rig {
         self.send_on(0, frame_type, body);
     }
 
-    /// On a line of its own.
+    /// Sends a frame on this line.
     pub fn send_on(&mut self, line: usize, frame_type: FrameType, body: &[u8]) {
         let what = What::Frame(frame_type, frame(frame_type, body));
         self.host.push_back(Sent { line, overtaken: false, plain: self.plain, what });
@@ -204,7 +205,7 @@ impl Rig {
         });
     }
 
-    /// Stop or Pause as it arrives on a line: it acts in the next tick, and its frame waits behind the others.
+    /// Adds a Stop or Pause that arrives on a line: it acts in the next tick, and its frame waits after the others.
     pub fn urgent(&mut self, line: usize, command: UrgentCommand) {
         self.urgent[line].push(command);
         self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);
@@ -213,17 +214,17 @@ impl Rig {
         }
     }
 
-    /// Events that are not done.
+    /// Returns the number of events that are not done.
     pub fn waiting(&self) -> usize {
         self.host.len()
     }
 
-    /// Records that came, oldest first, but for those of extensions.
+    /// Returns the records so far, oldest first, except those of extensions.
     pub fn records(&self) -> Vec<Response> {
         self.statuses.iter().filter_map(Status::response).filter(|record| record.frame_type < 0x40).collect()
     }
 
-    /// Sends, runs until it is done, and returns how its data were taken.
+    /// Sends a frame, runs until it is done, and returns the data status of its record.
     pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
         self.send(frame_type, body);
         for _ in 0..1000 {
@@ -239,7 +240,7 @@ impl Rig {
         panic!("no response to {frame_type:?}");
     }
 
-    /// What GetInfo returns.
+    /// Returns the answer to GetInfo.
     pub fn info(&mut self) -> Info {
         self.send(FrameType::GetInfo, &[]);
         for _ in 0..1000 {
@@ -268,14 +269,14 @@ impl Rig {
         }
     }
 
-    /// The emergency stop is pressed for so many ticks.
+    /// Presses the emergency stop for `ticks` ticks.
     pub fn press_stop(&mut self, ticks: usize) {
         self.safety_input = false;
         self.run(ticks);
         self.safety_input = true;
     }
 
-    /// Moves a joint to where it has to be, as fast as a joint may without its position being implausible (J-35).
+    /// Moves a joint to `to`, as fast as possible without making its position implausible (J-35).
     pub fn push(&mut self, joint: usize, to: f64) {
         self.follow = false;
         while self.nodes[joint].report.position != to {
@@ -297,7 +298,7 @@ impl Rig {
         panic!("not within {ticks} ticks: {:?}", self.controller.telemetry());
     }
 
-    /// What a node has answered and the controller has not seen yet is lost.
+    /// Drops answers of a node that the controller has not seen yet.
     pub fn drop_answers(&mut self, node: usize) {
         self.answers.retain(|frame| usize::from(frame.id & 0x0F) != node);
     }

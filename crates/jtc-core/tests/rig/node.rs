@@ -1,7 +1,7 @@
 //! A node without physics.
 use jtc_bus::{JointReport, NodeState};
 
-/// A node as its state machine shows it on the bus.
+/// A node with its state machine, as seen on the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     pub report: JointReport,

@@ -1,4 +1,4 @@
-//! Trajectories, and the way to a place on them.
+//! Trajectories, and moves to a point on them.
 use jtc_core::TrajectoryState;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
@@ -19,31 +19,31 @@ pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     points
 }
 
-/// A point of one joint alone: rad, rad/s, rad/s².
+/// Returns a point that moves only one joint: rad, rad/s, rad/s².
 pub fn point(joint: usize, q: f64, v: f64, a: f64) -> RawPoint {
     let mut point = RawPoint::default();
     put(&mut point, joint, q, v, a);
     point
 }
 
-/// What a joint of a point does: rad, rad/s, rad/s².
+/// Sets a joint of a point: rad, rad/s, rad/s².
 pub fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
     point.position[joint] = raw(q, 3.141592);
     point.velocity[joint] = raw(v, 6.283185);
     point.acceleration[joint] = raw(a, 12.566370);
 }
 
-/// The integer of a value, and the value of the largest one.
+/// Returns the integer of a value; `scale` is the value of the largest integer.
 pub fn raw(value: f64, scale: f64) -> i16 {
     (value / scale * 32767.0).round() as i16
 }
 
-/// A point at rest: `raw` in every joint.
+/// Returns a point at rest: `raw` in every joint.
 pub fn rest(raw: i16) -> RawPoint {
     RawPoint { position: [raw; 6], ..RawPoint::default() }
 }
 
-/// rad of a raw position.
+/// Returns the angle of a raw position, rad.
 pub fn rad(raw: i16) -> f64 {
     f64::from(raw) * (3.141592 / 32767.0)
 }
@@ -65,7 +65,7 @@ impl Rig {
         assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
     }
 
-    /// The same, and runs on until `point` ms of the path are done.
+    /// Uploads points 10 ms apart, executes them, and runs until `point` ms of the path are done.
     pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
         self.execute(points);
         self.until(4_000, |rig| rig.controller.telemetry().point >= point);

@@ -1,4 +1,4 @@
-//! What is read and set, and when (J-53).
+//! Settings that are read and set, and the states in which they may be set (J-53).
 use super::*;
 
 #[test]
@@ -62,7 +62,7 @@ fn j53_gravity_that_is_set_is_computed_with() {
     assert!(before.iter().zip(after).all(|(b, a)| (b + a).abs() < 1e-9) && before[1].abs() > 10.0);
 }
 
-/// What was received must also fit to the settings that come later.
+/// Parameters that were received must also fit the settings that come later.
 #[test]
 fn j53_settings_that_the_parameters_contradict_are_refused() {
     for (setting, value) in [(96, 7_000.0), (101, 0.5), (103, 0.001)] {
@@ -78,7 +78,7 @@ fn j53_settings_that_the_parameters_contradict_are_refused() {
     assert_eq!(bench.send(0, &fixed::PID_PARAM_USE_DEFAULT), DataStatus::IncorrectValue);
 }
 
-/// What was given is checked, also when it was withdrawn since.
+/// Parameters that were given are checked, also if they were withdrawn since.
 #[test]
 fn j53_settings_fit_to_what_disable_has_withdrawn() {
     let mut bench = Bench::new();
@@ -109,7 +109,7 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
-/// Beside a payload a setting of the arm is as it is alone; the speed override may change with it.
+/// A setting of the arm that comes with a payload is treated as it is alone; the speed override may change with the payload.
 #[test]
 fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
     for (state, stands, bare) in [

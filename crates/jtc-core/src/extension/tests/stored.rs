@@ -42,7 +42,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     bench.info(0);
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
-    // They may have been withdrawn since, as Disable does.
+    // The parameters may have been withdrawn since, as Disable does.
     bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
@@ -70,7 +70,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "it is busy");
 }
 
-/// Whatever is loaded is an arm that the controller would have taken frame by frame.
+/// Any image that is loaded is an arm that the controller would have taken frame by frame.
 #[test]
 fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     let mut bench = Bench::new();
@@ -92,7 +92,7 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
                     continue;
                 }
                 let info = bench.info(0);
-                // A value that is given twice, and left out elsewhere where it is the default, makes the same arm.
+                // A value that is given twice, and left out elsewhere if it is the default, makes the same arm.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());
@@ -114,7 +114,7 @@ fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     assert!(!bench.controller.load_arm(&image));
     let refused = |bench: &mut Bench| bench.send(0, &fixed::PID_PARAM_USE_DEFAULT);
     assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
-    // One that could not be written is another one after the next start.
+    // An arm that could not be written is another arm after the next start.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.info(0);

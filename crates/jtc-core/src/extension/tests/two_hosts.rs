@@ -26,8 +26,8 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    /// What is in use is what was accepted last, frame by frame, whoever sent it: nothing of two frames is mixed, though each may take
-    /// many ticks; each host has its own records and answers, in the order of its frames.
+    /// The parameters in use are those that were accepted last, frame by frame, from either host: two frames are never mixed, though each
+    /// may take many ticks. Each host has its own records and answers, in the order of its frames.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(
         first in prop::collection::vec(any::<bool>(), 1..40),

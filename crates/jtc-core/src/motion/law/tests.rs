@@ -1,4 +1,4 @@
-//! The parts of the control law, each where it acts (section 6).
+//! Tests of the parts of the control law, each in the modes in which it acts (section 6).
 use super::*;
 use crate::Parameters;
 use crate::catch::Catch;
@@ -24,7 +24,8 @@ struct Arm {
 }
 
 impl Arm {
-    /// What it measures is compared with the set values of the same tick, so that one tick shows what the law makes of them.
+    /// Creates a held arm. Its measurements are compared with the set values of the same tick, so that one tick shows the result of the
+    /// law.
     fn held(gains: PidGains) -> Self {
         let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
@@ -62,7 +63,7 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// Also where set values move: a joint that comes to rest in HoldPos has a velocity.
+/// Also if set values move: a joint that comes to rest in HoldPos has a velocity.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {
@@ -135,7 +136,7 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     law.torque = Default::default();
     law.torque.iter_mut().for_each(|torque| torque.pid.i = 1.0);
     assert!(law.knows_loads(&[true; JOINTS], config, false));
-    // Somebody leans on joint 2, or its integral is still on its way: a twenty-fifth of 180 N·m.
+    // A person leans on joint 2, or its integral has not settled: the limit is 0.04 of 180 N·m, 7.2 N·m.
     for (p, known) in [(7.1, true), (-7.1, true), (7.3, false), (-7.3, false)] {
         law.torque[1].pid.p = p;
         assert_eq!(law.knows_loads(&[true; JOINTS], config, false), known, "{p} N·m");
@@ -187,7 +188,7 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     }
 }
 
-/// Gravity is more than joint 2 can hold, in all cases. What the joint does beside that decides whether it is an error.
+/// In all cases gravity is more than joint 2 can hold. The motion of the joint decides if this is an error.
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
@@ -204,7 +205,7 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         (ControlMode::Hold, true, false, false, DRIVEN, false),
         (ControlMode::Hold, true, false, true, 0.06, false),
     ] {
-        // No set position sags where there is no error of position.
+        // A set position does not sag without a position error.
         let mut arm = Arm::held(NONE);
         arm.config.joints[1].torque_max = 10.0;
         let limits = arm.config.joints[1];

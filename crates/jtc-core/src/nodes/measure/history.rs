@@ -7,7 +7,7 @@ const WINDOW: usize = 5;
 /// Slots of the ring: a power of two, so that an index needs no comparison.
 const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
-/// One over the time that it is taken over while no answer is lost, 1/s.
+/// Inverse of the time that the rate is taken over while no answer is lost, 1/s.
 const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
 
 /// A usable answer.
@@ -15,18 +15,18 @@ const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
 pub(super) struct Answered {
     /// rad.
     pub position: f64,
-    /// When it came, ms.
+    /// Time at which it came, ms.
     pub at_ms: u32,
 }
 
 impl Answered {
-    /// Way to a younger one, rad; none at all where both are the same.
+    /// Returns the distance to a younger answer, rad; zero if both are the same.
     fn way_to(&self, now: &Self) -> f64 {
         // Numbers so near to each other differ exactly.
         f64::from(now.position as f32 - self.position as f32)
     }
 
-    /// Milliseconds after another one.
+    /// Returns the milliseconds since another answer.
     fn since(&self, other: &Self) -> u32 {
         self.at_ms.wrapping_sub(other.at_ms)
     }
@@ -37,16 +37,16 @@ impl Answered {
 pub(super) struct Rate {
     /// rad/s.
     pub rad_s: f64,
-    /// Every answer after the one that it is taken from was about where it had been predicted.
+    /// Every answer after the one that the rate is taken from was close to its prediction.
     pub as_predicted: bool,
 }
 
-/// What is kept of an answer. A single number has a four hundredth of the step of a 16-bit encoder.
+/// Stored form of an answer. A single-precision number resolves 1/400 of the step of a 16-bit encoder.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kept {
     /// rad.
     position: f32,
-    /// When it came, ms.
+    /// Time at which it came, ms.
     at_ms: u32,
 }
 
@@ -54,11 +54,11 @@ struct Kept {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
     answers: [Kept; SLOTS],
-    /// Where the next one goes; it wraps around.
+    /// Slot of the next answer; the number wraps around.
     next: u8,
-    /// How many answers before the newest came in turn, one in each millisecond: more than are kept, perhaps.
+    /// Number of answers before the newest that came in turn, one in each millisecond: more than are kept, perhaps.
     in_turn: u8,
-    /// Which were about where they had been predicted; the newest is bit 0.
+    /// Answers that were close to their predictions, as a mask; the newest is bit 0.
     as_predicted: u8,
 }
 
@@ -66,13 +66,13 @@ remembered!(Kept { position, at_ms });
 remembered!(History { answers, next, in_turn, as_predicted });
 
 impl History {
-    /// Nothing is known but this answer.
+    /// Creates a history that has this answer alone.
     pub fn of(answer: &Answered) -> Self {
         let kept = Kept { position: answer.position as f32, at_ms: answer.at_ms };
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Keeps an answer. Returns the rate from the youngest one that is old enough to it; `None` when there is none.
+    /// Keeps an answer. Returns the rate to it from the youngest answer that is old enough; `None` without such an answer.
     #[inline(always)]
     pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
@@ -91,7 +91,7 @@ impl History {
         rate
     }
 
-    /// The same where answers have been lost.
+    /// Returns the rate if answers have been lost.
     #[cold]
     fn rate_over_gaps(&self, now: &Answered) -> Option<Rate> {
         let n = (0..WINDOW).find(|&n| now.since(&self.nth(n)) >= WINDOW_MS)?;
@@ -100,13 +100,14 @@ impl History {
         Some(Rate { rad_s: from.way_to(now) / seconds, as_predicted: self.younger_as_predicted(n) })
     }
 
-    /// The `n` newest answers were about where they had been predicted.
+    /// Returns `true` if the `n` newest answers were close to their predictions.
     fn younger_as_predicted(&self, n: usize) -> bool {
         let younger = (1u8 << n) - 1;
         self.as_predicted & younger == younger
     }
 
-    /// The position so many milliseconds before `now_ms`, rad, if an answer came in each millisecond since then, perhaps but the last.
+    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then, perhaps except the
+    /// last.
     pub fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;
@@ -114,17 +115,17 @@ impl History {
             .then(|| self.nth(n as usize).position)
     }
 
-    /// The last answer.
+    /// Returns the last answer.
     pub fn newest(&self) -> Answered {
         self.nth(0)
     }
 
-    /// The position of the answer that came at this time, rad, if it is kept.
+    /// Returns the position of the answer that came at this time, rad, if it is kept.
     pub fn at(&self, at_ms: u32) -> Option<f64> {
         (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
     }
 
-    /// The answer before which `n` younger ones came.
+    /// Returns the answer before which `n` younger ones came.
     #[inline(always)]
     fn nth(&self, n: usize) -> Answered {
         let Kept { position, at_ms } = self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS];
@@ -144,8 +145,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
 
-        /// The same as found by looking through a list of all answers: milliseconds since the one before, mostly one, position and
-        /// whether it was as predicted.
+        /// The rate is the one found in a list of all answers: milliseconds since the answer before, mostly one, position, and `true` if it
+        /// was as predicted.
         #[test]
         fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),

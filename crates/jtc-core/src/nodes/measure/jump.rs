@@ -2,7 +2,7 @@
 //!
 //! A drive has two encoders: the joint's, which its position comes from, and the motor's, which its speed comes from. Its speed is the mean
 //! over a window, so the way of the position within that window follows from it. A position that has gone further within one answer, and
-//! stays there, is no motion: the encoder has jumped. What it has jumped by is taken off all further answers, so the arm does not move.
+//! stays there, is not a motion: the encoder has jumped. The jump is taken off all further answers, so the arm does not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -11,22 +11,22 @@ use crate::DT;
 use crate::config::Config;
 use crate::remembered::remembered;
 
-/// Answers for which a difference is constant when it is a jump.
+/// Number of answers for which a difference must be constant to be a jump.
 const CONSTANT: u8 = 5;
-/// Answers, one after the other, for which something may be taken for a jump, whatever its size becomes.
+/// Highest number of consecutive answers that may be taken for a jump, for any change of its size.
 const LOOKS: u8 = 15;
-/// How often the size of a jump changes before it stays: what changes more often is a gear that is twisted.
+/// Number of changes of a jump's size before the size stays: a size that changes more often comes from a gear that is twisted.
 const CHANGES: u8 = 2;
 /// Longest time between an answer and the one before it within which a jump can have come, ms.
 const WITHIN_MS: u32 = 3;
 /// Steps of the encoder that do not count.
 const STEPS: f64 = 3.0;
-/// What does not count where the encoder's step is given as less, rad.
+/// Difference that does not count, rad, if [`STEPS`] configured steps of the encoder are less.
 const LEAST: f64 = 2e-5;
 /// Share of the way that does not count.
 const SHARE: f64 = 0.1;
-/// A jump is so many times as large as what does not count: drives whose clocks drift against the controller's answer with a reading that
-/// is one of their ticks older, or not, and two such slips are no jump.
+/// Multiple of the difference that does not count, which a jump must exceed: drives whose clocks drift against the controller's answer with
+/// a reading that is one of their ticks older, or not, and two such slips are not a jump.
 const SLIPS: f64 = 2.0;
 /// From this share of its full scale on a speed says nothing.
 const SATURATED: f64 = 0.98;
@@ -34,36 +34,37 @@ const SATURATED: f64 = 0.98;
 /// The jumps of an encoder.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jumps {
-    /// What is taken off each answer, rad.
+    /// Jump that is taken off each answer, rad.
     taken_off: f64,
-    /// Difference of the two encoders before what may be a jump, rad.
+    /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// What may be a jump, rad; when something was found: the jump, or how many times as fast positions move as the speed says.
+    /// Size of the possible jump, rad. After a finding: the size of the jump, or the factor: positions move this many times as fast as the
+    /// speed says.
     value: f32,
-    /// Answers that it has been there for.
+    /// Number of answers with the possible jump.
     answers: u8,
-    /// Answers that were taken for a jump, one after the other.
+    /// Number of consecutive answers that were taken for a jump.
     looks: u8,
-    /// How often its size has changed meanwhile.
+    /// Number of changes of its size meanwhile.
     changes: u8,
-    /// What was found since the drive was configured.
+    /// Finding since the drive was configured.
     found: Option<StopKind>,
 }
 
 remembered!(Jumps { taken_off, before, value, answers, looks, changes, found });
 
-/// What an answer that was not expected is.
+/// Meaning of an answer that was not expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Seen {
     /// A motion, or nothing is known of it.
     Motion,
-    /// Perhaps a jump by this way, rad: until that is known, it is taken for one.
+    /// Perhaps a jump by this way, rad: until that is known, the answer is taken for a jump.
     Perhaps(f64),
     /// A jump by this way, rad.
     Jump(f64),
 }
 
-/// The way of a joint within the window of its drive's speed, and what that speed makes of it.
+/// Way of a joint within the window of its drive's speed, as measured and as that speed has it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nodes) struct Ways {
     /// Way of the answered positions, rad.
@@ -73,7 +74,7 @@ pub(in crate::nodes) struct Ways {
 }
 
 impl Ways {
-    /// Of an answer, and the position (rad) a window before it; `None` where the speed is beyond its scale.
+    /// Returns the ways of an answer, and the position (rad) a window before it; `None` if the speed is beyond its scale.
     pub(super) fn of(answer: &Reading, from: f64, config: &Config) -> Option<Self> {
         if answer.velocity.abs() > SATURATED * config.velocity_full_scale {
             return None;
@@ -82,47 +83,47 @@ impl Ways {
         Some(Self { measured: answer.position - from, reported: answer.velocity * window })
     }
 
-    /// What the speed does not explain, rad.
+    /// Returns the way that the speed does not explain, rad.
     pub fn unexplained(&self) -> f64 {
         self.measured - self.reported
     }
 
-    /// As much of it does not count, rad.
+    /// Returns the unexplained way that does not count, rad.
     pub fn tolerance(&self, config: &Config) -> f64 {
         (STEPS * config.encoder_step).max(LEAST) + SHARE * self.reported.abs()
     }
 }
 
 impl Jumps {
-    /// What is taken off each answer, rad.
+    /// Returns the jump that is taken off each answer, rad.
     pub fn taken_off(&self) -> f64 {
         self.taken_off
     }
 
-    /// What was found since the drive was configured, with a jump's size (rad) or a speed's factor.
+    /// Returns the finding since the drive was configured, with the size of a jump (rad) or the factor of a speed.
     pub fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
 
-    /// It is not known yet whether it has jumped.
+    /// Returns `true` while it is not known if a possible jump is a jump.
     #[inline(always)]
     pub fn watching(&self) -> bool {
         self.answers > 0
     }
 
-    /// An answer came as expected.
+    /// Takes note of an answer that came as expected.
     #[inline(always)]
     pub fn as_expected(&mut self) {
         self.answers = 0;
     }
 
-    /// From now on this way (rad) is taken off each answer.
+    /// Takes this way (rad) off each answer from now on.
     pub fn take_off(&mut self, way: f64) {
         self.taken_off += way;
         self.found = Some(StopKind::EncoderJump);
     }
 
-    /// Positions move `factor` times as fast as the speed says.
+    /// Stores that positions move `factor` times as fast as the speed says.
     pub fn find_factor(&mut self, factor: f32) {
         (self.value, self.answers) = (factor, 0);
         self.found = Some(StopKind::SpeedScale);
@@ -167,7 +168,7 @@ impl Jumps {
         }
         let size = now.unexplained() - f64::from(self.before);
         if watched == 0 || (size - f64::from(self.value)).abs() > tolerance {
-            // It has come within this answer, or become another one.
+            // The jump has come within this answer, or has become another one.
             (self.value, same) = (size as f32, 0);
             self.changes += u8::from(watched > 0);
             let twisted = self.changes > CHANGES || (self.changes > 0 && size.abs() <= twist);

@@ -1,47 +1,47 @@
-//! How late the answers of a joint are (J-63).
+//! Lateness of the answers of a joint (J-63).
 //!
-//! An answer does not name the Move that it answers, but those of a node keep their order. So the newest answer is as late as there
-//! are Moves behind the one that it answers: those that are *outstanding*. A missing answer may be late or lost, and nothing in what
-//! has come distinguishes the two, until two answers come in one tick: the first of them was late. For a second after such
-//! *evidence* unanswered Moves count as outstanding, never more of them than have come in together; without it, as lost. Evidence may be
-//! wrong: a frame that the bus repeats comes twice.
-//! An answer that was lost all the same shows in the long run, because the count does not come back to zero: what it does not fall
-//! below is taken off.
+//! An answer does not name the Move that it answers, but the answers of a node keep their order. So the newest answer is late by the number
+//! of Moves sent after the Move that it answers: the *outstanding* Moves. A missing answer may be late or lost, and the answers that came
+//! do not distinguish the two, until two answers come in one tick: the first of them was late. For a second after such *evidence*
+//! unanswered Moves count as outstanding, never more of them than have come in together; without evidence, as lost. Evidence may be wrong:
+//! a frame that the bus repeats comes twice. An answer that was lost all the same shows in the long run, because the count does not come
+//! back to zero: the lowest count of a window is subtracted.
 use crate::remembered::remembered;
 
-/// How long evidence counts, ms.
+/// Time for which evidence counts, ms.
 const LASTS_MS: u16 = 1_000;
-/// Ticks over which the count is to come back to zero.
+/// Ticks within which the count must come back to zero.
 const WINDOW: u8 = 64;
-/// Most that an answer is taken to be late, ticks.
+/// Highest lateness of an answer, ticks.
 const MOST: u8 = 7;
 
-/// Which Moves of a node are unanswered.
+/// Unanswered Moves of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lateness {
     /// Time for which the last evidence still counts, ms.
     left_ms: u16,
     /// Moves whose answers may still come.
     outstanding: u8,
-    /// As many of them there have been: the answers of one tick, but for the last.
+    /// Upper bound of `outstanding`: the highest number of answers in one tick, less the last, while evidence counts.
     most: u8,
-    /// The fewest of them in this window, and the ticks that it has had.
+    /// Fewest outstanding Moves in this window, and ticks that the window has had.
     fewest: u8,
     window: u8,
-    /// In which of the last ticks a Move was sent; the newest is bit 0.
+    /// Ticks in which a Move was sent, as a mask of the last ones; the newest is bit 0.
     moves: u8,
 }
 
 remembered!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// No answer is taken for late, and none of so many in a tick is evidence of it: this tick need not be counted.
+    /// Returns `true` if no answer counts as late and the `answers` of a tick, at most one, are not evidence: this tick need not be
+    /// counted.
     pub fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
 
-    /// One tick, `elapsed_ms` after the last, with so many answers; `asked`: a Move was sent for it. Returns how late the newest answer
-    /// is, ticks.
+    /// Counts one tick, `elapsed_ms` after the last, with this number of `answers`; `asked`: a Move was sent for it. Returns the lateness
+    /// of the newest answer, ticks.
     pub fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
         if self.left_ms == 0 {
             *self = Self { moves: u8::MAX, ..Self::default() };
@@ -54,7 +54,7 @@ impl Lateness {
         // The Move was sent in the tick before, however long ago that is.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
-        // Where there are more answers than Moves, some had been taken for lost.
+        // If there are more answers than Moves, some of them had counted as lost.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
         self.fewest = self.fewest.min(self.outstanding);
@@ -66,14 +66,14 @@ impl Lateness {
         self.age()
     }
 
-    /// The newest answer was so many ticks late only: of those that were outstanding some were lost.
+    /// Corrects the count: the newest answer was only `late` ticks late, because some of the outstanding answers were lost.
     pub fn lost(&mut self, late: u8) {
         let behind = self.moves & !u8::MAX.checked_shl(late.into()).unwrap_or(0);
         self.outstanding = self.outstanding.min(behind.count_ones() as u8);
         self.fewest = self.fewest.min(self.outstanding);
     }
 
-    /// How long ago the Move was sent behind which there are as many as are outstanding, ticks.
+    /// Returns the age of the Move after which as many Moves were sent as are outstanding, ticks.
     fn age(&self) -> u8 {
         let (mut behind, mut age) = (self.outstanding, 0);
         while age < MOST && (behind > 0 || self.moves >> age & 1 == 0) {
@@ -96,7 +96,7 @@ mod tests {
     /// A Move that is sent or not, and its answer: lost, or so late.
     type Sent = (bool, bool, u8);
 
-    /// In each tick what is counted, and how late the newest answer really is, if there is one.
+    /// Returns for each tick the counted lateness, and the real lateness of the newest answer, if there is one.
     fn counted(sent: &[Sent]) -> Vec<(u8, Option<u8>)> {
         let mut lateness = Lateness::default();
         let (mut due, mut last) = (Vec::new(), 0);
@@ -116,8 +116,8 @@ mod tests {
         all
     }
 
-    /// A burst that shows how late answers may be, and then any; in every 24th tick all that is on its way has come. Moves that were not
-    /// sent, and `lost` of a hundred answers for so many ticks.
+    /// A burst that shows how late answers may be, and then any; in every 24th tick all that is on its way has come. Some Moves are not
+    /// sent, and `lost` of a hundred answers are lost in these `ticks`.
     fn sent(most: u8, lost: u32, ticks: usize) -> impl Strategy<Value = Vec<Sent>> {
         let any = (prop::bool::weighted(0.9), 0..100u32, 0..=most);
         prop::collection::vec(any, ticks).prop_map(move |any| {
@@ -133,7 +133,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Where none is lost, every answer behind the burst is as late as it is.
+        /// If no answer is lost, the counted lateness of every answer after the burst is the real one.
         #[test]
         fn j63_unanswered_moves_are_how_late_an_answer_is(sent in (1..=MOST).prop_flat_map(|most| sent(most, 0, 700))) {
             for (tick, (age, late)) in counted(&sent).into_iter().enumerate().skip(2 * usize::from(MOST)) {
@@ -141,10 +141,10 @@ mod tests {
             }
         }
 
-        /// And where some were, all are again when the windows of the loss are over.
+        /// If some answers were lost, every count is right again when the windows of the loss are over.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // Where as many are outstanding as there can be, one more makes no difference: there are fewer.
+            // With as many outstanding as possible, one more makes no difference: so there are fewer.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -155,7 +155,7 @@ mod tests {
             }
         }
 
-        /// Never two answers in a tick: whatever is missing was lost.
+        /// Without two answers in a tick, every missing answer counts as lost.
         #[test]
         fn j63_without_evidence_nothing_is_late(lost in prop::collection::vec(any::<bool>(), 300)) {
             let sent: Vec<Sent> = lost.into_iter().map(|lost| (true, lost, 0)).collect();

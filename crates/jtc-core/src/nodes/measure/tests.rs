@@ -1,4 +1,4 @@
-//! What is measured, and what is predicted in its place (J-35, J-63).
+//! Tests of the measurement, and of the prediction in its place (J-35, J-63).
 extern crate std;
 
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 mod late;
 
 const VELOCITY_MAX: f64 = 2.0;
-/// What the single numbers of the history make of a prediction, rad, or of a rate, rad/s.
+/// Error of a prediction, rad, or of a rate, rad/s, because the history has single precision.
 const ROUNDED: f64 = 1e-6;
 
 fn tick(answer: Option<f64>, velocity: f64) -> Tick {
@@ -24,7 +24,7 @@ fn tick(answer: Option<f64>, velocity: f64) -> Tick {
     }
 }
 
-/// What is commanded is what it was.
+/// Runs a step with an unchanged commanded velocity.
 fn step(joint: &mut Measurement, tick: &Tick) -> bool {
     let past = |ticks: u8| Late {
         ms: ticks.into(),
@@ -165,11 +165,11 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     for (rate, reported, off, since, carried) in [
         (0.4, 0.5, 0.0, 0, 0.4),
         (0.4, 0.3, 0.0, 0, 0.4),
-        // What was a way of 5 ms is now longer by a tenth of what no joint does in one.
+        // The way of 5 ms is now longer by a tenth of the implausible way of one millisecond.
         (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
         (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
         (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
-        // The reported velocity is carried on until the rate is one of answers behind the jump alone.
+        // The reported velocity is carried on until the rate comes from answers after the jump alone.
         (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
@@ -180,7 +180,7 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     }
 }
 
-/// The velocity that is predicted follows the commands; what it differs by from the answer is what fades.
+/// The predicted velocity follows the commands; its difference from the answer fades.
 #[test]
 fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     let mut joint = moving(0.4);
@@ -216,7 +216,7 @@ fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
     assert!((joint.speed() - 0.3).abs() < ROUNDED);
 }
 
-/// The double pole's own decay, whatever the ticks are and wherever it is.
+/// The offset decays like the double pole, for any ticks and any state.
 #[test]
 fn j63_an_offset_fades_like_a_critically_damped_filter() {
     let config = Config::avena();

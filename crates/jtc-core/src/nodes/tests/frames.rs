@@ -1,4 +1,4 @@
-//! What nodes are asked for, and which frame each tick sends (J-12, J-16, J-20, J-23).
+//! Requests to nodes, and the frame that each tick sends (J-12, J-16, J-20, J-23).
 use super::*;
 
 #[test]
@@ -22,7 +22,7 @@ fn j16_j20_what_a_node_is_asked_for() {
             for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
                 let mut expected = expected;
                 if refused && !is_configured && state == NodeState::READY {
-                    // It takes its configuration in Init only.
+                    // The node takes its configuration in Init only.
                     expected[0] = Init;
                 }
                 let got = [Goal::Ready, Goal::Enabled, Goal::Down]
@@ -63,7 +63,7 @@ fn j20_a_node_is_configured_in_init_and_ready_once() {
     }
 }
 
-/// What the frame of a tick is.
+/// Kind of the frame of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sent {
     Move,
@@ -73,7 +73,7 @@ enum Sent {
     ResetAll,
 }
 
-/// One frame to nodes that `change` made of ready ones, so many Moves after the last other frame.
+/// Sends one frame to nodes that `change` made of ready ones, `moves` Moves after the last other frame.
 fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     let (config, mut nodes) = (Config::avena(), ready());
     nodes.moves = moves;
@@ -128,7 +128,7 @@ fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     }
 }
 
-/// Under torque what the gripper alone is in want of comes in one tick of twenty.
+/// Under torque, a frame that only the gripper needs comes in one tick of twenty.
 #[test]
 fn j23_a_gripper_is_brought_up_on_the_side() {
     let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
@@ -153,7 +153,7 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that is to be enabled does not wait for that.
+    // A joint that must be enabled does not wait that long.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
@@ -181,7 +181,7 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     }
 }
 
-/// Where nothing else is to be sent, one configuration may follow another; and a node that is to stay enabled has nothing to wait for.
+/// If no other frame must be sent, one configuration may follow another; a node that must stay enabled has nothing to wait for.
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
@@ -206,8 +206,8 @@ fn j20_configurations_and_changes_of_state_take_turns() {
     }
 }
 
-/// What a gripper in this state is asked for while the joints are where the goal has them; a frame that asks for no change of state
-/// asks for none of its own.
+/// Returns the request to a gripper in this state while the joints are in the state of the goal; a frame that requests no change of state
+/// requests none of the gripper.
 fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {
@@ -222,7 +222,7 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
     }
 }
 
-/// A gripper that keeps its part is left alone where the arm has no torque, but not against its own clear, nor for ever.
+/// A gripper that keeps its part is left alone while the arm has no torque, but not against its own clear, nor for ever.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};

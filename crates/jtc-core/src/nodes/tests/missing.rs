@@ -6,7 +6,7 @@ use super::*;
 #[test]
 fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     let lost = BusState { acknowledged: false, bus_off: false };
-    // On a bus that is off nobody can have answered, whatever was acknowledged before.
+    // On a bus that is off no node can have answered, even if an earlier frame was acknowledged.
     let off = BusState { acknowledged: true, bus_off: true };
     for (state, sent_move, unacknowledged, silent) in [
         (GOOD, true, 0, 1),
@@ -18,14 +18,14 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     ] {
         let mut nodes = ready();
         nodes.sent_move = sent_move;
-        // One that boots is not missed yet.
+        // A node that boots is not missed yet.
         nodes.nodes[4].boot_left = 100;
         tick(&mut nodes, &[], state);
         assert_eq!(nodes.unacknowledged, unacknowledged, "{state:?} {sent_move}");
         for (n, node) in nodes.nodes.iter().enumerate() {
             assert_eq!(node.silent, if n == 4 { 0 } else { silent }, "{state:?} {sent_move}, node {n}");
         }
-        // What answers is there.
+        // A node that answers is there.
         nodes.sent_move = true;
         tick(&mut nodes, &all(NodeState::READY), GOOD);
         assert_eq!((nodes.unacknowledged, nodes.nodes[4].boot_left), (0, 0));
@@ -37,7 +37,7 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     assert_eq!(booting.unacknowledged, 0, "nobody is there to acknowledge");
 }
 
-/// Until the bus is given up, a joint that nobody can have answered for is predicted, and that counts as missing its answer.
+/// Until the bus is given up, a joint is predicted if no node can have answered, and that counts as a missing answer of the joint.
 #[test]
 fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
     let lost = BusState { acknowledged: false, bus_off: false };
@@ -64,8 +64,8 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
-/// Of two answers in a tick the first was late: that the second is ahead of it is no motion. In the next tick one answer may be
-/// the first in time again: what it is beside the prediction is bridged, too.
+/// If two answers come in a tick, the first was late: the distance between them is not a motion. In the next tick one answer may be the
+/// first in time again: its difference from the prediction is bridged, too.
 #[test]
 fn j63_the_second_answer_of_a_tick_makes_no_step() {
     let mut nodes = ready();

@@ -1,4 +1,4 @@
-//! What Teaching adds to the torque of one joint (J-25).
+//! Tests of the torque that Teaching adds to one joint (J-25).
 use proptest::prelude::*;
 
 use super::*;
@@ -75,7 +75,7 @@ fn j25_a_joint_at_rest_is_held_by_dry_friction_up_to_its_breakaway_torque() {
         let mut joint = begun(0.2, coulomb);
         let at_rest = tick(&mut joint, 0.2, 0.0);
         assert!(at_rest.brake.abs() < 1e-3 && at_rest.friction == 0.0, "no step at the begin");
-        // Pulled away slowly it slips, and is held where it stands then.
+        // Pulled away slowly the joint slips, and is then held at its new position.
         let slips = tick(&mut joint, 0.25, 0.0).brake;
         assert!((slips + breakaway).abs() < 1e-3, "{slips} N·m, not {breakaway}");
         let back = tick(&mut joint, 0.2, 0.0).brake;
@@ -100,7 +100,7 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// Half of the Coulomb part, smoothed within 0.1 rad/s, gone from 0.6 rad/s on; less where the damping does not bear its slope.
+/// Half of the Coulomb part, smoothed within 0.1 rad/s, gone from 0.6 rad/s on; less if the damping does not bear its slope.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in
@@ -124,13 +124,13 @@ fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
         let torque = tick(&mut joint, position, 0.0).brake;
         assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
     }
-    // One that is found in there, or beyond, is moved by nothing; going out further it meets the spring.
+    // A joint that is found in there, or beyond, is not moved; further out it meets the spring.
     for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
         let mut joint = begun(found, 8.0);
         assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
         let torque = tick(&mut joint, further, 0.0).brake;
         assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
-        // Led inwards and out again it has no room of its own any more.
+        // Led inwards and out again the joint has no margin of its own any more.
         tick(&mut joint, 0.0, 0.0);
         let torque = tick(&mut joint, 1.45, 0.0).brake;
         assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");

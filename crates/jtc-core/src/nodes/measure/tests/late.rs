@@ -19,7 +19,7 @@ struct Motion {
     commanded: f64,
 }
 
-/// What is used in a millisecond, less where the joint is and how fast.
+/// Difference between the values used in a millisecond, and the real position and speed of the joint.
 #[derive(Clone, Copy, Debug)]
 struct Off {
     /// rad.
@@ -37,7 +37,7 @@ impl Motion {
         self.amplitude * self.rate * (self.rate * ms * DT).cos()
     }
 
-    /// Most of it, rad/s.
+    /// Returns the highest speed, rad/s.
     fn speed(&self) -> f64 {
         self.amplitude * self.rate
     }
@@ -132,11 +132,12 @@ proptest! {
         late in (1u32..=5).prop_flat_map(lateness),
     ) {
         let off = motion.off(&arrivals(&late, &[]));
-        // Those of the burst itself have been bridged, which fades.
+        // The differences of the burst itself have been bridged, and fade.
         prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
     }
 
-    /// Their velocities alike: where the joint does what is commanded, it has the velocity that was reported, and what was commanded since.
+    /// Late velocities: a joint that follows its command has the velocity that was reported, plus the change of the commanded velocity
+    /// since.
     #[test]
     fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
         let motion = Motion { commanded: 1.0, ..motion };
@@ -145,8 +146,8 @@ proptest! {
         }
     }
 
-    /// However many are lost among them: what is used is off by the way of the most that answers are late, and by what is bridged
-    /// when that is seen, which is as much; and nothing of it stays.
+    /// However many answers are lost among the late ones, the position used is off by the way of the highest lateness, and by the bridged
+    /// difference when that is seen, which is as much. No part of it stays.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
@@ -162,8 +163,8 @@ proptest! {
     }
 }
 
-/// Where a joint is fast, the answer behind a lost one is where the prediction has it, and not a millisecond's way behind: it does not take
-/// the rest of the window to be seen.
+/// If a joint is fast, the answer after a lost one is at its predicted position, and does not lag by the way of a millisecond: the loss is
+/// seen before the rest of the window is over.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -173,7 +174,7 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// What was late before it was known makes no step: it is bridged, and fades.
+/// Answers that were late before that was known make no step: they are bridged, and the difference fades.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -186,7 +187,7 @@ fn j63_the_first_late_answers_make_no_step() {
     }
 }
 
-/// Nor does a lateness that shifts once it is known that there is some, also where the encoder is said to be coarse.
+/// A lateness that shifts, once lateness is known, makes no step either, also if the encoder is configured as coarse.
 #[test]
 fn j63_a_lateness_that_shifts_makes_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -218,7 +219,7 @@ fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     }
 }
 
-/// What is bridged because an answer was beside the prediction, and is in its place again in small steps, does not add up with them.
+/// The bridged difference of an answer off its prediction does not add up if the answers return to their place in small steps.
 #[test]
 fn j63_what_was_bridged_is_taken_back() {
     let mut joint = moving(0.0);

@@ -2,9 +2,9 @@
 
     python benches/dynamics.py [--states 100000] [--rounds 3] [--json FILE]
 
-Pinocchio (`pip install pin`) is called in a loop over the states, which is the only way that its bindings have for these functions, but for
-what its `parallel` extension computes for a batch, where the wheel has it. Of several rounds the best is printed: other programs can
-only slow one down. Build the package with optimisation first (`maturin develop --profile dist`).
+Pinocchio (`pip install pin`) is called in a loop over the states, because its bindings have no batch call for most of these functions. Its
+`parallel` extension is used for the others, if the wheel has it. The best of several rounds is printed, because other programs can only
+slow a round down. Build the package with optimisation first (`maturin develop --profile dist`).
 """
 
 import argparse
@@ -32,7 +32,7 @@ def best(rounds, of):
 
 
 def anchors(arm, states):
-    """Pinocchio's functions by name, each over all states."""
+    """Returns Pinocchio's functions by name, each over all states."""
     q, qd, qdd, tau = states
     model = pin.buildModelFromXML(arm.to_urdf())
     data = model.createData()

@@ -1,7 +1,7 @@
-"""A first motion: the arm moves to a place and along an example, and a report is written.
+"""First motion: moves the arm to a position and along an example trajectory, and writes a report.
 
     python first_motion.py                       # a simulated arm
-    python first_motion.py /dev/ttyUSB0          # a real one: read the page on safety first
+    python first_motion.py /dev/ttyUSB0          # a real arm: read the page on safety first
 """
 
 import sys
@@ -14,7 +14,7 @@ def main(target: str = "sim:") -> None:
         print(f"{robot.arm.name}: {robot.status.waiting_for}")
         print(robot.move([0, 30, -60, 0, 30, 0], degrees=True, speed=50))
 
-        # `approach` moves an arm that stands elsewhere to the first point.
+        # `approach` moves the arm to the first point if it is elsewhere.
         run = robot.run(openjtc.example("motion"), approach=True)
         print(run)
         print("report:", run.report("first_motion.html", overwrite=True))

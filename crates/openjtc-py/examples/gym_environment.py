@@ -1,9 +1,9 @@
-"""A Gymnasium environment over the simulated arm: reach joint positions with torques, 50 decisions a second.
+"""Gymnasium environment with the simulated arm: reach joint positions with torques, 50 decisions per second.
 
-    pip install './openjtc-0.2.0-….whl[gym]'    # the wheel of a release, by its whole name; or only `pip install gymnasium` beside it
+    pip install './openjtc-0.2.0-….whl[gym]'    # the wheel of a release, by its full name; if it is installed, only `pip install gymnasium`
     python gym_environment.py
 
-checks the environment and runs a scripted policy in it. The actions are shares of the torques that the drives reach.
+checks the environment and runs a scripted policy in it. The actions are shares of the largest torques of the drives.
 """
 
 import gymnasium as gym
@@ -16,7 +16,7 @@ from openjtc.sim import Plant
 
 
 class Reach(gym.Env):
-    """Observed: positions, velocities and goal. The reward is minus the distance, and minus 100 where a drive trips."""
+    """Observes positions, velocities and goal. The reward is minus the distance, and minus 100 if a drive trips."""
 
     def __init__(self, seconds=5.0):
         self.plant = Plant(Arm.avena())

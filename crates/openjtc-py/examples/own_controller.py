@@ -1,9 +1,9 @@
-"""A controller of one's own beside openjtc's, in simulation, on the same motion.
+"""Compares your own controller with openjtc's controller, in simulation and on the same motion.
 
     python own_controller.py
 
-Both move the same arm, whose masses and friction are not quite those of its file: openjtc's controller over the serial line, a PD law
-with gravity compensation through the same drives. The errors of both are printed.
+Both move the same arm, whose masses and friction differ slightly from its file: openjtc's controller over the serial line, and a PD law
+with gravity compensation through the same drives. The program prints the errors of both.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ WAY = np.array([0.8, 0.5, -0.7, 0.4, 0.6, -0.9])
 
 
 def there_and_back(start, u, period):
-    """Positions, velocities and accelerations of a smooth way to `start + WAY` and back; `u` is the time over `period`."""
+    """Returns positions, velocities and accelerations of a smooth path to `start + WAY` and back; `u` is the time divided by `period`."""
     w = 2 * np.pi
     s, ds, dds = (1 - np.cos(w * u)) / 2, w / 2 * np.sin(w * u), w**2 / 2 * np.cos(w * u)
     return start + np.outer(s, WAY), np.outer(ds, WAY) / period, np.outer(dds, WAY) / period**2

@@ -1,4 +1,4 @@
-"""Teach by hand and replay: what was shown becomes waypoints, and they become a motion within the limits.
+"""Teach by hand and replay: recorded positions become waypoints, and the waypoints become a motion within the limits.
 
     python teach_and_replay.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
 """
@@ -16,7 +16,7 @@ def main(target: str = "sim:") -> None:
         robot.move(START)
         with robot.teach() as teaching:
             if target == "sim:":
-                # There is no hand in the simulator: one leads the arm along a path.
+                # A simulated hand leads the arm along a path.
                 shown = robot.plan([START, START + [0.5, 0.2, -0.2, 0, 0.3, 0], START + [0.2, 0, 0, 0.4, 0, 0]])
                 robot.lead(shown)
             print("lead the arm by hand: 8 s")

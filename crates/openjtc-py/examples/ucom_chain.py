@@ -1,6 +1,6 @@
-"""A chain of UCoM boards: numbered, looked at, driven by name, recorded as a table.
+"""Chain of UCoM boards: number the boards, examine them, drive them by name, record a table.
 
-Without an argument it is a simulated head; with one it is a bus, as socketcan:can0. **Joints move.**
+Without an argument the chain is a simulated head; an argument names a bus, such as socketcan:can0. **Joints move.**
 """
 
 import math
@@ -12,18 +12,18 @@ from openjtc import Error, ucom
 
 def main(bus: str) -> None:
     with ucom.connect(bus) as chain:
-        # Numbers along the init wire, and who stands where.
+        # Numbers the boards along the init wire and lists them.
         boards = chain.init().boards
         print(f"{len(boards)} boards")
         for board in boards:
             print(f"  {board.number:2}  0x{board.flash_number:04X}  {board.state:9}  {board.description}")
 
-        # Applications start; nothing moves yet. Only now they send the names of their signals.
+        # Starts applications without movement. Only started applications send the names of their signals.
         chain.start([1, 2])
         for signal in chain.boards[1].signals.inputs:
             print(f"  input {signal.text}, {signal.minimum:g} to {signal.maximum:g}")
 
-        # Control loops run under supervision until the end of the context; words are 0.01 degrees here.
+        # Control loops run under supervision until the end of the context; one word step is 0.01 degrees here.
         report = chain.run([1, 2], active=True, inputs={"1.set_position": 0, "2.set_position": 0})
         print(f"boards {report.boards} run; {report.load_percent:.0f} % of the bus")
 

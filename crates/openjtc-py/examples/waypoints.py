@@ -1,4 +1,4 @@
-"""From waypoints to a cycle: planned within all limits, looked at, run three times.
+"""From waypoints to a cycle: plan within all limits, print the plan, run it three times.
 
     python waypoints.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
 """

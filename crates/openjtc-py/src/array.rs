@@ -1,4 +1,4 @@
-//! Arrays of numpy as arrays of joints, and back: one row a state, one column a joint, base to wrist.
+//! Converts numpy arrays to arrays of joints, and back: one row per state, one column per joint, base to wrist.
 
 use jtc_core::JOINTS;
 use jtc_host::error::Facts;
@@ -10,12 +10,12 @@ use pyo3::prelude::*;
 
 use crate::error::Failure;
 
-/// An array of numpy or anything that becomes one (lists, tuples), as floats.
+/// Reads a numpy array, or a list or tuple, as floats.
 pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyArrayDyn<'py, f64>, Failure> {
     let made = || -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let numpy = value.py().import("numpy")?;
         let array = numpy.call_method1("ascontiguousarray", (value, "float64"))?;
-        // `ascontiguousarray` gives scalars a dimension; nothing here is a scalar.
+        // `ascontiguousarray` gives scalars a dimension; no argument here is a scalar.
         Ok(array.cast_into::<PyArrayDyn<f64>>()?)
     };
     made().map(|array| array.readonly()).map_err(|error| {
@@ -24,7 +24,7 @@ pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyAr
     })
 }
 
-/// Six finite numbers, base to wrist; `what` names them in the error.
+/// Reads six finite numbers, base to wrist; `what` names them in the error.
 pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
@@ -36,7 +36,7 @@ pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Fai
     Ok(numbers)
 }
 
-/// Rows of six finite numbers, and whether it was one row without a second dimension.
+/// Reads rows of six finite numbers. The flag is `true` for one row without a second dimension.
 pub fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
     let array = floats(value, what)?;
     let shape = array.shape().to_vec();
@@ -67,18 +67,18 @@ fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// An (N, 6) array.
+/// Makes an (N, 6) array.
 pub fn matrix<'py>(py: Python<'py>, rows: &[[f64; JOINTS]]) -> Bound<'py, PyArray2<f64>> {
     wide(py, rows)
 }
 
-/// An (N, M) array.
+/// Makes an (N, M) array.
 pub fn wide<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> Bound<'py, PyArray2<f64>> {
     let flat = PyArray1::from_slice(py, rows.as_flattened());
     flat.reshape([rows.len(), M]).unwrap_or_else(|_| PyArray2::zeros(py, [rows.len(), M], false))
 }
 
-/// A (6,) array where there was one row, else an (N, 6) array.
+/// Makes a (6,) array if the input was one row, else an (N, 6) array.
 pub fn as_given<'py>(py: Python<'py>, rows: &[[f64; JOINTS]], one: bool) -> Bound<'py, PyAny> {
     match rows {
         [row] if one => PyArray1::from_slice(py, row).into_any(),

@@ -1,4 +1,4 @@
-//! The real control code, one tick a call.
+//! The real control code, one tick per call.
 
 use jtc_bus::{Format, Frame};
 use jtc_core::{BusState, Config};
@@ -12,36 +12,36 @@ use crate::arm::Arm;
 use crate::error::Failure;
 use crate::telemetry::Telemetry;
 
-/// A frame of the joint bus as Python has it.
+/// Frame of the joint bus in the form of Python.
 pub type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
 
-/// What comes out of a tick: frame for the bus, bytes for the host, safety output, and whether the watchdog reset the controller.
+/// Outputs of a tick: frame for the bus, bytes for the host, safety output, and `true` if the watchdog reset the controller.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool);
 
-/// A frame of the joint bus from what Python has.
+/// Converts a frame of the joint bus from Python.
 pub fn frame(id: u32, data: &[u8]) -> Result<Frame, Failure> {
     Frame::received(id, Format::BUS, data).map_err(|error| Failure::usage(error.to_string()))
 }
 
-/// The same for Python.
+/// Converts a frame of the joint bus to Python.
 pub fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
     (frame.id, PyBytes::new(py, frame.data()))
 }
 
-/// The settings of a controller for an arm, and the image of the arm that its board has stored. Without an arm it is as new.
+/// Returns the settings of a controller for an arm, and the stored image of the arm. Without an arm, the controller is as new.
 pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
     let Some(arm) = arm else { return Ok((Config::avena(), None)) };
     let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
-    // With an image all that it knows comes from there, as on a board; else it has the limits, and waits for parameters.
+    // With an image, the controller reads all data from the image, as on a board. Otherwise it has the limits and waits for parameters.
     Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
 }
 
-/// A controller on its board. Time passes with its ticks only.
+/// Controller on its board. Time advances only with its ticks.
 #[pyclass(module = "openjtc._native")]
 pub struct Controller {
     board: Board,
     now_us: u64,
-    /// A pin keeps its level where no tick comes.
+    /// Level of the safety output pin, which stays when a tick is missing.
     safety_output: bool,
 }
 
@@ -56,7 +56,7 @@ impl Controller {
         Ok(Self { board, now_us: 0, safety_output: false })
     }
 
-    /// One millisecond.
+    /// Runs one tick, 1 ms.
     #[allow(clippy::too_many_arguments, reason = "the inputs of a tick; Python has them in one object")]
     fn tick<'py>(
         &mut self,
@@ -89,7 +89,7 @@ impl Controller {
         Ok((sent, to_host, self.safety_output, false))
     }
 
-    /// What the last tick computed.
+    /// Values that the last tick computed.
     #[getter]
     fn telemetry(&self) -> Telemetry {
         Telemetry(*self.board.telemetry())
@@ -102,7 +102,7 @@ impl Controller {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Controller>()
 }

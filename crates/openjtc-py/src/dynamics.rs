@@ -1,4 +1,4 @@
-//! Dynamics and kinematics of an arm over many states at once.
+//! Dynamics and kinematics of an arm, for many states in one call.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
 
-/// A payload as Python passes it: mass, centre of mass, inertia.
+/// Payload from Python: mass, centre of mass, inertia.
 pub type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
 
-/// A payload that there can be.
+/// Makes a payload, or returns an error if it is not physically consistent.
 pub fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
     let Some((mass, com, inertia)) = numbers else { return Ok(Payload::NONE) };
     let payload = Payload { mass, com, inertia };
@@ -25,7 +25,7 @@ pub fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
     Ok(payload)
 }
 
-/// An arm prepared for computing. It does not change.
+/// Dynamics of one arm. The object does not change.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Dynamics {
     arm: Arc<HostArm>,
@@ -56,7 +56,7 @@ impl Dynamics {
         })
     }
 
-    /// Joint torques of the rigid bodies.
+    /// Computes joint torques of the rigid bodies.
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -69,7 +69,7 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Joint accelerations; `rotors`: with the rotor inertias of the arm.
+    /// Computes joint accelerations; `rotors`: with the rotor inertias of the arm.
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -84,14 +84,14 @@ impl Dynamics {
         Ok(array::as_given(py, &accelerations, states.one))
     }
 
-    /// Joint torques at rest.
+    /// Computes joint torques at rest.
     fn gravity<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>, Failure> {
         let states = States::read([("q", q)])?;
         let torques = states.map(py, |[q]| self.dynamics.gravity_torque(q));
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Mass matrices without rotors.
+    /// Computes mass matrices without rotors.
     fn mass_matrix<'py>(
         &self,
         py: Python<'py>,
@@ -102,7 +102,7 @@ impl Dynamics {
         shaped(py, matrices.as_flattened().as_flattened(), states.one, states.count, &[JOINTS, JOINTS])
     }
 
-    /// Poses of the six joint frames and the flange, 4×4 each.
+    /// Computes poses of the six joint frames and the flange, 4×4 each.
     fn frames<'py>(
         &self,
         py: Python<'py>,
@@ -114,7 +114,7 @@ impl Dynamics {
         shaped(py, flat, states.one, states.count, &[JOINTS + 1, 4, 4])
     }
 
-    /// Poses of the flange, 4×4 each.
+    /// Computes poses of the flange, 4×4 each.
     fn forward_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -125,7 +125,7 @@ impl Dynamics {
         shaped(py, poses.as_flattened().as_flattened(), states.one, states.count, &[4, 4])
     }
 
-    /// Geometric Jacobians of the flange.
+    /// Computes geometric Jacobians of the flange.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -136,7 +136,7 @@ impl Dynamics {
         shaped(py, jacobians.as_flattened().as_flattened(), states.one, states.count, &[6, JOINTS])
     }
 
-    /// Joint positions for poses of the flange, the nearest to `near` each.
+    /// Computes joint positions for poses of the flange, each the solution nearest to `near`.
     fn inverse_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -165,7 +165,7 @@ impl Dynamics {
         }
     }
 
-    /// All joint positions within the limits for one pose of the flange.
+    /// Computes all joint positions within the limits for one pose of the flange.
     fn all_inverse_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -182,7 +182,7 @@ impl Dynamics {
         Ok(array::matrix(py, &all).into_any())
     }
 
-    /// Friction of the joints at velocities, as the controller compensates it.
+    /// Computes the friction of the joints at velocities, as the controller compensates it.
     fn friction<'py>(
         &self,
         py: Python<'py>,
@@ -223,11 +223,11 @@ impl Dynamics {
     }
 }
 
-/// Arguments of many states: each has a row for every state, or one for all.
+/// Arguments of many states: each argument has one row for every state, or one row for all states.
 struct States<const K: usize> {
     columns: [Vec<JointVec>; K],
     count: usize,
-    /// Every argument was one row without a second dimension.
+    /// `true` if every argument was one row without a second dimension.
     one: bool,
 }
 
@@ -244,7 +244,7 @@ impl<const K: usize> States<K> {
         Ok(Self { columns, count, one: shapes.iter().all(|(_, _, one)| *one) })
     }
 
-    /// A value for each state, computed while other threads of Python run.
+    /// Computes a value for each state while other Python threads run.
     fn map<T: Send>(&self, py: Python<'_>, of: impl Fn([&JointVec; K]) -> T + Sync) -> Vec<T> {
         py.detach(|| {
             (0..self.count).map(|k| of(self.columns.each_ref().map(|column| pick(column, k)))).collect()
@@ -252,12 +252,12 @@ impl<const K: usize> States<K> {
     }
 }
 
-/// Row `k`, or the one that is for all.
+/// Returns row `k`, or the single row for all states.
 fn pick<T>(rows: &[T], k: usize) -> &T {
     if let [row] = rows { row } else { &rows[k] }
 }
 
-/// The number of states that these arguments have in common.
+/// Returns the common number of states of these arguments.
 fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<usize, Failure> {
     let many = shapes.iter().find(|(_, _, one)| !one);
     let Some(&(first, count, _)) = many else { return Ok(1) };
@@ -269,7 +269,7 @@ fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<us
     }
 }
 
-/// An array of `count` values of the shape `inner`; without the first dimension where it was `one`.
+/// Makes an array of `count` values of the shape `inner`; without the first dimension if `one` is set.
 fn shaped<'py>(
     py: Python<'py>,
     flat: &[f64],
@@ -282,7 +282,7 @@ fn shaped<'py>(
     array.map_err(|error| Failure::usage(error.to_string()))
 }
 
-/// The 4×4 matrix of a pose.
+/// Returns the 4×4 matrix of a pose.
 fn homogeneous(pose: &Pose) -> [[f64; 4]; 4] {
     let [x, y, z] = std::array::from_fn(|i| {
         let [a, b, c] = pose.rotation[i];
@@ -291,7 +291,7 @@ fn homogeneous(pose: &Pose) -> [[f64; 4]; 4] {
     [x, y, z, [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Poses of 4×4 matrices, and whether it was one without a third dimension.
+/// Reads poses from 4×4 matrices. The flag is `true` for one matrix without a third dimension.
 fn poses(value: &Bound<'_, PyAny>) -> Result<(Vec<Pose>, bool), Failure> {
     let array = array::floats(value, "pose")?;
     let shape = array.shape().to_vec();
@@ -319,7 +319,7 @@ fn pose_failure(error: PoseError) -> Failure {
     PlanError::Plan(error.into()).into()
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Dynamics>()
 }

@@ -1,4 +1,4 @@
-//! Errors of the libraries as exceptions of Python, with all that they know.
+//! Errors of the libraries as Python exceptions, with all their facts.
 
 use std::ops::{Deref, DerefMut};
 
@@ -7,47 +7,47 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A failure on its way to Python, where it becomes an exception.
+/// Failure that becomes an exception in Python.
 #[derive(Clone, Debug)]
 pub struct Failure(host_kit::Failure);
 
 impl Failure {
-    /// Of an error of the libraries.
+    /// Makes a failure from an error of the libraries.
     pub fn of(error: &impl Diagnose) -> Self {
         Self(host_kit::Failure::of(error))
     }
 
-    /// A failure of a kind.
+    /// Makes a failure of a kind.
     pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
         Self(host_kit::Failure::new(kind, code, message))
     }
 
-    /// An argument that is none.
+    /// Makes a failure for an invalid argument.
     pub fn usage(message: impl ToString) -> Self {
         Self(host_kit::Failure::usage(message))
     }
 
-    /// What a check refuses; nothing was done.
+    /// Makes a failure for a request that a check refused before any action.
     pub fn refused(code: &'static str, message: impl ToString, next: impl Into<Next>) -> Self {
         Self::new(ErrorKind::Refused, code, message).next(next)
     }
 
-    /// What went wrong on the way.
+    /// Makes a failure for an action that failed while it ran.
     pub fn fault(code: &'static str, message: impl ToString, next: impl Into<Next>) -> Self {
         Self::new(ErrorKind::Fault, code, message).next(next)
     }
 
-    /// The same with the act that helps.
+    /// Sets the next step that helps.
     pub fn next(self, next: impl Into<Next>) -> Self {
         Self(self.0.next(next))
     }
 
-    /// The same with these facts.
+    /// Sets the facts.
     pub fn with(self, facts: Facts) -> Self {
         Self(self.0.with(facts))
     }
 
-    /// The same in other words.
+    /// Replaces the message.
     pub fn message(mut self, message: impl ToString) -> Self {
         self.message = message.to_string();
         self
@@ -86,7 +86,7 @@ impl From<Failure> for PyErr {
     }
 }
 
-/// The exception of `openjtc.errors` for this failure.
+/// Returns the exception of `openjtc.errors` for this failure.
 fn to_python(py: Python<'_>, failure: &Failure) -> PyResult<PyErr> {
     let host_kit::Failure { kind, code, message, next, facts } = &failure.0;
     let kind = match kind {

@@ -1,4 +1,4 @@
-//! Values that the libraries serialise, as dicts, lists, strings and numbers of Python.
+//! Converts serialised values of the libraries to Python dicts, lists, strings and numbers.
 
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
@@ -8,13 +8,13 @@ use serde_json::Value;
 
 use crate::error::Failure;
 
-/// What serialises, as plain values of Python.
+/// Converts a serialisable value to plain Python values.
 pub fn plain<'py>(py: Python<'py>, value: &impl Serialize) -> Result<Bound<'py, PyAny>, Failure> {
     let value = serde_json::to_value(value).map_err(|e| Failure::usage(e.to_string()))?;
     to_python(py, &value).map_err(|e| Failure::usage(e.to_string()))
 }
 
-/// The same of a value that is JSON already.
+/// Converts a JSON value to plain Python values.
 pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     match value {
         Value::Null => Ok(py.None().into_bound(py)),

@@ -21,7 +21,7 @@ mod wire;
 
 use pyo3::prelude::*;
 
-/// The compiled part of the package `openjtc`; its Python files are what people import.
+/// Compiled part of the package `openjtc`; users import the Python modules.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,4 +1,4 @@
-//! The flight recorder: every tick of the last seconds before the first error, run again.
+//! Flight recorder: every tick of the last seconds before the first error, replayed.
 
 use std::path::PathBuf;
 
@@ -8,14 +8,14 @@ use pyo3::prelude::*;
 use crate::error::Failure;
 use crate::run::Samples;
 
-/// A log that was read from a controller.
+/// Log that was read from a controller.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct FlightLog {
     account: Account,
 }
 
 impl FlightLog {
-    /// As Python has it.
+    /// Wraps a log for Python.
     pub fn of(account: Account) -> Self {
         Self { account }
     }
@@ -23,30 +23,30 @@ impl FlightLog {
 
 #[pymethods]
 impl FlightLog {
-    /// What happened, what broke first in front.
+    /// Timeline in words, beginning with the first failure.
     #[getter]
     fn story(&self) -> Vec<String> {
         self.account.story.lines()
     }
 
-    /// Ticks, and how many of them a replay of the same program gave the same bits for.
+    /// Number of ticks, and number of ticks that the replay with the same program reproduced bit for bit.
     #[getter]
     fn replayed(&self) -> (usize, usize) {
         (self.account.replayed.ticks.len(), self.account.replayed.same)
     }
 
-    /// What the recorder does: recording, or why it stopped.
+    /// State of the recorder: recording, or the reason of its stop.
     #[getter]
     fn state(&self) -> &'static str {
         self.account.log.state.name()
     }
 
-    /// Each tick.
+    /// Returns a sample for each tick.
     fn samples(&self) -> Samples {
         crate::robot::samples_of(&self.account)
     }
 
-    /// A recording as MCAP, with the log in it: `jtc log replay` reads it.
+    /// Saves an MCAP recording that contains the log; `jtc log replay` reads it.
     #[pyo3(signature = (path, overwrite=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         let mut options = std::fs::OpenOptions::new();
@@ -64,7 +64,7 @@ impl FlightLog {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<FlightLog>()
 }

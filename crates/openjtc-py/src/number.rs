@@ -1,4 +1,4 @@
-//! Numbers of Python that have a range: one outside it is an error with the value and the limit, and none is changed in silence.
+//! Range checks of numbers from Python: a number out of range is an error with value and limit, and never changed silently.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use host_kit::Facts;
 
 use crate::error::Failure;
 
-/// The number, where it is in this range; `what` names it, `unit` follows it.
+/// Returns the number if it is in this range, else an error. `what` and `unit` describe the number in the error.
 pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) -> Result<f64, Failure> {
     if range.contains(&value) {
         return Ok(value);
@@ -20,12 +20,12 @@ pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) ->
     Err(failure.with(Facts::beyond(value, limit)))
 }
 
-/// s, up to this many.
+/// Returns a duration of up to `most` seconds.
 pub fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Failure> {
     within(value, 0.0..=most, what, "s").map(Duration::from_secs_f64)
 }
 
-/// How long somebody waits, s: not at all where it is negative, and as long as it takes where no clock can count it.
+/// Returns a timeout, s: no wait if negative, and a wait without limit if the number is too large for the clock.
 pub fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
     if value.is_nan() {
         return seconds(value, f64::INFINITY, what);

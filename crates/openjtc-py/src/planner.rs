@@ -1,4 +1,4 @@
-//! Motions from poses and waypoints, and the check that guards each upload.
+//! Planning of motions from poses and waypoints, and the check that guards each upload.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
 
-/// A verdict as plain values, with what refuses and what warns in words.
+/// Converts a verdict to plain values, with refusals and warnings in words.
 pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, PyAny>> {
     let all = json::plain(py, verdict)?;
     all.set_item("ok", verdict.is_ok())?;
@@ -33,7 +33,7 @@ pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, P
     Ok(all)
 }
 
-/// A motion that was planned, and passed the check.
+/// Planned motion that passed the check.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Plan {
     planned: Planned,
@@ -53,7 +53,7 @@ impl Plan {
         PyArray1::from_slice(py, &self.planned.waypoint_times)
     }
 
-    /// Which limit of which joint binds from when to when.
+    /// Returns the time spans in which a joint is at a limit.
     fn binding<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
         json::plain(py, &self.planned.binding)
     }
@@ -67,14 +67,14 @@ impl Plan {
         verdict(py, &self.planned.verdict)
     }
 
-    /// What is commanded at each point, with its torques.
+    /// Returns the commanded values of each point, with the torques.
     fn samples(&self) -> Samples {
         let Planned { binding, notes, .. } = &self.planned;
         Samples::of_plan(self.info.clone(), self.samples.clone(), binding.clone(), notes.clone())
     }
 }
 
-/// Plans for one arm.
+/// Planner for one arm.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Planner {
     arm: Arc<jtc_host::Arm>,
@@ -89,7 +89,7 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// The blend that is given, or its own.
+    /// Returns the given blend, or the planner's own.
     fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
         given.map_or(Ok(self.blend), |blend| distance("blend", blend))
     }
@@ -130,7 +130,7 @@ impl Planner {
     }
 }
 
-/// A blend that is negative, or not a number, is not valid.
+/// Returns a valid blend, or an error if it is negative or not finite.
 fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     if value.is_finite() && value >= 0.0 {
         return Ok(value);
@@ -138,7 +138,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     Err(Failure::usage(format!("{what}: {value} is no distance")))
 }
 
-/// The torque margin that is given (%), or the default one.
+/// Returns the given torque margin (%), or the default.
 pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
@@ -170,14 +170,14 @@ impl Planner {
         Ok(Self { arm, config, speed, blend, blend_m, line, jerk, temperature, margin_pct })
     }
 
-    /// From a position at rest to another one.
+    /// Plans from one position at rest to another one.
     fn to(&self, py: Python<'_>, start: &Bound<'_, PyAny>, to: &Bound<'_, PyAny>) -> PyResult<Plan> {
         let target = Target::Joints(array::joints(to, "to")?);
         let start = array::joints(start, "start")?;
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// From a position at rest to a pose of the flange: x y z (m), roll pitch yaw (rad).
+    /// Plans from a position at rest to a pose of the flange: x y z (m), roll pitch yaw (rad).
     fn to_flange(
         &self,
         py: Python<'_>,
@@ -191,8 +191,8 @@ impl Planner {
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// Through positions (N, 6), with a blend (rad) in the place of its own, and with times (s from the first, NaN: as soon as the limits
-    /// allow).
+    /// Plans through positions (N, 6), with a blend (rad) instead of the planner's own, and with times (s from the first position, NaN: as
+    /// soon as the limits allow).
     #[pyo3(signature = (positions, blend=None, times=None))]
     fn through(
         &self,
@@ -216,7 +216,7 @@ impl Planner {
         self.plan(py, |planner| Ok(HostPlanner { blend, ..planner.clone() }.through(&waypoints)?))
     }
 
-    /// Through the waypoints of a file, CSV or JSON.
+    /// Plans through the waypoints of a file, CSV or JSON.
     fn through_file(
         &self,
         py: Python<'_>,
@@ -229,14 +229,14 @@ impl Planner {
         self.waypoints(py, file, blend)
     }
 
-    /// Through the waypoints of the text of such a file.
+    /// Plans through the waypoints in the text of a CSV or JSON file.
     fn through_text(&self, py: Python<'_>, text: &str, blend: Option<f64>, degrees: bool) -> PyResult<Plan> {
         let file = WaypointFile::parse(text).map_err(Failure::from)?;
         let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
         self.waypoints(py, file, blend)
     }
 
-    /// Checks a trajectory, from `start` where it is given.
+    /// Checks a trajectory, from `start` if given.
     #[pyo3(signature = (trajectory, start=None))]
     fn check<'py>(
         &self,
@@ -259,7 +259,7 @@ impl Planner {
     }
 }
 
-/// Trajectories and files to try, by their names: the text of one.
+/// Returns the text of an example trajectory or file by its name.
 #[pyfunction]
 fn example_text(name: &str) -> Result<String, Failure> {
     let all = &jtc_host::example::EXAMPLES;
@@ -270,7 +270,7 @@ fn example_text(name: &str) -> Result<String, Failure> {
     })
 }
 
-/// As few of the positions (N, 6) as keep every other one within a tolerance (rad) of the legs between them.
+/// Thins positions (N, 6): every dropped position is within a tolerance (rad) of the legs between the kept ones.
 #[pyfunction]
 fn thinned<'py>(
     py: Python<'py>,
@@ -286,7 +286,7 @@ fn thinned<'py>(
     Ok(array::matrix(py, &kept.into_iter().map(|i| rows[i]).collect::<Vec<_>>()))
 }
 
-/// The classes and functions.
+/// Registers the classes and functions.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Planner>()?;
     module.add_class::<Plan>()?;

@@ -1,4 +1,4 @@
-//! The simulated arm with its drives, for a controller that is written in Python.
+//! Simulated arm with its drives, for a controller that is written in Python.
 
 use jtc_bus::{Answer, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::JOINTS;
@@ -11,19 +11,19 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
-/// Boot of the drives, ms: until it is over the mean of their speed has forgotten that there was none before.
+/// Boot time of the drives, ms: long enough for the mean of their speed to be filled with samples.
 const BOOT_MS: u32 = 12;
-/// Milliseconds within which drives are enabled that can be.
+/// Longest time until the drives are enabled, ms.
 const BRING_UP_MS: u64 = 2_000;
 
-/// Arm and drives, or the arm alone.
+/// Arm with drives, or the arm alone.
 #[pyclass(module = "openjtc._native")]
 pub struct Plant {
     config: SimConfig,
     plant: SimPlant,
     drives: bool,
     ticks: u64,
-    /// What the drives answered last.
+    /// Last reports of the drives.
     reports: [JointReport; JOINTS],
 }
 
@@ -34,7 +34,7 @@ impl Plant {
     fn new(py: Python<'_>, arm: SimulatedArm<'_>, drives: bool) -> Result<Self, Failure> {
         let mut config = SimConfig { support: Support::Brakes, gripper: false, ..arm.config()? };
         for drive in &mut config.drives {
-            // Nobody waits here for the boot and the alignment of simulated motors.
+            // Shortens the boot and the alignment of simulated motors.
             *drive = DriveConfig { boot_ms: BOOT_MS, first_enable_ms: 1, ..*drive };
         }
         let plant = SimPlant::new(&config);
@@ -43,7 +43,7 @@ impl Plant {
         Ok(new)
     }
 
-    /// The arm at rest at `position`, its drives just enabled.
+    /// Restarts the arm at rest at `position`, with its drives just enabled.
     fn reset(&mut self, py: Python<'_>, position: &Bound<'_, PyAny>) -> Result<(), Failure> {
         let position = array::joints(position, "position")?;
         for (joint, (q, (low, high))) in position.iter().zip(&self.config.arm.stops).enumerate() {
@@ -61,7 +61,7 @@ impl Plant {
         py.detach(|| self.bring_up())
     }
 
-    /// Milliseconds under a torque.
+    /// Applies a torque for `ms` milliseconds.
     fn step(&mut self, py: Python<'_>, torque: &Bound<'_, PyAny>, ms: u64) -> PyResult<()> {
         let torque = array::joints(torque, "torque")?;
         pass(py, ms, || self.millisecond(&torque))
@@ -72,7 +72,7 @@ impl Plant {
         self.ticks
     }
 
-    /// As the drives reported last; without drives as it is.
+    /// Positions that the drives reported last; without drives the true positions.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.measured(|report| report.position, self.plant.truth().q))
@@ -89,12 +89,12 @@ impl Plant {
         PyArray1::from_slice(py, &self.measured(of, self.plant.truth().temperature))
     }
 
-    /// Of the true arm: `position`, `velocity`, `torque`, `outside`, `temperature`.
+    /// Returns true values of the arm: `position`, `velocity`, `torque`, `outside`, `temperature`.
     fn truth<'py>(&self, py: Python<'py>, what: &str) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
         truth(py, self.plant.truth(), what)
     }
 
-    /// Drives that carry their joints.
+    /// Flags of the drives that carry their joints.
     #[getter]
     fn enabled(&self) -> Vec<bool> {
         let states = self.plant.node_states();
@@ -107,7 +107,7 @@ impl Plant {
         self.reports.iter().map(|report| report.errors.into()).collect()
     }
 
-    /// Torques that the drives reach, N·m.
+    /// Largest torques of the drives, N·m.
     #[getter]
     fn torque_max<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.config.arm.torque_ceiling)
@@ -129,7 +129,7 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// A request to the drives, whose answers to moves are kept.
+    /// Sends a request to the drives, and stores their answers to moves.
     fn ask(&mut self, request: &Request) {
         let mut answers = Vec::new();
         self.plant.receive(self.ticks * 1_000, &request.emit(), &mut answers);
@@ -156,12 +156,12 @@ impl Plant {
             let states = self.plant.node_states();
             let all = |state: NodeState| states[..JOINTS].iter().all(|each| *each == state);
             if all(NodeState::ENABLED) {
-                // With what it reads now the first step begins.
+                // The first step begins with the values that are read now.
                 self.ask(&Request::zero_torque(false));
                 self.ticks = 0;
                 return Ok(());
             }
-            // One frame a millisecond, as on the bus.
+            // Sends one frame per millisecond, as on the bus.
             if all(NodeState::INIT) && !configured {
                 self.ask(&configure);
                 configured = true;
@@ -182,7 +182,7 @@ impl Plant {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Plant>()
 }

@@ -1,4 +1,4 @@
-//! What a run was: its samples as arrays, its figures, its report.
+//! Results of a run: samples as arrays, figures, report.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use crate::error::Failure;
 use crate::robot::motion::Ran;
 use crate::{array, json};
 
-/// Samples with what belongs to them: of a run, of a plan, of a flight recorder.
+/// Samples of a run, a plan or a flight recorder, with their metadata.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Samples {
     outcome: String,
@@ -28,14 +28,14 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Of a run.
+    /// Makes the samples of a run.
     pub fn of_run(ran: Ran) -> Self {
         let Ran { outcome, broken, info, samples, upload, link, baud, notes, .. } = ran;
         let facts = upload.map(|upload| Facts::of_link(&upload, &link, baud)).into_iter().collect();
         Self { outcome: outcome.into(), info, samples, facts, broken, binding: None, notes }
     }
 
-    /// Of a motion that was planned and not run.
+    /// Makes the samples of a planned motion.
     pub fn of_plan(
         info: RecordingInfo,
         samples: Vec<Sample>,
@@ -46,7 +46,7 @@ impl Samples {
         Self { outcome, info, samples, facts, broken: None, binding: Some(binding), notes }
     }
 
-    /// Of a flight recorder.
+    /// Makes the samples of a flight recorder.
     pub fn of_log(info: RecordingInfo, samples: Vec<Sample>, broken: Option<RunFailure>) -> Self {
         let outcome = "log".into();
         Self { outcome, info, samples, facts: Vec::new(), broken, binding: None, notes: Vec::new() }
@@ -103,7 +103,7 @@ impl Samples {
         self.notes.clone()
     }
 
-    /// What broke first, in a line.
+    /// First failure, in one line.
     #[getter]
     fn failure(&self) -> Option<String> {
         self.broken.as_ref().map(RunFailure::headline)
@@ -113,7 +113,7 @@ impl Samples {
         self.samples.len()
     }
 
-    /// Each column as an array: (N,) of all, (N, 6) of the joints; NaN where a value is not known.
+    /// Returns each column as an array: (N,), or (N, 6) for values of joints; an unknown value is NaN.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("time", PyArray1::from_iter(py, self.samples.iter().map(|s| s.time_s)))?;
@@ -125,24 +125,24 @@ impl Samples {
         Ok(all)
     }
 
-    /// The state of the controller at each sample.
+    /// State of the controller at each sample.
     #[getter]
     fn states(&self) -> Vec<&'static str> {
         self.samples.iter().map(|sample| sample.state.name()).collect()
     }
 
-    /// Figures: recorded_s, executed_s, samples, and those of each joint.
+    /// Returns figures: recorded_s, executed_s, samples, and the figures of each joint.
     fn summary<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
         let summary = py.detach(|| Digest::of(&self.samples).summary(&self.info));
         json::plain(py, &summary)
     }
 
-    /// The report: one page that opens offline.
+    /// Returns the report: one page that opens offline.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| html(&self.input(&Digest::of(&self.samples))))
     }
 
-    /// A recording, MCAP or CSV by the ending.
+    /// Writes a recording, MCAP or CSV by the file ending.
     #[pyo3(signature = (path, overwrite=false))]
     fn write(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         if path.exists() && !overwrite {
@@ -154,7 +154,7 @@ impl Samples {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Samples>()
 }

@@ -1,4 +1,4 @@
-//! The settings of a simulated arm, as Python gives them.
+//! Settings of a simulated arm from Python.
 
 use jtc_core::JOINTS;
 use jtc_host::trajectory::Loaded;
@@ -10,10 +10,10 @@ use crate::controller::of_arm;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 
-/// Shares by which masses and frictions are off, and factors in their place, as Python gives them.
+/// Relative errors of masses and frictions, and factors instead of random errors, from Python.
 type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
 
-/// What `openjtc.sim` has in its arguments; `model_error`: mass, friction, factors of the masses, factors of the frictions.
+/// Arguments of `openjtc.sim`; `model_error`: mass, friction, factors of the masses, factors of the frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct SimulatedArm<'py> {
@@ -28,7 +28,7 @@ pub struct SimulatedArm<'py> {
 }
 
 impl SimulatedArm<'_> {
-    /// The world around it: the settings of the controller and its stored arm are there, too.
+    /// Makes the configuration of the simulation, including the settings of the controller and its stored arm.
     pub fn config(&self) -> Result<SimConfig, Failure> {
         let arm = self.arm.as_ref().map(|arm| &*arm.get().inner);
         let mut config = match arm {
@@ -40,7 +40,7 @@ impl SimulatedArm<'_> {
         config.arm.payload = payload(self.payload)?;
         config.model_error = ModelError::NONE;
         if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
-            // A share beyond 1 would draw masses below 0.
+            // A share above 1 could draw negative masses.
             if let Some(bad) = [mass, friction].iter().find(|share| !(0.0..=1.0).contains(*share)) {
                 return Err(Failure::usage(format!("model_error: a share of {bad} is not within 0..1")));
             }
@@ -87,10 +87,10 @@ fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: 
     }
 }
 
-/// So much of a long time is simulated before signals (Ctrl-C) are looked at, ms.
+/// Simulated time between two checks for signals (Ctrl-C), ms.
 const SLICE_MS: u64 = 1_000;
 
-/// Milliseconds pass, without the GIL.
+/// Advances the simulation by `ms` milliseconds, without the GIL.
 pub fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> PyResult<()> {
     let mut left = ms;
     while left > 0 {
@@ -102,7 +102,7 @@ pub fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> Py
     Ok(())
 }
 
-/// What supports the arm while its drives are not enabled.
+/// Parses the support of the arm while its drives are not enabled.
 pub fn support(name: &str) -> Result<Support, Failure> {
     Ok(match name {
         "brakes" => Support::Brakes,
@@ -115,7 +115,7 @@ pub fn support(name: &str) -> Result<Support, Failure> {
     })
 }
 
-/// Faults in the words of a fault file; files of hands are looked for where Python runs.
+/// Parses faults from the text of a fault file; hand files are relative to the working directory of Python.
 pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
     let load = |file: &str| {
         let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;
@@ -126,7 +126,7 @@ pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
         .map_err(|error| Failure::usage(error.to_string()).next("`jtc help faults` lists kinds and keys"))
 }
 
-/// The path of a hand.
+/// Makes the path of a hand.
 pub fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
     HandPath::new(points, step_s).ok_or_else(|| {
         Failure::usage(format!("hand: it needs points, and a step above 0 s; step_s is {step_s}"))

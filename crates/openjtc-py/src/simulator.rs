@@ -1,4 +1,4 @@
-//! The simulated world: host line, controller, joint bus, drives, arm.
+//! Simulated system: host line, controller, joint bus, drives, arm.
 
 use jtc_core::JOINTS;
 use jtc_sim::{SimConfig, Truth, World};
@@ -17,7 +17,7 @@ type PyInputs<'py> = (Vec<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool, bool, 
 /// Outputs: frame, bytes to the host, safety output.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool);
 
-/// A world with a controller in it.
+/// Simulated system with a controller.
 #[pyclass(module = "openjtc._native")]
 pub struct Simulator {
     world: World,
@@ -53,7 +53,7 @@ impl Simulator {
         Ok(Self { world })
     }
 
-    /// Milliseconds pass.
+    /// Advances the simulation by `ms` milliseconds.
     fn step(&mut self, py: Python<'_>, ms: u64) -> PyResult<()> {
         pass(py, ms, || self.world.step())
     }
@@ -68,7 +68,7 @@ impl Simulator {
         Telemetry(*self.world.telemetry())
     }
 
-    /// Of the true arm: `position`, `velocity`, `torque`, `outside`, `temperature`.
+    /// Returns true values of the arm: `position`, `velocity`, `torque`, `outside`, `temperature`.
     fn truth<'py>(&self, py: Python<'py>, what: &str) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
         truth(py, self.world.truth(), what)
     }
@@ -88,7 +88,7 @@ impl Simulator {
         }
     }
 
-    /// Bytes of the host that are not yet at the controller.
+    /// Number of bytes of the host that have not reached the controller yet.
     #[getter]
     fn unsent(&self) -> usize {
         self.world.host_write_pending()
@@ -114,12 +114,12 @@ impl Simulator {
         self.world.safety_output()
     }
 
-    /// Frames on the joint bus in the last millisecond.
+    /// Returns the frames on the joint bus in the last millisecond.
     fn bus_frames<'py>(&self, py: Python<'py>) -> Vec<PyFrame<'py>> {
         self.world.bus_frames().iter().map(|timed| to_python(py, &timed.frame)).collect()
     }
 
-    /// What happened: time in s and words.
+    /// Returns the events: time in s and text.
     fn events(&self) -> Vec<(f64, String)> {
         let entries = self.world.log().entries();
         entries.map(|entry| (entry.time_us as f64 * 1e-6, entry.event.to_string())).collect()
@@ -138,7 +138,7 @@ impl Simulator {
         Ok(dict)
     }
 
-    /// What went into the controller in the last millisecond and what came out; nothing unless it is watched.
+    /// Returns inputs and outputs of the controller in the last millisecond; `None` without `watch`.
     fn exchange<'py>(&self, py: Python<'py>) -> Option<(PyInputs<'py>, PyOutputs<'py>)> {
         let exchange = self.world.exchange()?;
         let frames = exchange.bus.iter().map(|frame| to_python(py, frame)).collect();
@@ -157,7 +157,7 @@ impl Simulator {
     }
 }
 
-/// One list of numbers of the true arm.
+/// Returns one array of true values of the arm.
 pub fn truth<'py>(py: Python<'py>, truth: &Truth, what: &str) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
     let values: &[f64; JOINTS] = match what {
         "position" => &truth.q,
@@ -170,7 +170,7 @@ pub fn truth<'py>(py: Python<'py>, truth: &Truth, what: &str) -> Result<Bound<'p
     Ok(PyArray1::from_slice(py, values))
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulator>()
 }

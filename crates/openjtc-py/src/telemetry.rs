@@ -1,16 +1,16 @@
-//! What a tick of the controller computed.
+//! Values that a tick of the controller computed.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry as CoreTelemetry};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// One tick of the controller. Arrays have six numbers, base to wrist.
+/// Values of one tick of the controller. Arrays have six numbers, base to wrist.
 #[pyclass(frozen, module = "openjtc._native", eq)]
 pub struct Telemetry(pub CoreTelemetry);
 
 impl PartialEq for Telemetry {
-    /// Bit for bit.
+    /// Compares bit for bit.
     fn eq(&self, other: &Self) -> bool {
         self.bits() == other.bits()
     }
@@ -95,7 +95,7 @@ impl Telemetry {
         self.of(py, |joint| joint.set_acceleration)
     }
 
-    /// Positions that were commanded for the time of the measurement, rad: what the control law compares it with.
+    /// Positions that were commanded for the time of the measurement, rad; the control law compares the measurement with them.
     #[getter]
     fn due_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.due_position)
@@ -149,7 +149,7 @@ impl Telemetry {
         self.of(py, |joint| joint.torque_friction)
     }
 
-    /// What blends out a step at a change of state, and payload and brake of teaching, N·m.
+    /// Torques that blend out a step at a change of state, and payload and braking torques of teaching, N·m.
     #[getter]
     fn torque_other<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_other)
@@ -173,7 +173,7 @@ impl Telemetry {
         self.0.state.name()
     }
 
-    /// What becomes of the trajectory: `Null`, `Stop` (complete, at its start), `Pause`, `Execute`, `Finish`.
+    /// State of the trajectory: `Null`, `Stop` (complete, at its start), `Pause`, `Execute`, `Finish`.
     #[getter]
     fn trajectory(&self) -> &'static str {
         self.0.trajectory.name()
@@ -185,13 +185,13 @@ impl Telemetry {
         self.0.point
     }
 
-    /// A pause or stop brakes with all the torque there is.
+    /// True if a pause or stop brakes with the full torque.
     #[getter]
     fn braking(&self) -> bool {
         self.0.braking
     }
 
-    /// Error word; 0: none.
+    /// Error word; 0 means no error.
     #[getter]
     fn errors(&self) -> u16 {
         self.0.errors
@@ -203,7 +203,7 @@ impl Telemetry {
         self.0.joints.iter().map(|joint| joint.internal).collect()
     }
 
-    /// Positions and velocities that were measured for this tick; the others are predicted.
+    /// True for joints whose position and velocity were measured for this tick; the others are predicted.
     #[getter]
     fn fresh(&self) -> Vec<bool> {
         self.0.joints.iter().map(|joint| joint.fresh).collect()
@@ -221,7 +221,7 @@ impl Telemetry {
         self.of(py, JointTelemetry::position_error)
     }
 
-    /// All of it, every number with all its bits: what two equal ticks have in common.
+    /// Returns all values with all their bits; two equal ticks have equal bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.bits())
     }
@@ -236,7 +236,7 @@ impl Telemetry {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Telemetry>()
 }

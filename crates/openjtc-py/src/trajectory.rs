@@ -1,4 +1,4 @@
-//! A trajectory: points of six joints at a fixed step.
+//! Trajectory: points of six joints at a fixed step.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,17 +13,19 @@ use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
 
-/// Points at a fixed step, `step_ms` (ms): `time` (N,) in s; `position`, `velocity` and `acceleration` (N, 6) in rad, rad/s and rad/s², one column a
-/// joint, base to wrist; `duration` in s. It does not change.
+/// A trajectory: points at a fixed step, `step_ms` (ms). The object does not change.
+///
+/// `time` (N,) is in s and `duration` in s; `position`, `velocity` and `acceleration` (N, 6) are in rad, rad/s and rad/s², one column per
+/// joint, base to wrist.
 #[pyclass(frozen, module = "openjtc")]
 pub struct Trajectory {
     pub inner: Arc<HostTrajectory>,
-    /// What was derived, resampled or left out when it was read.
+    /// Notes on data that was derived, resampled or left out by the reader.
     notes: Vec<String>,
 }
 
 impl Trajectory {
-    /// As Python has it.
+    /// Wraps a trajectory for Python.
     pub fn of(trajectory: HostTrajectory) -> Self {
         Self { inner: Arc::new(trajectory), notes: Vec::new() }
     }
@@ -45,7 +47,7 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// From points (N, 6): positions (rad), and their velocities (rad/s) and accelerations (rad/s²), `step_ms` (ms) apart.
+    /// Makes a trajectory from points (N, 6), `step_ms` (ms) apart: positions (rad), velocities (rad/s) and accelerations (rad/s²).
     #[new]
     fn new(
         step_ms: u16,
@@ -72,45 +74,45 @@ impl Trajectory {
         Ok(Self::of(HostTrajectory { step_ms, points: points.collect() }))
     }
 
-    /// From a file of any form that `jtc traj run` reads.
+    /// Loads a file of any form that `jtc traj run` reads.
     #[staticmethod]
     #[pyo3(signature = (path, arm=None, degrees=false))]
     fn load(py: Python<'_>, path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
         py.detach(|| Self::loaded(Loaded::load(&path, arm.map(|arm| &arm.inner.joint_names))?, degrees))
     }
 
-    /// From the text of such a file.
+    /// Parses the text of a trajectory file.
     #[staticmethod]
     #[pyo3(signature = (text, arm=None, degrees=false))]
     fn parse(py: Python<'_>, text: &str, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
         py.detach(|| Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees))
     }
 
-    /// As a recording measured it.
+    /// Loads the measured motion of a recording.
     #[staticmethod]
     fn load_measured(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         py.detach(|| Self::loaded(Loaded::load_measured(&path)?, false))
     }
 
-    /// From a point to the next one, ms.
+    /// Time from one point to the next, ms.
     #[getter]
     fn step_ms(&self) -> u16 {
         self.inner.step_ms
     }
 
-    /// From the first point to the last one, s.
+    /// Time from the first point to the last one, s.
     #[getter]
     fn duration(&self) -> f64 {
         self.inner.duration_s()
     }
 
-    /// What was derived, resampled or left out when it was read.
+    /// Notes on data that was derived, resampled or left out by the reader.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
 
-    /// When each point is passed, s: (N,).
+    /// Time of each point (N,), s.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let step = f64::from(self.inner.step_ms) * 1e-3;
@@ -135,12 +137,12 @@ impl Trajectory {
         self.channel(py, |point| point.acceleration)
     }
 
-    /// The same way at another speed, 1 to 100 % of its own.
+    /// Returns the same path at another speed, 1 to 100 % of its own.
     fn at_speed(&self, percent: f64) -> Result<Self, Failure> {
         Ok(Self::of(plan::at_speed(&self.inner, percent)?))
     }
 
-    /// As `jtc traj run` reads it, with all digits.
+    /// Returns the trajectory as CSV with all digits, in the form that `jtc traj run` reads.
     fn to_csv(&self) -> String {
         self.inner.to_exact_csv()
     }
@@ -158,7 +160,7 @@ impl Trajectory {
     }
 }
 
-/// The class.
+/// Registers the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Trajectory>()
 }

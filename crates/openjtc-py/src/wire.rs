@@ -1,4 +1,4 @@
-//! Frames of the host's line and of the joint bus, made and read.
+//! Makes and reads frames of the host's line and of the joint bus.
 
 use jtc_bus::{Answer, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale};
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX, settings};
@@ -28,7 +28,7 @@ fn emitted(command: &Command<'_>) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// The frame of a command without numbers, by its name in `openjtc.control.encode`.
+/// Makes the frame of a command without numbers, by its name in `openjtc.control.encode`.
 #[pyfunction]
 fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes>, Failure> {
     let command = match name {
@@ -50,7 +50,7 @@ fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes
     Ok(PyBytes::new(py, &emitted(&command)?))
 }
 
-/// The frames of an arm's parameters: friction, model, and gains, which the controller waits for last.
+/// Makes the frames of an arm's parameters: friction, model, and last the gains, which the controller waits for.
 #[pyfunction]
 fn encode_parameters<'py>(py: Python<'py>, arm: &Arm) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
     let set = arm.inner.parameter_set();
@@ -68,7 +68,7 @@ fn encode_parameters<'py>(py: Python<'py>, arm: &Arm) -> Result<Vec<Bound<'py, P
     Ok(frames.iter().map(|bytes| PyBytes::new(py, bytes)).collect())
 }
 
-/// The frames of a trajectory.
+/// Makes the frames of a trajectory.
 #[pyfunction]
 fn encode_trajectory<'py>(
     py: Python<'py>,
@@ -96,7 +96,7 @@ fn encode_trajectory<'py>(
     made.collect()
 }
 
-/// The frame of a jog with these velocities, rad/s.
+/// Makes the frame of a jog with these velocities, rad/s.
 #[pyfunction]
 fn encode_jog<'py>(py: Python<'py>, velocity: &Bound<'py, PyAny>) -> Result<Bound<'py, PyBytes>, Failure> {
     let velocity = array::joints(velocity, "velocity")?;
@@ -105,7 +105,7 @@ fn encode_jog<'py>(py: Python<'py>, velocity: &Bound<'py, PyAny>) -> Result<Boun
     Ok(PyBytes::new(py, &bytes[..length]))
 }
 
-/// The frame that announces a payload.
+/// Makes the frame that sets a payload.
 #[pyfunction]
 fn encode_payload(py: Python<'_>, numbers: PayloadNumbers) -> Result<Bound<'_, PyBytes>, Failure> {
     let payload = payload(Some(numbers))?;
@@ -114,7 +114,7 @@ fn encode_payload(py: Python<'_>, numbers: PayloadNumbers) -> Result<Bound<'_, P
     Ok(PyBytes::new(py, &bytes[..length]))
 }
 
-/// Reads the statuses in what a controller sends.
+/// Reads the statuses in the bytes of a controller.
 #[pyclass(module = "openjtc._native")]
 struct StatusReader {
     receiver: StatusReceiver,
@@ -127,7 +127,7 @@ impl StatusReader {
         Self { receiver: StatusReceiver::new() }
     }
 
-    /// The statuses that are complete with these bytes, oldest first.
+    /// Returns the statuses that these bytes complete, oldest first.
     fn feed<'py>(&mut self, py: Python<'py>, bytes: &[u8]) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut rest = bytes;
         let mut found = Vec::new();
@@ -160,7 +160,7 @@ fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// What the controller asks of the nodes with a frame: its kind and its numbers.
+/// Reads the controller's request to the nodes from a frame: its kind and its numbers.
 #[pyfunction]
 fn bus_request<'py>(
     py: Python<'py>,
@@ -193,7 +193,7 @@ fn node(node: u8, below: usize) -> Result<u8, Failure> {
     Err(Failure::usage(format!("node: {node} is not within 0..{}", below - 1)))
 }
 
-/// A joint's answer to a move.
+/// Makes a joint's answer to a move.
 #[pyfunction]
 #[pyo3(name = "bus_joint_answer")]
 #[allow(clippy::too_many_arguments, reason = "the numbers of a frame; Python has them as keywords")]
@@ -223,7 +223,7 @@ fn joint_answer(
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// The gripper's answer to a move.
+/// Makes the gripper's answer to a move.
 #[pyfunction]
 #[pyo3(name = "bus_gripper_answer")]
 fn gripper_answer(py: Python<'_>, pump: bool, part: bool, state: u8, errors: u8) -> PyFrame<'_> {
@@ -232,7 +232,7 @@ fn gripper_answer(py: Python<'_>, pump: bool, part: bool, state: u8, errors: u8)
     to_python(py, &Answer::Gripper(report).emit(Scale::CURRENT))
 }
 
-/// A node's answer to a request for a state.
+/// Makes a node's answer to a request for a state.
 #[pyfunction]
 #[pyo3(name = "bus_state_answer")]
 fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Failure> {
@@ -240,7 +240,7 @@ fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Fa
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// A node's answer to a configuration.
+/// Makes a node's answer to a configuration.
 #[pyfunction]
 #[pyo3(name = "bus_configured_answer")]
 fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFrame<'_>, Failure> {
@@ -248,7 +248,7 @@ fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFra
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// The functions and the class.
+/// Registers the functions and the class.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<StatusReader>()?;
     module.add_function(wrap_pyfunction!(encode_command, module)?)?;

@@ -1,4 +1,4 @@
-"""The controller stepped from Python: the bits of the simulator's own, and drives that are written in Python."""
+"""Tests of the controller stepped from Python: equal bits to the simulator's controller, and drives written in Python."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from openjtc.sim import Simulator
 
 
 def quintic(start, goal, seconds, step_ms=10):
-    """A motion from rest to rest."""
+    """Makes a motion from rest to rest."""
     start, goal = np.asarray(start, float), np.asarray(goal, float)
     u = np.linspace(0, 1, round(seconds * 1000 / step_ms) + 1)[:, None]
     way = goal - start
@@ -23,7 +23,7 @@ def quintic(start, goal, seconds, step_ms=10):
 
 
 def stepped_beside(simulator, controller, until, limit_ms=60_000, spoil=None):
-    """Steps both until `until()`; the first millisecond in which an output differs, or None."""
+    """Steps both until `until()`. Returns the first millisecond in which an output differs, or None."""
     for ms in range(limit_ms):
         if until():
             return None
@@ -83,7 +83,7 @@ def test_another_input_has_another_output():
     simulator.write(b"".join(encode.use_defaults()))
 
     def spoil(ms, inputs):
-        """Nobody hears joint 3 in millisecond 6000."""
+        """Drops the answer of joint 3 in millisecond 6000."""
         if ms != 6_000:
             return inputs
         return Inputs(**{**vars(inputs), "bus": [f for f in inputs.bus if f[0] & 0xF != 2]})
@@ -93,7 +93,7 @@ def test_another_input_has_another_output():
 
 
 class Drives:
-    """Seven nodes on a bus of their own; joints are masses on a table without friction: 2 kg·m² each."""
+    """Seven nodes on their own bus; joints are masses on a table without friction: 2 kg·m² each."""
 
     def __init__(self):
         self.state = [bus.INIT] * 7
@@ -123,7 +123,7 @@ def test_drives_in_python_are_brought_up_and_held_until_they_are_silent():
         out = controller.tick(Inputs(bus=answers, host=host))
         answers, host = drives.answers(out.bus), b""
         seen += statuses.feed(out.host)
-        # The controller carries the weight of the arm; so do these drives' joints.
+        # The controller compensates gravity, so gravity is subtracted for the joints of these drives.
         load = drives.torque - model.gravity(drives.position) if drives.state[0] == bus.ENABLED else np.zeros(6)
         drives.velocity = drives.velocity + load / 2.0 * 1e-3
         drives.position = drives.position + drives.velocity * 1e-3

@@ -1,4 +1,4 @@
-"""Dynamics and kinematics: properties that hold for every arm, and Pinocchio, which shares no code with the package."""
+"""Tests of dynamics and kinematics: properties of every arm, and a comparison with Pinocchio, which shares no code with the package."""
 
 import re
 import threading
@@ -20,7 +20,7 @@ def arm():
 
 @pytest.fixture
 def states(request):
-    """Random positions, velocities, accelerations and torques; their seed is printed, and shown where the test fails."""
+    """Returns random positions, velocities, accelerations and torques; the seed is printed, and shown if the test fails."""
     seed = int(np.random.SeedSequence().entropy % 2**32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
@@ -172,7 +172,7 @@ def test_other_threads_run_meanwhile(arm):
 
 
 def right_angles(urdf):
-    """Angles of joints next to a right angle are that angle, as the package takes them."""
+    """Rounds joint angles close to a right angle to that angle, as the package does."""
 
     def snap(text):
         angles = np.array([float(x) for x in text.split()])

@@ -1,4 +1,4 @@
-"""The examples run as they stand there, on simulated arms that are as fast as the computer."""
+"""Runs the examples unchanged, on simulated arms without real-time pacing."""
 
 from __future__ import annotations
 

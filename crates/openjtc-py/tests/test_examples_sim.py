@@ -1,4 +1,4 @@
-"""The examples of simulation run as their first lines say, and do what they are for."""
+"""Runs the simulation examples as their docstrings say, and checks their results."""
 
 import re
 import subprocess
@@ -11,7 +11,7 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
 def run(name):
-    """What an example prints; it runs where no file of it is."""
+    """Runs an example in a separate process and returns its output."""
     path = EXAMPLES / name
     assert len(path.read_text().splitlines()) < 60
     done = subprocess.run([sys.executable, path], capture_output=True, text=True, timeout=300)

@@ -1,4 +1,4 @@
-"""The notebooks run from top to bottom, and a run shows itself in them."""
+"""Runs the notebooks from top to bottom, and checks that a run shows its report in them."""
 
 from __future__ import annotations
 

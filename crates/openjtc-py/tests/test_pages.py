@@ -1,9 +1,9 @@
-"""The Python lines of the pages are run as they stand there, and print what is shown.
+"""Runs the Python lines of the documentation pages and compares their output with the pages.
 
-Blocks of the kind ``pycon`` hold lines behind ``>>>`` with what they print, those of the kind ``python`` lines alone. The blocks of a page are
-run one after the other in one place, in a folder of their own. A comment directly above a block says more: ``<!-- not run: REASON -->``,
-``<!-- needs: PACKAGE -->`` (left out where it is not installed), or ``<!-- numbers vary -->`` where numbers are not compared. ``UPDATE_DOCS=1``
-writes what is printed into the page. Simulated arms are as fast as they can be followed, and not as a real one.
+Blocks of the kind ``pycon`` have statements after ``>>>`` with their output, blocks of the kind ``python`` only statements. The blocks of a
+page run one after the other in one namespace and one temporary folder. A comment directly above a block sets an option:
+``<!-- not run: REASON -->``, ``<!-- needs: PACKAGE -->`` (skips the block if the package is not installed), or ``<!-- numbers vary -->``
+(does not compare numbers). ``UPDATE_DOCS=1`` writes the output into the page. Simulated arms run at ``SPEED`` times real time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 import openjtc
 import pytest
 
-#: Times real time, of simulated arms.
+#: Speed of simulated arms, times real time.
 SPEED = 6.0
 ROOT = Path(__file__).resolve().parents[3]
 BLOCK = re.compile(
@@ -30,13 +30,13 @@ NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?(?:0x[0-9a-fA-F]+|\d[\d_]*(?:\.\d*)?
 
 
 def pages() -> list[Path]:
-    """The pages that have Python in them; none where the package is tested without its repository."""
+    """Returns the pages with Python blocks; an empty list if the package is tested without its repository."""
     candidates = [ROOT / "README.md", ROOT / "crates/openjtc-py/README.md", *sorted((ROOT / "docs").glob("*.md"))]
     return [page for page in candidates if page.exists() and BLOCK.search(page.read_text(encoding="utf-8"))]
 
 
 def examples(text: str) -> list[tuple[str, str]]:
-    """Source and shown output of each statement of a ``pycon`` block."""
+    """Returns source and shown output of each statement of a ``pycon`` block."""
     found: list[tuple[list[str], list[str]]] = []
     for line in text.splitlines():
         if line == ">>>" or line.startswith(">>> "):
@@ -51,10 +51,10 @@ def examples(text: str) -> list[tuple[str, str]]:
 
 
 def run(source: str, names: dict[str, object], mode: str) -> tuple[str, bool]:
-    """What a statement, or with "exec" a script, prints, and whether it ended in an exception."""
+    """Runs a statement, or with "exec" a script. Returns its output, and True if it ended in an exception."""
     out = io.StringIO()
     try:
-        # Bars of progress are drawn on stderr.
+        # Progress bars are drawn on stderr.
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
             exec(compile(source, "<page>", mode), names)
     except Exception as error:
@@ -64,11 +64,11 @@ def run(source: str, names: dict[str, object], mode: str) -> tuple[str, bool]:
 
 
 def same(shown: str, printed: str, varying: bool) -> bool:
-    """Whether that is what the page shows. Its ``[...]`` stands for any text."""
+    """Returns True if the output matches the page. ``[...]`` in the page stands for any text."""
 
     def prepared(text: str) -> str:
         if varying:
-            # The number of a joint or a board tells one thing from another.
+            # Joint and board numbers are compared, because they identify the joint or board.
             text = re.sub(r"\b(joints?|boards?) (\d+)", lambda m: f"{m[1]} " + "abcdefghij"[int(m[2]) % 10], text)
             text = re.sub(r"\s", "", NUMBER.sub("#", text))
         return "\n".join(line.rstrip() for line in text.strip("\n").splitlines())
@@ -127,7 +127,7 @@ def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def told_to_install() -> list[tuple[Path, str]]:
-    """What the project says to `pip install`, word by word."""
+    """Returns the arguments of every `pip install` in the project, word by word."""
     places = ["README.md", "docs", "crates/openjtc-py", "crates/jtc-host/src", "crates/jtc-cli/src", "crates/ucom-cli/src", "references"]
     kinds = {".md", ".py", ".pyi", ".rs", ".ipynb", ".toml"}
     files = [file for place in places for file in [ROOT / place, *sorted((ROOT / place).rglob("*"))] if file.suffix in kinds]
@@ -141,7 +141,7 @@ def told_to_install() -> list[tuple[Path, str]]:
 
 
 def test_nobody_is_told_to_install_a_name_that_is_not_ours():
-    """The package is on no index: a line that installs it by its name runs what somebody else puts there. A wheel is named by its path."""
+    """The package is on no index, so installing it by name could run code of a stranger. A wheel must be named by its path."""
     words = told_to_install()
     if not (ROOT / "docs").exists():
         pytest.skip("the package is tested without its repository")

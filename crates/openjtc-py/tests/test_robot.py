@@ -1,4 +1,4 @@
-"""A connection to a simulated controller: motions, what refuses them, what stops them, what is seen of them."""
+"""Tests of a connection to a simulated controller: motions, refusals, stops and results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import pytest
 from robot_agent import agent
 
 HOME = np.array([0.0, 0.5, -1.0, 0.0, 0.5, 0.0])
-#: Distance that a held arm may have from where it was moved, rad.
+#: Largest distance of a held arm from its target, rad.
 NEAR = 5e-3
 
 
@@ -30,7 +30,7 @@ def robot():
 
 @pytest.fixture
 def live():
-    """One whose time passes, ten times faster than the clock."""
+    """Yields a robot whose simulated time runs ten times faster than real time."""
     with openjtc.connect("sim:", speed=10.0) as robot:
         yield robot
 
@@ -55,12 +55,12 @@ def test_a_run_has_figures_arrays_tables_and_reports(robot, tmp_path: Path):
     n = len(run)
     assert a["time"].shape == (n,) and a["position"].shape == a["torque"].shape == (n, 6)
     assert np.all(np.diff(a["time"]) > 0)
-    # The figures are those of the samples.
+    # The figures agree with the samples.
     operating = np.array([state == "Operate" for state in run._native.states])
     rms = 1e3 * np.sqrt(np.mean(a["error"][operating] ** 2, axis=0))
     assert [joint.rms_error_mrad for joint in run.joints] == pytest.approx(rms, rel=0.05)
     assert run.duration == pytest.approx(openjtc.example("motion").duration, abs=0.3)
-    # The parts of the torque are the torque.
+    # The parts of the torque sum up to the torque.
     parts = sum(a[f"torque_{part}"] for part in ("model", "p", "i", "d", "friction"))
     assert np.abs(parts - a["torque"])[operating].max() < 1.0
     page = run.report(tmp_path / "run.html").read_text(encoding="utf-8")
@@ -108,7 +108,7 @@ def test_what_is_refused_has_its_facts_and_moves_nothing(robot):
     assert error.cause and error.next and "joint 1" in error.message
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.joint, again.limit) == (str(error), error.joint, error.limit)
-    # A trajectory that begins elsewhere.
+    # A trajectory with another start position is refused.
     with pytest.raises(openjtc.RefusedError) as caught:
         robot.run(robot.plan([HOME, HOME + 0.2]))
     assert caught.value.joint is not None and "approach=True" in caught.value.next
@@ -128,21 +128,21 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     with pytest.raises(openjtc.UsageError, match="nothing was sent"):
         robot.move(HOME, record=file)
     assert file.read_text() == "mine"
-    # A motion that is refused leaves no file.
+    # A refused motion leaves no file.
     with pytest.raises(openjtc.RefusedError):
         robot.move([4, 0, 0, 0, 0, 0], record=tmp_path / "none.csv")
     assert not (tmp_path / "none.csv").exists()
 
 
 def test_a_move_without_a_speed_is_slow_and_says_so(robot):
-    """Joint positions, a pose of the flange and approaches, with and without a speed."""
+    """Covers joint positions, a pose of the flange and approaches, with and without a speed."""
     told = "at 25 % of the limits; `speed=` sets it"
     way = robot.plan([[0] * 6, HOME])
     slow = robot.move(HOME)
     assert f"move {told}" in slow.notes
     robot.move([0] * 6, speed=100)
     same = robot.move(HOME, speed=25)
-    # With an approach of 0.2 s, or without one where the arm stands exactly at the first point.
+    # The run has an approach of 0.2 s, or no approach if the arm is exactly at the first point.
     assert same.duration == pytest.approx(slow.duration, abs=0.25) and not same.notes
     robot.move([0] * 6, speed=100)
     assert slow.duration > 1.7 * robot.move(HOME, speed=100).duration
@@ -153,7 +153,7 @@ def test_a_move_without_a_speed_is_slow_and_says_so(robot):
     robot.move(HOME + 0.1, speed=100)
     assert not robot.run(way, approach=True, speed=100).notes
     assert not robot.run(robot.plan([HOME, [0] * 6])).notes
-    # Twice the approach, one note.
+    # Several approaches give a single note.
     assert robot.run(robot.plan([robot.position, HOME]), approach=True, repeat=3).notes.count(f"approach {told}") == 1
 
 
@@ -197,7 +197,7 @@ def test_a_blend_in_degrees_is_refused_where_rad_are_meant(robot, blend: float):
 
 def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
     run = robot.move([0, 30, 0, 0, 0, 0], degrees=True)
-    # A notebook takes every form that an object has, and shows one.
+    # A notebook requests every representation of an object and shows one of them.
     forms = [form for form in ("html", "svg", "png", "jpeg", "pdf", "markdown") if hasattr(run, f"_repr_{form}_")]
     assert forms == ["html"] and len(run._repr_html_()) < 2_000_000
 
@@ -208,7 +208,7 @@ def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
 )
 def test_what_an_optional_package_is_needed_for_says_how_to_install_it(robot, package: str, act: str, monkeypatch):
     plan = robot.plan([[0] * 6, HOME])
-    # As where it is not installed.
+    # Simulates that the package is not installed.
     for module in [name for name in sys.modules if name.partition(".")[0] == package]:
         monkeypatch.delitem(sys.modules, module)
 
@@ -311,7 +311,7 @@ def test_a_stop_is_the_end_of_all_that_was_asked_for_before(live):
     assert first.wait(30).outcome == "stopped"
     with pytest.raises(openjtc.FaultError, match="cancelled"):
         second.wait(30)
-    # What is asked for after it is done.
+    # A later request is executed.
     assert live.move(HOME).outcome == "finished"
 
 
@@ -352,7 +352,7 @@ def test_the_end_of_a_context_and_of_a_program_stops_what_moves(tmp_path: Path):
     with pytest.raises(openjtc.NoLinkError, match="closed"):
         robot.move(HOME)
     robot.close()
-    # Without a context, too.
+    # Checked without a context, too.
     program = (
         "import openjtc\n"
         "robot = openjtc.connect('sim:', speed=10.0)\n"
@@ -479,7 +479,7 @@ def test_settings_info_and_arm_are_those_of_the_controller(robot):
     assert robot.info["board"] == "simulator" and robot.info["firmware"] == openjtc.__version__
     with pytest.raises(openjtc.UsageError, match="no setting"):
         robot.set_settings({"no_such": 1.0})
-    # Settings change without torque only.
+    # Settings can only change while the drives have no torque.
     with pytest.raises(openjtc.Error, match="not allowed"):
         robot.set_settings({"ramp_ms": 300})
 
@@ -493,7 +493,7 @@ def test_another_arm_than_the_one_that_was_named_is_not_moved(tmp_path: Path):
 
 @pytest.mark.skipif("OPENJTC_ROBOTS" not in os.environ, reason="OPENJTC_ROBOTS names no folder of robot descriptions")
 def test_a_robot_description_plans_and_runs(monkeypatch: pytest.MonkeyPatch):
-    """UR5 as others describe it: from the URDF to a motion that was followed."""
+    """Imports the URDF of a third-party UR5, plans a motion and runs it."""
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / "references" / "arms")
     import descriptions
 
@@ -520,7 +520,7 @@ def test_there_is_no_such_port_or_agent():
 
 @pytest.mark.skipif("JTC" not in os.environ, reason="the environment names no program jtc")
 def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
-    """``jtc sim`` behind a pseudo-terminal and ``jtc serve``, in processes of their own."""
+    """Uses ``jtc sim`` at a pseudo-terminal and ``jtc serve``, in separate processes."""
     jtc = os.environ["JTC"]
     env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
     port = tmp_path / "port"

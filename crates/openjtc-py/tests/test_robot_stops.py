@@ -1,4 +1,4 @@
-"""What stops an arm, whatever the program does meanwhile: Stop, Ctrl-C, the end of a block, of a motion's waiting and of the program."""
+"""Tests of everything that stops an arm: Stop, Ctrl-C, the end of a block, of a wait for a motion and of the program."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ needs_jtc = pytest.mark.skipif("JTC" not in os.environ, reason="the environment 
 
 @pytest.fixture
 def live():
-    """One whose time passes, five times faster than the clock."""
+    """Yields a robot whose simulated time runs five times faster than real time."""
     with openjtc.connect("sim:", speed=5.0) as robot:
         yield robot
 
 
 @pytest.fixture
 def port(tmp_path: Path):
-    """A simulated controller behind a pseudo-terminal, in a process of its own: it is there when a program has gone."""
+    """Yields a simulated controller at a pseudo-terminal, in a separate process, so that it survives the end of a program."""
     path = tmp_path / "port"
     env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
     serial = [os.environ["JTC"], "sim", "--serial", path]
@@ -54,11 +54,11 @@ def port(tmp_path: Path):
 
 
 class Wire:
-    """A simulated controller at a pseudo-terminal whose bytes are seen, and which can be silenced."""
+    """Simulated controller at a pseudo-terminal. The test sees its bytes and can silence it."""
 
     def __init__(self) -> None:
         self.simulator, self.sent, self.is_silent, self.is_over = Simulator(), b"", False, False
-        #: What somebody else sends, and who looks at what is sent here before the controller has it.
+        #: Bytes of another program, and a callback that sees the bytes sent here before the controller receives them.
         self.to_send, self.on_sent = b"", None
         self.master, self.slave = pty.openpty()
         tty.setraw(self.master)
@@ -116,7 +116,7 @@ def is_moving(robot: openjtc.Robot) -> bool:
 
 
 def stands(robot: openjtc.Robot) -> bool:
-    """The arm stands, is held, and stays there."""
+    """Returns True if the arm is at rest, is held, and stays there."""
     status = robot.status
     before, state = status.position, status.state
     time.sleep(0.15)
@@ -125,7 +125,7 @@ def stands(robot: openjtc.Robot) -> bool:
 
 
 class Aside:
-    """Something in a thread of its own, with what it raised."""
+    """Call in a separate thread, with its result and its exception."""
 
     def __init__(self, act) -> None:
         self.result = self.error = None
@@ -156,7 +156,7 @@ def press_after(seconds: float) -> Aside:
     return Aside(lambda: (time.sleep(seconds), os.kill(os.getpid(), signal.SIGINT)))
 
 
-# What was asked for before a Stop is not done after it.
+# A Stop discards all earlier requests.
 
 
 def test_what_waits_for_its_turn_is_not_done_after_a_stop(live, tmp_path: Path):
@@ -197,7 +197,7 @@ def test_a_place_by_its_name_is_not_looked_up_first_and_gone_to_after_a_stop(liv
         waiting.join()
         assert isinstance(waiting.error, openjtc.FaultError) and waiting.error.code == "cancelled"
         assert stands(robot)
-        # Looked up before the Stop, and begun after it.
+        # The request was made before the Stop, and begins after it.
         asked = robot._link.asked()
         robot.stop()
         with pytest.raises(openjtc.FaultError, match="cancelled"):
@@ -218,7 +218,7 @@ def test_a_stop_between_the_upload_and_the_execution_counts(live):
         assert stands(live)
 
 
-# Who stops the arm of whom.
+# Stops by this thread, other threads and other programs.
 
 
 def test_a_stop_ends_the_program_that_waits_for_its_motion(live):
@@ -247,12 +247,12 @@ def test_a_motion_that_the_program_stops_itself_is_no_error(live):
     assert motion.wait(30).outcome == "stopped"
     other.join()
     assert other.error is None and other.result.outcome == "stopped"
-    # By a Stop of this thread.
+    # This thread stops the arm.
     motion = live.start(openjtc.example("motion"), approach=True)
     until(lambda: is_moving(live))
     live.stop()
     assert motion.wait(30).outcome == "stopped"
-    # By a Stop of another one.
+    # Another thread stops the arm.
     motion = live.start(openjtc.example("motion"), approach=True)
     until(lambda: is_moving(live))
     Aside(live.stop).join()
@@ -263,7 +263,7 @@ def test_a_motion_that_the_program_stops_itself_is_no_error(live):
 def test_a_stop_acts_whatever_the_connection_is_busy_with(live):
     live.disable()
     live.use_defaults()
-    # The drives take their time to hold the arm; several wait for that.
+    # Several threads wait until the drives hold the arm.
     waiting = [Aside(lambda: live.wait_ready(30)) for _ in range(3)]
     waiting.append(Aside(live.doctor))
     time.sleep(0.05)
@@ -281,11 +281,11 @@ def test_a_stop_is_written_first_of_all(wire: Wire):
         robot.use_defaults()
         robot.wait_ready()
         assert wire.stops() == 0
-        # Nothing moves here, and nothing is asked before it is written.
+        # The arm is at rest, and the Stop is still written before any query.
         before = len(wire.sent)
         robot.stop()
         assert wire.sent[before:].startswith(encode.stop())
-        # While the connection waits for something else; and where nothing comes back, which it says.
+        # A Stop during another wait, and on a silent line, which raises an error.
         robot.disable()
         waiting = Aside(lambda: robot.wait_ready(60))
         time.sleep(0.2)
@@ -308,7 +308,7 @@ def test_what_a_stop_overtakes_on_its_way_is_not_sent(wire: Wire):
         until(lambda: robot.status.trajectory == "Pause")
         executed = wire.sent.count(encode.execute())
 
-        # A resume asks the controller for its settings before it sends Execute: that is when somebody stops the arm.
+        # A resume reads the controller's settings before it sends Execute; the Stop comes in between.
         def stop(data: bytes) -> None:
             if any(bytes([0x9B, kind]) in data for kind in range(0x40, 0x60)):
                 wire.on_sent = None
@@ -330,7 +330,7 @@ def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):
         motion = robot.start(openjtc.example("motion"), approach=True)
         second = robot.start(openjtc.example("motion"), approach=True)
         until(lambda: is_moving(robot))
-        # As an agent passes on the Stop of another client.
+        # The Stop arrives in the way in which an agent forwards the Stop of another client.
         wire.to_send = encode.stop()
         with pytest.raises(openjtc.StoppedError) as caught:
             motion.wait(30)
@@ -350,7 +350,7 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
         robot = ends.enter_context(openjtc.connect(wire.path))
         robot.use_defaults()
         robot.wait_ready()
-        # What the connection is busy with when the Stop comes, and what waits behind it.
+        # The Stop comes while the connection is busy and further requests wait.
         if busy == "jog":
             Aside(lambda: robot.jog(0.1, 5.0, joint=1))
         elif busy == "flight_log":
@@ -358,13 +358,13 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
         waiting = [robot.start(openjtc.example("motion"), approach=True) for _ in range(5)]
         halt_as_another_program(wire.path, folder)
         executed = wire.sent.count(encode.execute())
-        # Longer than a new request has to wait.
+        # This is longer than the hold-off of new requests after a Stop.
         time.sleep(4.0)
         for motion in waiting:
             with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
                 motion.wait(30)
         assert stands(robot) and wire.sent.count(encode.execute()) == executed
-        # What is requested now is done.
+        # A new request is executed.
         assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
 
 
@@ -380,7 +380,7 @@ def test_a_stop_at_the_agent_voids_what_waits_however_late_its_turn_comes(tmp_pa
         with urllib.request.urlopen(stop, timeout=10) as answer:
             assert answer.status == 200
         before = robot.position
-        # Longer than a new request has to wait.
+        # This is longer than the hold-off of new requests after a Stop.
         time.sleep(4.0)
         for motion in waiting:
             with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
@@ -390,7 +390,7 @@ def test_a_stop_at_the_agent_voids_what_waits_however_late_its_turn_comes(tmp_pa
 
 
 def halt_as_another_program(port: str, folder: str) -> None:
-    """A Stop through the socket where the program that has the port listens."""
+    """Sends a Stop through the socket of the program that owns the port."""
     name = f"openjtc/line-{os.stat(port).st_rdev:x}.sock"
     with socket.socket(socket.AF_UNIX) as asker:
         asker.settimeout(10.0)
@@ -420,7 +420,7 @@ def test_jogging_that_is_stopped_is_an_error_and_the_arm_rests(live):
 @needs_jtc
 def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str):
     def paused() -> None:
-        # A program that ends without a word, while its motion is paused.
+        # This program ends without closing its connection while its motion is paused.
         program = (
             "import os, sys, time, openjtc\n"
             "robot = openjtc.connect(sys.argv[1])\n"
@@ -457,7 +457,7 @@ def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str)
             robot.doctor()
         pressed.join()
         assert robot.status.trajectory == "Stop" and stands(robot)
-    # Asked for before a Stop: not resumed after it.
+    # A resume that was requested before a Stop is discarded.
     paused()
     with openjtc.connect(port) as robot:
         doctor = Aside(robot.doctor)
@@ -490,7 +490,7 @@ def test_a_second_motion_waits_and_the_first_is_paused(live):
     motion = live.start(openjtc.example("motion"), approach=True)
     second = live.start(openjtc.example("motion"), approach=True)
     until(lambda: is_moving(live))
-    # Each has its own.
+    # Each motion has its own progress.
     assert motion.progress[0] in ("approach", "upload", "motion") and second.progress[0] == "waiting"
     begin = time.monotonic()
     live.speed = 0.5
@@ -520,7 +520,7 @@ def test_several_threads_wait_for_a_motion_and_each_gets_it(live):
 
 
 class Pressed:
-    """A bar in whose code Ctrl-C is pressed, or that cannot be drawn."""
+    """Progress bar that raises `KeyboardInterrupt`, or that cannot be drawn."""
 
     disable = False
     error: type[BaseException] = KeyboardInterrupt
@@ -605,7 +605,7 @@ def test_ctrl_c_ends_waiting_for_what_does_not_come(live):
     live.wait_ready(60)
 
 
-# Teaching is off when nobody teaches.
+# Teaching is switched off when its context ends.
 
 
 def test_teaching_ends_with_a_stop_an_error_ctrl_c_and_the_connection(live):
@@ -703,7 +703,7 @@ def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
         "        os.write(there, b'x')\n"
         "        time.sleep(30)\n"
         "        os._exit(9)\n"
-        # A signal that comes while the interpreter is forked is lost.
+        # A signal that arrives during the fork of the interpreter is lost.
         "    os.read(here, 1)\n"
         "    os.kill(child, 15)\n"
         "    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -15\n"
@@ -746,7 +746,7 @@ def test_whatever_ends_a_task_stops_its_arm(live):
         with pytest.raises(asyncio.TimeoutError):
             await asyncio.wait_for(live.run_async(openjtc.example("motion"), approach=True), 0.5)
         assert stands(live)
-        # Before it has begun at all.
+        # The task is cancelled before it has begun.
         task = asyncio.create_task(live.run_async(openjtc.example("motion"), approach=True))
         await asyncio.sleep(0)
         task.cancel()

@@ -1,4 +1,4 @@
-"""Numbers and values of a connection: what is refused, what is not known, and what another arm is."""
+"""Tests of numbers and values of a connection: refused values, unknown values, and a different arm."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_odd_numbers_are_refused_with_value_and_limit(robot):
         with pytest.raises(openjtc.UsageError) as caught:
             act()
         assert np.isnan(caught.value.value)
-    # A motion is not over for a time that is none.
+    # An invalid timeout does not end the motion.
     assert motion.wait(INF).outcome == "finished"
     assert motion.wait(-1).outcome == "finished"
 
@@ -97,9 +97,9 @@ def test_no_number_panics(robot):
             try:
                 act(number)
             except Exception as error:
-                # A panic is no Exception.
+                # A panic is not an `Exception`.
                 assert isinstance(error, (openjtc.Error, OverflowError)), repr(error)
-            # What a push has done to the arm.
+            # A push may have put the controller into Error.
             if robot.status.state == "Error":
                 robot.recover()
 
@@ -150,7 +150,7 @@ def test_another_arm_than_the_one_that_was_named_is_neither_moved_nor_let_go(tmp
         robot.set_settings({"velocity_max_rad_s": [1.25] * 6})
         robot.use_defaults()
         robot.wait_ready()
-        # What the controller has can be looked at, and is not moved.
+        # The controller's arm can be read, but not moved.
         assert robot.arm.limits["velocity_max"] == pytest.approx(1.25)
         refused = (lambda: robot.move(HOME), lambda: robot.jog(0.1, 0.2, joint=1), lambda: robot.teach().__enter__(), robot.resume)
         for act in refused:
@@ -198,7 +198,7 @@ def test_what_a_silent_joint_measures_is_not_known(robot):
     robot.inject(f'format = 2\n[[fault]]\nkind = "node-silent"\njoint = 3\nat_s = {now + 0.5}\n')
     while robot.status.state != "Error":
         pass
-    # A drive that is gone before the controller knows it has never been measured.
+    # A drive that is lost before the controller has seen it was never measured.
     with pytest.raises(openjtc.Error):
         robot.recover()
     status = robot.status

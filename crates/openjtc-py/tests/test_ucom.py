@@ -1,4 +1,4 @@
-"""Chains of boards by name, on a simulated chain; what is on its bus is seen by a client of its own."""
+"""Tests of boards by name on a simulated chain; a separate client observes the bus."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def test_inventories_name_boards_and_are_compared_with(tmp_path: Path) -> None:
         chain.run("nod", active=True, inputs={"nod.set_position": 300})
         bus_value = chain["NOD.set_position"]
         assert bus_value == 300
-    # Names are known before it was asked who is there; "all" is no name, whatever an inventory has.
+    # Names of the inventory are known before the first scan; "all" is never a name, even if an inventory has it.
     file.write_text(file.read_text().replace('name = "nod"', 'name = "all"'))
     with ucom.connect(simulated, inventory=file) as chain:
         assert set(chain.info("all")) == {1, 2} == set(chain.boards)
@@ -235,7 +235,7 @@ def test_inventories_name_boards_and_are_compared_with(tmp_path: Path) -> None:
     with ucom.connect(simulated, inventory=file) as chain:
         assert chain.start("nod")[2].state == "started"
         chain.stop()
-        # Another program has exchanged the names, and has one board more: the numbers are new all the same.
+        # Another program has exchanged the names and added a board; `init` still numbers the chain again.
         text = file.read_text().replace('name = "nod"\n', "")
         text = text.replace("number = 1\n", 'number = 1\nname = "nod"\n')
         file.write_text(text + "[[board]]\nnumber = 3\nflash_number = 0x77\n")
@@ -269,7 +269,7 @@ def test_probe_and_conformance(numbered: ucom.SimulatedChain, numbered_bus: Bus)
         assert chain.probe().boards == (1, 2, 3)
         report = chain.conformance(1)
         assert report.tests and not report.failed and not report.left
-        # It reads the protocol as before, and its boards are as they were.
+        # The chain keeps its profile, and its boards are unchanged.
         chain.run(1)
         for asked in ({"alive": True}, {"init": True}):
             with pytest.raises(errors.RefusedError) as runs:

@@ -1,4 +1,4 @@
-"""Whom a chain keeps alive, and what it does of boards that do not answer."""
+"""Tests of heartbeats at the end of a chain, and of boards that do not answer."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ from openjtc import errors, ucom
 
 #: PC_START and MCA_PC_START to board 0, and the answer to the first.
 START, START_LOOP, READY = 0x300, 0x540, 0x500
-#: So long a board is silent; it is not lost before 20 s.
+#: Time for which a board is silent, s; the board is not lost before 20 s.
 SILENT_S = 2.5
 
 
 @pytest.fixture
 def patient(tmp_path: Path) -> Path:
-    """A profile that takes no board for lost that is silent for a moment."""
+    """Returns a profile in which a board counts as lost only after 20 s of silence."""
     profile = tmp_path / "patient.toml"
     profile.write_text("alive.dsp_lost = 20000\n")
     return profile
 
 
 def heartbeats(bus: Bus, seconds: float) -> int:
-    """Heartbeats of a PC within this time."""
+    """Counts the heartbeats of a PC within this time."""
     before = len(bus.frames)
     time.sleep(seconds)
     return bus.frames[before:].count(ALIVE)
 
 
 def runs_for_a_stranger(bus: Bus, board: int) -> None:
-    """The control loop of a board is started from the bus."""
+    """Starts the control loop of a board from another client of the bus."""
     before = len(bus.frames)
     bus.send(START + board)
     bus.wait(lambda: bus.came(READY + board, b"", before))
@@ -57,7 +57,7 @@ def runs_for_a_stranger(bus: Bus, board: int) -> None:
 
 
 def silent(sim: ucom.SimulatedChain, board: int, seconds: float = SILENT_S) -> float:
-    """Nothing of a board reaches the bus from now on; when that began."""
+    """Silences a board from now on. Returns the time of the start."""
     begun = time.monotonic()
     sim.fault(f"silent board={board} for_s={seconds}")
     time.sleep(0.1)
@@ -117,7 +117,7 @@ def test_texts_that_cannot_be_had_are_no_failed_run(
         chain.init()
 
         def silence() -> None:
-            # What enables its outputs, and its answer.
+            # Waits for the frame that enables its outputs, and the board's answer.
             bus.wait(lambda: bus.frames.count((ADMIN_TO + 1, ACTIVE)) == 2)
             silent(sim, 1)
 
@@ -145,7 +145,7 @@ def test_a_number_that_two_boards_have_is_an_error_while_one_runs(sim: ucom.Simu
         assert shared.value.code == "number-shared" and shared.value.board == 1
         chain.check()
     finally:
-        # Both are commanded to stop; their answers look alike.
+        # Both boards are commanded to stop; their answers look alike.
         with contextlib.suppress(errors.Error):
             chain.close()
 

@@ -1,4 +1,4 @@
-"""Chains of boards when something ends or fails: outputs are left safe, and what went wrong is reported."""
+"""Tests of chains after ends and failures: outputs are left safe, and the failure is reported."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_ctrl_c_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus:
         timer = threading.Timer(0.2, _thread.interrupt_main)
         timer.start()
         with pytest.raises(KeyboardInterrupt):
-            # Its control loop does not run: this waits.
+            # The control loop of board 3 does not run, so this call waits.
             next(chain.monitor(3))
         timer.join()
         # Before the context ends.
@@ -105,7 +105,7 @@ if sys.argv[2] == "monitor":
 
 @pytest.mark.parametrize("how", ["monitor", "end"])
 def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus, how: str) -> None:
-    """Without a context manager, too: by Ctrl-C in a call, and at the end of the program."""
+    """Checked without a context manager: by Ctrl-C in a call, and at the end of the program."""
     before = len(numbered_bus.frames)
     child = subprocess.Popen([sys.executable, "-c", CHILD, numbered.url, how], stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None and child.stdout.readline() == "runs\n"
@@ -114,7 +114,7 @@ def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, 
         child.send_signal(signal.SIGINT)
     assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
     child.stdout.close()
-    # Stopped by it, not by themselves for want of heartbeats: their applications have ended, too.
+    # The program has stopped the boards: their applications have ended, too. Missing heartbeats would only end the control loops.
     assert not numbered_bus.started(1) and not numbered_bus.started(2)
     numbered_bus.wait(lambda: numbered_bus.came(ADMIN_TO + 1, ACTIVE, before))
     ran = numbered_bus.frames.index((ADMIN_TO + 1, ACTIVE), before)

@@ -1,4 +1,4 @@
-"""A client of a chain's bus that shares no code with the package, and simulated chains for tests."""
+"""Client of a chain's bus that shares no code with the package, and simulated chains for tests."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ ALIVE = (0x680, b"")
 
 
 class Bus:
-    """A socketcand client in raw mode: every frame as (identifier, data)."""
+    """Socketcand client in raw mode: every frame as (identifier, data)."""
 
     def __init__(self, url: str) -> None:
         host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
         self.socket = socket.create_connection((host, int(port)))
         self.frames: list[tuple[int, bytes]] = []
-        #: When each was on the bus, s by its server.
+        #: Time of each frame on the bus, s by its server.
         self.times: list[float] = []
         self.text, self.ended = "", False
         self.thread = threading.Thread(target=self._read)
@@ -60,16 +60,16 @@ class Bus:
         self.socket.sendall(f"< send {identifier:X} {len(data)} {listed} >".encode())
 
     def came(self, identifier: int, data: bytes, after: int = 0) -> bool:
-        """This frame was on the bus since there were so many frames."""
+        """Returns True if this frame was on the bus after the first `after` frames."""
         return (identifier, data) in self.frames[after:]
 
     def when(self, identifier: int, data: bytes, after: int = 0) -> float:
-        """When it first was since then, s by the server of the bus."""
+        """Returns the time of the first such frame after the first `after` frames, s by the server of the bus."""
         self.wait(lambda: self.came(identifier, data, after))
         return self.times[self.frames.index((identifier, data), after)]
 
     def status(self, board: int) -> int:
-        """The status byte in the answer of a board to PC_INFO (0x200 + number), the first frame of DSP_INFO (0x140 + number)."""
+        """Reads the status byte in the answer of a board to PC_INFO (0x200 + number), the first frame of DSP_INFO (0x140 + number)."""
         before = len(self.frames)
         self.send(0x200 + board)
 
@@ -80,15 +80,15 @@ class Bus:
         return answers()[0][3]
 
     def runs(self, board: int) -> bool:
-        """MCARUN (0x20) of its status."""
+        """Returns MCARUN (0x20) of its status."""
         return bool(self.status(board) & 0x20)
 
     def started(self, board: int) -> bool:
-        """MSTART (0x80) of its status."""
+        """Returns MSTART (0x80) of its status."""
         return bool(self.status(board) & 0x80)
 
     def sends_outputs(self, board: int) -> bool:
-        """Its sensor outputs (0x380 + number) come within a moment."""
+        """Returns True if its sensor outputs (0x380 + number) come within 0.1 s."""
         before = len(self.frames)
         time.sleep(0.1)
         return any(identifier == 0x380 + board for identifier, _ in self.frames[before:])
@@ -109,7 +109,7 @@ def sim() -> Iterator[ucom.SimulatedChain]:
 
 @pytest.fixture(scope="module")
 def numbered() -> Iterator[ucom.SimulatedChain]:
-    """A chain whose three boards have numbers, for tests that leave it as it was."""
+    """Yields a chain whose three boards have numbers, for tests that leave it unchanged."""
     simulated = ucom.sim(boards=3)
     with ucom.connect(simulated) as chain:
         chain.init()

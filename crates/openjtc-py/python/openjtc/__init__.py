@@ -7,12 +7,13 @@ Four lines move an arm, real or simulated::
     with openjtc.connect("sim:") as robot:
         print(robot.move([0, 30, -60, 0, 30, 0], degrees=True))
 
-Joints are counted from 1, base to wrist; arrays have one column a joint. Angles are rad, torques N·m, times s, unless a name says otherwise.
+Joints are counted from 1, base to wrist; arrays have one column per joint. Angles are in rad, torques in N·m and times in s,
+unless a name says otherwise.
 
 - `connect` and `Robot`: motions, jogging, teaching, arms, payloads, the flight recorder of one controller.
 - `Planner`: motions from poses and waypoints within all limits, without a controller.
 - `openjtc.dynamics`: kinematics and dynamics of an arm, vectorised.
-- `openjtc.sim`: the simulated arm step by step, with the real controller or one of your own.
+- `openjtc.sim`: the simulated arm step by step, with the real controller or your own.
 - `openjtc.control`: the control code of the boards, tick by tick.
 - `openjtc.ucom`: chains of UCoM boards.
 """
@@ -70,9 +71,9 @@ __all__ = [
 
 
 def example(name: str) -> Trajectory:
-    """A trajectory to try, by its name: ``motion``, ``lines`` …; ``jtc example`` lists them.
+    """Returns an example trajectory by its name: ``motion``, ``lines`` …; ``jtc example`` lists the names.
 
     Raises:
-        UsageError: There is none of this name; the message lists them.
+        UsageError: The name is unknown; the message lists the names.
     """
     return Trajectory.parse(example_text(name))

@@ -104,7 +104,8 @@ class Connected:
         """Identity of the controller: board, firmware, arm, hash of its arm, boots, uptime (s); None for a controller without extensions.
 
         ``reactions`` has ``last_held_stop``, joints that yield (``yields``) or whose encoder has jumped (``encoder_jumped``),
-        ``path_rate``, and the time for which this run was held back (``held_back_s``). It is None if the controller does not report it.
+        ``path_rate``, and the time for which this run was held back (``held_back_s``). The value is None if the controller does not
+        report it.
         """
         return self._link.info()
 
@@ -154,7 +155,7 @@ class Connected:
         """Changes settings by name, all or none.
 
         Args:
-            values: One number for each setting, or six for a setting of joints, base to wrist.
+            values: Value of each setting: a number, or six numbers for a setting of joints, base to wrist.
 
         Raises:
             UsageError: A setting is unknown, or a value is out of range: the error has joint, value and limit. No setting was changed.

@@ -1,4 +1,4 @@
-"""Connecting: to a simulated controller, a serial port, an agent."""
+"""Connections to a simulated controller, a serial port or an agent."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from openjtc.robot import Robot
 __all__ = ["connect"]
 
 _open: weakref.WeakSet[Robot] = weakref.WeakSet()
-#: The process that connected last.
+#: Process that connected last.
 _process = os.getpid()
 
 
 @atexit.register
 def _close_all() -> None:
-    """A program that ends stops what it moves: all arms at once, then one after the other is waited for."""
-    # In a child of the process that connected they are closed already: they are the parent's.
+    """Stops the motions of all connections when the program ends: first sends every Stop, then waits for one arm after the other."""
+    # In a child process they count as closed, because they belong to the parent.
     robots = [robot for robot in list(_open) if not robot.is_closed]
     for robot in robots:
         robot._link.halt()
@@ -42,14 +42,14 @@ def _close_all() -> None:
 
 def _end(number: int, frame: FrameType | None) -> None:
     if os.getpid() != _process:
-        # A child has no arm to stop, and ends as ever.
+        # A child process has no arm to stop and ends by the signal as usual.
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
     raise SystemExit(128 + number)
 
 
 def _catch_signals() -> None:
-    """A program that a signal ends stops what it moves, too. Where somebody handles these signals already, that is left as it is."""
+    """Lets a program that ends by a signal stop its motions, too. Signal handlers that exist already are kept."""
     global _process
     _process = os.getpid()
     if threading.current_thread() is not threading.main_thread():
@@ -75,26 +75,27 @@ def connect(
 ) -> Robot:
     """Connects to a controller.
 
-    The end of the program stops what it moves, also at SIGTERM and SIGHUP: where nobody else handles them, the first connection in the main
-    thread lets them raise `SystemExit` there. What nobody can handle, SIGKILL or a loss of power, stops nothing on a serial line; an agent
-    stops the motion of a program that has gone.
+    The end of the program stops its motions, also at SIGTERM and SIGHUP: if the program has no handler for these signals, the first
+    connection in the main thread installs handlers that raise `SystemExit`. SIGKILL and a loss of power cannot be handled: on a serial
+    line the motion continues, but an agent stops the motion of a program that has disconnected.
 
     Args:
-        target: ``sim:`` a simulated controller, drives and arm in this process, which hold the arm at once; ``/dev/ttyUSB0`` a serial
-            port, by the agent that owns it where there is one; ``http://HOST:PORT`` or ``https://…`` an agent (``jtc serve``).
-        arm: The arm, or its file (TOML, URDF); None: that of the controller, where it can be asked, else the built-in one. A controller
-            that has another arm refuses motions.
+        target: ``sim:`` for a simulated controller, drives and arm in this process, which hold the arm at once; ``/dev/ttyUSB0`` for a
+            serial port, through the agent that owns the port, if any; ``http://HOST:PORT`` or ``https://…`` for an agent (``jtc serve``).
+        arm: The arm, or its file (TOML, URDF); None: the controller's arm if the controller can report it, else the built-in one. A
+            controller with another arm refuses motions.
         baud: Rate of a serial port, Bd.
-        speed: Of the simulator, times real time; None: as fast as the computer is, with time that passes only while something is done.
-        seed: Of the simulator's chances.
-        faults: What goes wrong in the simulator, as the text of a fault file (``jtc help faults``).
-        payload: What the simulated arm carries; its controller does not know of it.
-        name: As an agent shows this program to others; None: user and program.
-        token: Of an agent of somebody else; that of one's own is found.
-        certificates: A PEM file that an agent at ``https://`` is trusted by; None: those of the system.
+        speed: Speed of the simulator, times real time; None: as fast as possible, and time passes only during calls.
+        seed: Seed of the simulator's random numbers.
+        faults: Faults in the simulator, as the text of a fault file (``jtc help faults``).
+        payload: Payload of the simulated arm; its controller does not know it.
+        name: Name under which an agent shows this program to other clients; None: user and program.
+        token: Token for another user's agent; the token of your own agent is found automatically.
+        certificates: PEM file with the certificates for an agent at ``https://``; None: the certificate of your own agent, else of the
+            system.
 
     Raises:
-        NoLinkError: There is no such port or agent, or no controller answers.
+        NoLinkError: The port or agent does not exist, or no controller answers.
     """
     _catch_signals()
     if arm is not None and not isinstance(arm, Arm):

@@ -1,4 +1,4 @@
-"""Errors: what was asked for, where, value and limit, the likely cause, and what helps."""
+"""Errors: the failed request, place, value and limit, the likely cause, and the remedy."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ class Error(Exception):
     """Any error of openjtc.
 
     Attributes:
-        message: What was asked for, where, value and limit.
-        code: A short name for programs, that of ``jtc`` where it has the error, too.
-        joint: The joint, counted from 1; None where it is about none.
-        point: The point of the trajectory, counted from 0; in motion the millisecond of its path.
-        value: What was found, in the unit of the message.
-        limit: What is allowed, in the same unit.
-        cause: What usually causes it; empty where that is not known.
-        next: The next act that helps; empty where there is none.
-        board: The UCoM board, by its number; None where it is about none, or about several.
-        run: What was seen of a motion that ended in this error; None of any other error.
+        message: The failed request, its place, value and limit.
+        code: Short name for programs, the same as in ``jtc`` if ``jtc`` has the error, too.
+        joint: Joint, counted from 1; None if the error is not about one joint.
+        point: Point of the trajectory, counted from 0; in motion the millisecond of its path.
+        value: Value that was found, in the unit of the message.
+        limit: Allowed value, in the same unit.
+        cause: Usual cause; empty if unknown.
+        next: Next step that helps; empty if unknown.
+        board: Number of the UCoM board; None if the error is about no board, or about several.
+        run: Run of a motion that ended in this error; None for any other error.
     """
 
     run: Run | None = None
@@ -63,11 +63,11 @@ class Error(Exception):
 
 
 class UsageError(Error, ValueError):
-    """A wrong argument, or a file that cannot be understood. Nothing was sent."""
+    """A wrong argument, or a file that cannot be understood. No frame was sent."""
 
 
 class RefusedError(Error):
-    """A check refuses it: nothing was sent, moved or changed."""
+    """A check refused the request: nothing was sent, moved or changed."""
 
 
 class DeviceError(Error):
@@ -75,24 +75,24 @@ class DeviceError(Error):
 
 
 class NoLinkError(Error, ConnectionError):
-    """There is no port or bus, or nobody answers."""
+    """No port or bus was found, or no device answers."""
 
 
 class FaultError(Error):
-    """It went wrong on the way, or was cancelled there. The message says whether the arm may be moving."""
+    """A request failed or was cancelled while it ran. The message says whether the arm may be moving."""
 
 
 class HeldStopError(FaultError):
-    """The controller stopped the arm and holds it: it met something, or a load that its model lacks. Its code is ``held-stop``.
+    """The controller stopped the arm and holds it after a contact, or under a load that its model lacks. The code is ``held-stop``.
 
-    ``text``, ``joint``, ``value`` and ``limit`` say what the controller found. Nothing moves until ``robot.recover()``, which comes after a
-    look at the arm.
+    ``text``, ``joint``, ``value`` and ``limit`` describe the cause. The arm does not move until ``robot.recover()``. Look at the arm before
+    that call.
 
     Attributes:
-        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …; empty where the controller
-            does not tell it.
-        unit: Unit of ``value`` and ``limit``; empty where they have none.
-        text: What the controller found, in words; empty where it does not tell.
+        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …; empty if the controller
+            does not report it.
+        unit: Unit of ``value`` and ``limit``; empty if they have no unit.
+        text: Cause in words; empty if the controller does not report it.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class HeldStopError(FaultError):
 
 
 class StoppedError(FaultError):
-    """Somebody stopped the arm while this waited for it: another thread, another program, whoever looks after the arm. Its code is ``stopped``.
+    """Another thread, another program or an operator stopped the arm during the call. The code is ``stopped``.
 
-    ``run`` is what was seen of a motion until then. Who goes on all the same sets off an arm that somebody wanted to stand.
+    ``run`` has the samples of a motion until then. A program that continues moves an arm that was stopped on purpose.
     """

@@ -1,4 +1,4 @@
-"""A motion on its way, and an arm that is led by hand."""
+"""Running motions, and teaching by hand."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ FilePath: TypeAlias = "str | os.PathLike[str]"
 
 
 class Motion:
-    """A motion on its way. `Robot.pause`, `Robot.resume` and `Robot.speed` act on it, too.
+    """A running motion. `Robot.pause`, `Robot.resume` and `Robot.speed` act on it, too.
 
-    It may be waited for and looked at from several threads. As long as it is there, the robot is: the end of the program stops it.
+    Several threads may use one motion. A motion keeps its robot open; the end of the program stops it.
     """
 
     def __init__(self, native: _native.Motion, robot: Robot, asked: int) -> None:
@@ -41,13 +41,13 @@ class Motion:
 
     @property
     def progress(self) -> tuple[str, float, float]:
-        """What is done (``waiting``, ``upload``, ``approach``, ``motion``; empty when it is over), how far it is, and of how much: s, or
-        segments of an upload."""
+        """Phase (``waiting``, ``upload``, ``approach``, ``motion``; empty after the end), progress in it and total: s, or segments of an
+        upload."""
         return self._native.progress()
 
     @property
     def is_done(self) -> bool:
-        """It is over, in whatever way."""
+        """True if the motion is over, with or without an error."""
         return self._is_over(0.0)
 
     def _is_over(self, seconds: float | None) -> bool:
@@ -56,13 +56,13 @@ class Motion:
         try:
             came = self._native.wait(seconds)
         except UsageError:
-            # The time is none.
+            # `seconds` is not a valid time.
             raise
         except Exception as error:
             self._error = error
             return True
         except BaseException:
-            # Ctrl-C has stopped it: who asks for what came of it then knows that.
+            # Ctrl-C has stopped the motion, so a later `wait` reports the stop without an error.
             self._stopped = True
             raise
         if came is None:
@@ -71,37 +71,36 @@ class Motion:
         run = Run(samples)
         if isinstance(error_of_run, Error):
             error_of_run.run = run
-        # The run last: it is what others look at.
+        # Sets the run last, because other threads read it.
         self._error, self._run = error_of_run, run
         return True
 
     def stop(self) -> None:
-        """Stops the arm on its path, as `Robot.stop` does; that the motion was stopped is no error of `wait` then."""
+        """Stops the arm on its path, as `Robot.stop` does. A later `wait` then raises no `StoppedError`."""
         self._stopped = True
         self._robot.stop()
 
     def wait(self, timeout: float | None = None) -> Run:
-        """Waits for its end. Ctrl-C stops the arm first.
+        """Waits until the motion ends. Ctrl-C stops the arm first.
 
         Args:
-            timeout: s; None: as long as it takes.
+            timeout: Longest wait, s; None: without limit.
 
         Returns:
-            What was seen. Its outcome is ``stopped`` where `stop` of this motion stopped it, or `Robot.stop` or `Robot.close` called in the
-            thread that waits.
+            The run. Its outcome is ``stopped`` after `stop` of this motion, or after `Robot.stop` or `Robot.close` in the waiting thread.
 
         Raises:
-            TimeoutError: It is not over yet, and goes on.
-            RefusedError: The check refuses it; nothing was sent.
-            StoppedError: Somebody else stopped it.
-            FaultError, DeviceError, NoLinkError: It ended in an error; ``run`` of the error is what was seen until then.
+            TimeoutError: The motion is not over and continues.
+            RefusedError: The check refused the trajectory. No frame was sent.
+            StoppedError: Another thread or program stopped the motion.
+            FaultError, DeviceError, NoLinkError: The motion ended in an error; ``run`` of the error has the samples until then.
         """
         if not self._is_over(timeout):
             raise TimeoutError(f"the motion goes on after {timeout} s")
         return self._ended(self._stopped or self._robot._stopped_since(self._asked))
 
     def _ended(self, own: bool) -> Run:
-        """What came of it; `own`: whoever asks has stopped it, where it was stopped."""
+        """Returns the run or raises its error. `own` is true if the caller itself stopped the motion."""
         if self._error is not None:
             raise self._error
         assert self._run is not None
@@ -117,7 +116,7 @@ class Motion:
 
 
 class Teaching:
-    """The arm is led by hand. It is held again when the context ends, and as soon as somebody stops the arm."""
+    """An arm that is led by hand. The controller holds the arm again when the context ends or after a Stop."""
 
     def __init__(self, link: _native.Link) -> None:
         self._link = link
@@ -125,11 +124,12 @@ class Teaching:
         self._rows = np.empty((0, 6))
 
     def record(self, seconds: float) -> None:
-        """Records where the arm is led for this time (s, up to 3600), behind what was recorded before. What was recorded by the time of an
-        error, or of Ctrl-C, is there all the same.
+        """Records the positions of the arm for this time (s, up to 3600) and appends them to the earlier ones.
+
+        After an error or Ctrl-C, the positions until then are kept.
 
         Raises:
-            FaultError: The arm is not taught any more, or the controller reports an error.
+            FaultError: Teaching has ended, or the controller reports an error.
         """
         self._link.take_taught()
         try:
@@ -142,19 +142,19 @@ class Teaching:
 
     @property
     def time(self) -> Array:
-        """Times of what was recorded (N,), s."""
+        """Times of the recorded positions (N,), s."""
         return np.array(self._times)
 
     @property
     def position(self) -> Array:
-        """Where the arm was (N, 6), rad."""
+        """Recorded joint positions (N, 6), rad."""
         return self._rows.copy()
 
     def waypoints(self, tolerance: float = 0.01) -> Array:
-        """As few of the positions as keep every other one within a tolerance of the straight legs between them.
+        """Thins the recorded positions: every dropped position is within a tolerance of the straight legs between the kept ones.
 
         Args:
-            tolerance: rad of the joint that is furthest.
+            tolerance: Largest deviation of any joint, rad.
 
         Returns:
             Waypoints (W, 6), rad, for `Robot.plan`.
@@ -172,7 +172,7 @@ def options_of(
     overwrite: bool,
     accept_device_limits: bool,
 ) -> dict[str, Any]:
-    """What a motion is run with. `asked`: how many Stops there had been when it was asked for."""
+    """Collects the options of a motion. `asked` is the number of Stops at the time of the request."""
     count = operator.index(repeat)
     if not 1 <= count < 2**32:
         limit = 1 if count < 1 else 2**32 - 1
@@ -192,14 +192,14 @@ def options_of(
 
 
 def followed(robot: Robot, begin: Callable[[], Motion], progress: bool | None) -> Run:
-    """Begins a motion and waits for it with a bar: upload and motion, one after the other."""
+    """Begins a motion and waits for it with a progress bar, first for the upload, then for the motion."""
     motion: Motion | None = None
     try:
         motion = begin()
         _show(motion, progress)
     except BaseException as error:
-        # The arm does not go on where nobody waits for it any more: Ctrl-C in Python's own code, or a bar that cannot be drawn. What keeps a
-        # motion from beginning has begun nothing.
+        # Stops the arm if the wait is interrupted by Ctrl-C in Python code or by a bar that cannot be drawn: no caller waits any more.
+        # An `Exception` before the start has started no motion.
         if motion is not None or not isinstance(error, Exception):
             robot._link.rest()
         raise

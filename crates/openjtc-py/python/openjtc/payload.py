@@ -1,4 +1,4 @@
-"""What the flange of an arm carries."""
+"""Payload at the flange of an arm."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["Payload"]
 
 @dataclass(frozen=True)
 class Payload:
-    """What the flange carries.
+    """Payload at the flange.
 
     Attributes:
-        mass: kg.
+        mass: Mass, kg.
         com: Centre of mass in the flange's frame, m.
-        inertia: xx, xy, xz, yy, yz, zz about the centre of mass, kg·m².
+        inertia: Inertia xx, xy, xz, yy, yz, zz about the centre of mass, kg·m².
     """
 
     mass: float
@@ -25,7 +25,7 @@ class Payload:
     inertia: Sequence[float] = (0.0,) * 6
 
     def _numbers(self) -> tuple[float, list[float], list[float]]:
-        """Mass, centre of mass, inertia, as the compiled part takes them."""
+        """Returns mass, centre of mass and inertia in the form of the compiled module."""
         if len(self.com) != 3 or len(self.inertia) != 6:
             raise UsageError("a payload has a centre of mass of 3 numbers and an inertia of 6", "payload")
         return (float(self.mass), [float(x) for x in self.com], [float(x) for x in self.inertia])

@@ -1,4 +1,4 @@
-"""Motions from poses and waypoints, within the limits of velocity, acceleration, jerk and torque, without a controller."""
+"""Plans motions from poses and waypoints within the limits of velocity, acceleration, jerk and torque, without a controller."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Planner:
     Args:
         arm: The arm; None: the built-in one.
         speed: Percent of what the limits allow, 1 to 100.
-        blend: How far from a waypoint its corner may be rounded, rad of the joint that is furthest, 0.5 at most; 0: the arm stops at each
-            waypoint. `through` takes one in degrees.
-        blend_m: The same of corners between lines and arcs of the flange, m, 0.5 at most.
-        line: Whether the flange keeps to a straight line where waypoints do not say how the arm gets there.
-        jerk: Whether jerk is limited, too.
-        temperature: Lowest bearing temperature at which friction has to be overcome, °C; None: that of a cold hall, 20.
-        payload: What the flange carries.
+        blend: Distance from a waypoint at which its corner may be rounded, rad of the joint that is furthest, 0.5 at most; 0: the arm stops
+            at each waypoint. `through` also takes a blend in degrees.
+        blend_m: Like `blend`, for corners between lines and arcs of the flange, m, 0.5 at most.
+        line: Moves the flange along a straight line to each waypoint that does not set this itself.
+        jerk: Limits jerk, too.
+        temperature: Lowest bearing temperature for which friction torque is planned, °C; None: 20, as in a cold hall.
+        payload: Payload at the flange.
         margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
     """
 
@@ -65,13 +65,13 @@ class Planner:
         flange: ArrayLike | None = None,
         degrees: bool = False,
     ) -> Plan:
-        """From a position at rest to another one, or to a pose of the flange.
+        """Plans a motion from one position at rest to another one, or to a pose of the flange.
 
         Args:
             start: Joint positions (6,), rad, or the name of a pose of the arm.
-            to: The same.
-            flange: In its place x, y, z (m) and roll, pitch, yaw (rad) of the flange in the base frame.
-            degrees: Whether all angles given are degrees.
+            to: Target, in the form of `start`.
+            flange: Flange pose instead of `to`: x, y, z (m) and roll, pitch, yaw (rad) in the base frame.
+            degrees: True if all given angles are degrees.
 
         Raises:
             RefusedError: The target is outside the limits, cannot be reached, or no torque holds it.
@@ -91,20 +91,20 @@ class Planner:
         blend: float | None = None,
         degrees: bool = False,
     ) -> Plan:
-        """Through waypoints, from rest to rest.
+        """Plans a motion through waypoints, from rest to rest.
 
         Args:
             waypoints: An array (N, 6) of joint positions (rad), a file, or a list of pose names and dicts.
-            times: When to be at each waypoint of an array, s from the first one; NaN: as soon as the limits allow.
-            blend: In the place of the planner's own; in degrees where `degrees` is true, else in rad.
-            degrees: Whether angles are degrees, `blend` among them; not for what names its units itself.
+            times: Time of each waypoint of an array, s from the first one; NaN: as soon as the limits allow.
+            blend: Replaces the planner's blend; in degrees if `degrees` is true, else in rad.
+            degrees: True if angles are degrees, including `blend`. Data that names its own units is not affected.
 
         Returns:
             The plan. Its `notes` name waypoints that rounded corners miss by more than 0.05 rad.
 
         Raises:
-            UsageError: A blend above 0.5 rad.
-            RefusedError: There is no such motion; the message names the waypoint.
+            UsageError: The blend is above 0.5 rad.
+            RefusedError: The motion is not possible; the message names the waypoint.
         """
         blend_rad = None if blend is None else float(np.radians(blend) if degrees else blend)
         if isinstance(waypoints, (str, os.PathLike)):
@@ -120,11 +120,11 @@ class Planner:
         return Plan(self._native.through(positions, blend_rad, given))
 
     def check(self, trajectory: Trajectory | Plan, *, start: ArrayLike | None = None) -> Check:
-        """Checks a trajectory as a run would: limits at and between points, torques, room to stop.
+        """Checks a trajectory as a run would: limits at and between points, torques, distance to stop.
 
         Args:
-            trajectory: What is checked.
-            start: Where the arm stands (6,), rad; None: at its first point.
+            trajectory: A trajectory or a plan.
+            start: Start position of the arm (6,), rad; None: the first point.
         """
         if isinstance(trajectory, Plan):
             trajectory = trajectory.trajectory
@@ -132,12 +132,12 @@ class Planner:
 
 
 def _plain(waypoint: Any) -> dict[str, Any]:
-    """Arrays of numpy in a dict as lists."""
+    """Returns the waypoint with its numpy arrays as lists."""
     return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in dict(waypoint).items()}
 
 
 def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
-    """Joint positions in rad, of numbers or of a named pose."""
+    """Returns joint positions in rad, from numbers or a named pose."""
     if isinstance(place, str):
         if degrees:
             raise UsageError("a named pose has its unit: leave `degrees` out", "usage")
@@ -146,12 +146,12 @@ def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
 
 
 def radians_of(place: ArrayLike, degrees: bool) -> ArrayLike:
-    """Joint positions in rad, of numbers."""
+    """Returns joint positions in rad, from numbers."""
     return np.radians(np.asarray(place, dtype=float)) if degrees else place
 
 
 def flange_of(flange: ArrayLike | None, degrees: bool) -> ArrayLike:
-    """x, y, z (m), roll, pitch, yaw (rad)."""
+    """Returns the flange pose as x, y, z (m), roll, pitch, yaw (rad)."""
     numbers = np.array(flange, dtype=float)
     if degrees and numbers.shape == (6,):
         numbers[3:] = np.radians(numbers[3:])

@@ -1,4 +1,4 @@
-"""What came of a motion, a plan, a check or a flight recorder: arrays, tables, figures, plots, reports."""
+"""Results of a motion, a plan, a check or a flight recorder: arrays, tables, figures, plots, reports."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointFigures:
-    """Figures of one joint over a motion; None where a value is not known.
+    """Figures of one joint over a motion; an unknown value is None.
 
     Attributes:
         name: Name in the arm file.
         rms_error_mrad: Root mean square of the position error, mrad.
         max_error_mrad: Largest absolute position error, mrad.
         peak_torque_nm: Largest absolute torque, N·m.
-        torque_limit_nm: Its limit, N·m.
+        torque_limit_nm: Torque limit, N·m.
         torque_share: Peak torque as a share of the limit, 0 to 1.
         peak_velocity_rad_s: Largest absolute velocity, rad/s.
         peak_temperature_c: Highest bearing temperature, °C.
@@ -52,9 +52,9 @@ class JointFigures:
 
 
 class Samples:
-    """Samples with their arm: of a run, of a plan, of a flight recorder.
+    """Samples of a run, a plan or a flight recorder, with their arm.
 
-    Over a line there are as many samples as the controller sends statuses, 25 per second; in the simulator and in a flight recorder one
+    Over a line there is one sample for each status of the controller, 25 per second. The simulator and the flight recorder have one sample
     each millisecond. Values that a source does not know are NaN.
     """
 
@@ -70,7 +70,7 @@ class Samples:
         return self._native.joint_names
 
     def arrays(self) -> dict[str, Array]:
-        """Every column as an array.
+        """Returns every column as an array.
 
         Returns:
             ``time`` (s) and ``point`` (ms of the path) of shape (N,); of shape (N, 6) ``set_position``, ``position``, ``error`` (rad),
@@ -95,7 +95,7 @@ class Samples:
         return columns
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A table of all samples: ``time``, ``point``, ``state``, and of each value and joint a column, ``position_1`` to ``position_6``.
+        """Returns a table of all samples: ``time``, ``point``, ``state``, and a column for each value and joint, such as ``position_1``.
 
         Raises:
             ImportError: pandas is not installed; the message says how to install it.
@@ -104,12 +104,12 @@ class Samples:
         return table
 
     def to_polars(self) -> polars.DataFrame:
-        """As `to_pandas`, with Polars."""
+        """Returns the table of `to_pandas` as a Polars frame."""
         table: polars.DataFrame = needed("polars").DataFrame(self._columns())
         return table
 
     def plot(self) -> Figure:
-        """Commanded and measured positions and their error, by Matplotlib.
+        """Plots commanded and measured positions and their error with Matplotlib.
 
         Raises:
             ImportError: Matplotlib is not installed; the message says how to install it.
@@ -131,8 +131,8 @@ class Samples:
         """Writes the report: one page with figures and interactive plots that opens offline.
 
         Args:
-            path: The file, as ``run.html``.
-            overwrite: Whether a file that is there is written over.
+            path: The file, such as ``run.html``.
+            overwrite: Overwrites an existing file.
 
         Raises:
             UsageError: The file exists.
@@ -147,7 +147,7 @@ class Samples:
         return path
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Writes a recording: MCAP, which Foxglove, PlotJuggler and Rerun open, or CSV, by the ending of the name."""
+        """Writes a recording, by the file ending as MCAP, which Foxglove, PlotJuggler and Rerun open, or as CSV."""
         self._native.write(path, overwrite)
         return Path(path)
 
@@ -172,26 +172,26 @@ class Samples:
 
 
 class Run(Samples):
-    """A motion that was run: how it ended, its samples and its figures."""
+    """An executed motion: its outcome, samples and figures."""
 
     @property
     def outcome(self) -> str:
-        """``finished``, ``stopped`` (on the way, here or by somebody else) or ``fault``."""
+        """``finished``, ``stopped`` (on the path, by this or another program) or ``fault``."""
         return self._native.outcome
 
     @property
     def duration(self) -> float:
-        """How long the trajectory was executed, s."""
+        """Time for which the trajectory was executed, s."""
         return float(self._native.summary()["executed_s"])
 
     @property
     def failure(self) -> str | None:
-        """What broke first, in a line; None where nothing did."""
+        """First failure, in one line; None if the motion did not fail."""
         return self._native.failure
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check, and the speed where none was named."""
+        """Changes that were made for the check, and the speed if the caller gave no speed."""
         return self._native.notes
 
     def __repr__(self) -> str:
@@ -203,9 +203,9 @@ class Run(Samples):
 
 
 class Check:
-    """What the check of a trajectory found: the one that guards each run.
+    """Result of the trajectory check that guards each run.
 
-    True in a condition where nothing forbids to run it.
+    True in a condition if the trajectory may run.
     """
 
     def __init__(self, verdict: dict[str, Any]) -> None:
@@ -216,17 +216,17 @@ class Check:
 
     @property
     def ok(self) -> bool:
-        """Nothing forbids to run it."""
+        """True if the trajectory may run."""
         return bool(self._verdict["ok"])
 
     @property
     def refusals(self) -> list[str]:
-        """What forbids it, the worst first: joint, point, value, limit."""
+        """Reasons that forbid the run, the worst first: joint, point, value, limit."""
         return list(self._verdict["refusals"])
 
     @property
     def warnings(self) -> list[str]:
-        """What is near a limit; a torque margin below 10 % is among it."""
+        """Values near a limit, including a torque margin below 10 %."""
         return list(self._verdict["warnings"])
 
     @property
@@ -241,18 +241,18 @@ class Check:
 
     @property
     def margin(self) -> dict[str, Any] | None:
-        """The smallest torque margin: ``percent`` of the limit, ``joint`` (from 1), ``time_s``, ``torque_nm``, ``limit_nm``,
+        """Smallest torque margin: ``percent`` of the limit, ``joint`` (from 1), ``time_s``, ``torque_nm``, ``limit_nm``,
         ``temperature_c``; None without a model."""
         margin: dict[str, Any] | None = self._verdict["margin"]
         return margin
 
     @property
     def next(self) -> str:
-        """What helps; empty where nothing is wrong."""
+        """Next step that helps; empty without a problem."""
         return str(self._verdict["next"])
 
     def raise_if_refused(self) -> None:
-        """Raises `RefusedError` where something forbids to run it."""
+        """Raises `RefusedError` if the trajectory may not run."""
         if not self.ok:
             worst = next((problem for problem in self.problems if not problem["warning"]), {})
             joint, point, value, limit = (worst.get(key) for key in ("joint", "point", "value", "limit"))
@@ -266,7 +266,7 @@ class Check:
 
 
 class Plan(Samples):
-    """A motion that was planned: it is within the limits, and passed the check. Its samples are what is commanded, with the torques."""
+    """A planned motion, within the limits and checked. Its samples are the commanded values, with the torques."""
 
     def __init__(self, native: _native.Plan) -> None:
         super().__init__(native.samples())
@@ -274,32 +274,32 @@ class Plan(Samples):
 
     @property
     def trajectory(self) -> Trajectory:
-        """What `Robot.run` runs."""
+        """Trajectory for `Robot.run`."""
         return self._plan.trajectory
 
     @property
     def duration(self) -> float:
-        """s."""
+        """Duration of the motion, s."""
         return self.trajectory.duration
 
     @property
     def waypoint_times(self) -> Array:
-        """When the motion is nearest to each waypoint, s: (W,)."""
+        """Times at which the motion is nearest to each waypoint (W,), s."""
         return self._plan.waypoint_times
 
     @property
     def binding(self) -> list[dict[str, Any]]:
-        """Which limit of which joint is used up from when to when: ``from_s``, ``to_s``, ``joint``, ``limit``."""
+        """Time spans in which a joint is at a limit: ``from_s``, ``to_s``, ``joint``, ``limit``."""
         return self._plan.binding()
 
     @property
     def notes(self) -> list[str]:
-        """What was changed for the check, and which waypoints rounded corners miss."""
+        """Changes that were made for the check, and waypoints that rounded corners miss."""
         return self._plan.notes
 
     @property
     def check(self) -> Check:
-        """What the check found."""
+        """Result of the check."""
         return Check(self._plan.check())
 
     def __repr__(self) -> str:
@@ -307,7 +307,7 @@ class Plan(Samples):
 
 
 class FlightLog(Samples):
-    """Every tick of the last seconds before the first error, read from the controller and run again by the same program."""
+    """Every tick of the last seconds before the first error, read from the controller and replayed with the same control code."""
 
     def __init__(self, native: _native.FlightLog) -> None:
         super().__init__(native.samples())
@@ -315,12 +315,12 @@ class FlightLog(Samples):
 
     @property
     def story(self) -> list[str]:
-        """What happened in words, what broke first in front."""
+        """Timeline in words, beginning with the first failure."""
         return self._log.story
 
     @property
     def replayed(self) -> tuple[int, int]:
-        """Ticks in the log, and those for which the replay gave the same bits."""
+        """Number of ticks in the log, and number of ticks that the replay reproduced bit for bit."""
         return self._log.replayed
 
     @property
@@ -329,7 +329,7 @@ class FlightLog(Samples):
         return self._log.state
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Writes an MCAP recording that holds the log itself, too: ``jtc log replay`` reads it."""
+        """Writes an MCAP recording that also contains the log itself; ``jtc log replay`` reads it."""
         self._log.save(path, overwrite)
         return Path(path)
 

@@ -1,4 +1,4 @@
-"""One controller, real or simulated: motions, jogging, teaching."""
+"""Motions, jogging and teaching with a real or simulated controller."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 
 
 class Robot(Connected):
-    """A connection to one controller. Made by `connect`; a context manager that stops what it moves when it ends.
+    """Connection to one controller, made by `connect`. As a context manager it stops its own motions when the block ends.
 
-    Methods may be called from several threads: `status`, `pause`, `resume`, `stop` and `speed` act at once on a motion that another thread
-    runs, where one that is still being uploaded is paused as it begins; everything else waits until the motion is over. What was asked for
-    before a `stop` and waits for its turn is not done any more: it raises `FaultError` with the code ``cancelled``.
+    Methods may be called from several threads. `status`, `pause`, `resume`, `stop` and `speed` act at once on a motion that another thread
+    runs; a motion that is still being uploaded is paused when it begins. All other methods wait until the motion is over. A request that
+    still waits when `stop` is called is discarded and raises `FaultError` with the code ``cancelled``.
 
-    Ctrl-C in the main thread stops the arm on its path, and is raised once it stands, wherever a method of this package waits. Where Python
-    itself waits (``time.sleep``, ``thread.join``, the prompt of an interpreter) after `start`, Ctrl-C raises `KeyboardInterrupt` alone: the
-    arm is stopped then by the end of the ``with`` block or of the program, and at a prompt by ``robot.stop()``.
+    While a method of this package waits in the main thread, Ctrl-C stops the arm on its path and is raised when the arm is at rest. While
+    Python itself waits (``time.sleep``, ``thread.join``, the interpreter's prompt) after `start`, Ctrl-C only raises `KeyboardInterrupt`.
+    The end of the ``with`` block or of the program then stops the arm; at a prompt, call ``robot.stop()``.
     """
 
     def plan(
@@ -50,8 +50,8 @@ class Robot(Connected):
     ) -> Plan:
         """Plans a motion of the controller's arm with its payload; nothing moves.
 
-        Arguments are those of `Planner` and `Planner.through`. `speed` is 100 % of what the limits allow, also on a real arm: `run` and its
-        `speed` decide how fast the plan is run.
+        The arguments are described at `Planner` and `Planner.through`. `speed` is 100 % of the limits by default, also on a real arm;
+        the `speed` of `run` decides how fast the plan is executed.
         """
         mass, com, inertia = self._link.payload() if self.info else (0.0, [0.0] * 3, [0.0] * 6)
         payload = Payload(mass, tuple(com), tuple(inertia)) if mass else None
@@ -70,9 +70,9 @@ class Robot(Connected):
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
-            start: Where the arm is to stand (6,), rad; None: where it stands now, which every joint has to report.
-            degrees: Whether the numbers of a file are degrees.
-            accept_device_limits: The controller's limits differ from the arm's, and are safe for it.
+            start: Start position (6,), rad; None: the present position, which every joint must report.
+            degrees: True if the numbers of a file are degrees.
+            accept_device_limits: Accepts controller limits that differ from the arm's, because they are safe for the arm.
         """
         trajectory, _ = self._trajectory(trajectory, degrees)
         return Check(self._link.check(trajectory, start, accept_device_limits))
@@ -99,9 +99,9 @@ class Robot(Connected):
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Motion:
-        """Begins what `run` does, and returns at once. **The arm moves.**
+        """Begins a motion like `run`, and returns at once. **The arm moves.**
 
-        A file is read before that, with the names of the controller's arm, for which a motion on its way is waited for.
+        A file is read first, with the names of the controller's arm. Reading these names waits for a running motion.
         """
         return self._start(
             self._link.asked(),
@@ -128,7 +128,7 @@ class Robot(Connected):
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Motion:
-        # Asked for so many Stops ago: what is found out before it begins may take its time.
+        # `asked` is the number of Stops at the time of the request. Reading the file may take a while, and a Stop can come meanwhile.
         trajectory, name = self._trajectory(trajectory, degrees)
         options = options_of(asked, name, approach, speed, repeat, record, overwrite, accept_device_limits)
         return Motion(self._link.run(trajectory, options), self, asked)
@@ -150,24 +150,24 @@ class Robot(Connected):
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
-            approach: Whether an arm that stands elsewhere is moved to the first point: at `speed` percent of the limits, 50 at most; without
-                `speed` at 10 %, and at 25 % where the controller is a simulator.
+            approach: Moves the arm to the first point if it is elsewhere, at `speed` percent of the limits, 50 at most. Without `speed`
+                at 10 %, or at 25 % on a simulator.
             speed: Percent of the trajectory's own speed, 1 to 100; None: 100.
-            repeat: How often it is run, 1 or more.
-            record: A recording that is written while the arm moves, MCAP or CSV by the ending.
-            overwrite: Whether a recording that is there is replaced, once the new one is whole.
-            degrees: Whether the numbers of a file are degrees.
-            accept_device_limits: The controller's limits differ from the arm's, and are safe for it.
-            progress: Whether a bar is drawn on standard error; None: at a terminal.
+            repeat: Number of executions, 1 or more.
+            record: Path of a recording that is written while the arm moves, MCAP or CSV by the file ending.
+            overwrite: Replaces an existing recording after the new one is complete.
+            degrees: True if the numbers of a file are degrees.
+            accept_device_limits: Accepts controller limits that differ from the arm's, because they are safe for the arm.
+            progress: Draws a progress bar on standard error; None: only at a terminal.
 
         Returns:
-            What was seen: outcome, figures, samples.
+            The run: outcome, figures, samples.
 
         Raises:
-            RefusedError: The check refuses it: joint, point, value and limit are in the error; nothing was sent.
-            StoppedError: Somebody stopped it on its way; ``run`` of the error is what was seen until then.
-            FaultError, DeviceError, NoLinkError: It ended in an error; the message says whether the arm may be moving, and ``run`` of the
-                error is what was seen until then.
+            RefusedError: The check refused the trajectory; the error has joint, point, value and limit. No frame was sent.
+            StoppedError: The motion was stopped; ``run`` of the error has the samples until then.
+            FaultError, DeviceError, NoLinkError: The motion ended in an error. The message says whether the arm may be moving, and ``run``
+                of the error has the samples until then.
         """
         begin = functools.partial(
             self.start,
@@ -183,20 +183,23 @@ class Robot(Connected):
         return followed(self, begin, progress)
 
     async def run_async(self, trajectory: Trajectory | Plan | FilePath, **options: Any) -> Run:
-        """As `run`, for asyncio; whatever ends the task before, stops the arm, and is raised once it stands. Options are those of `start`."""
+        """Runs a trajectory like `run`, for asyncio. Takes the options of `start`.
+
+        An exception that ends the task early, such as a cancellation, stops the arm and is raised when the arm is at rest.
+        """
         asked = self._link.asked()
         loop = asyncio.get_running_loop()
         motion: Motion | None = None
         try:
-            # A file is read, and the controller asked, where nothing else waits for it.
+            # Reads the file and queries the controller in an executor, so that the event loop never waits.
             motion = await loop.run_in_executor(None, functools.partial(self._start, asked, trajectory, **options))
             while not motion.is_done:
                 await asyncio.sleep(0.02)
         except BaseException as error:
             if motion is not None or not isinstance(error, Exception):
-                # At once: what is about to begin in the executor was asked for before.
+                # Stops at once, so that a motion that is about to begin in the executor is discarded: its request is older.
                 self._link.halt()
-                # A coroutine that is thrown away may not wait any more.
+                # A closed coroutine must not wait.
                 if not isinstance(error, GeneratorExit):
                     await asyncio.shield(loop.run_in_executor(None, self._link.rest))
             raise
@@ -216,25 +219,25 @@ class Robot(Connected):
         progress: bool | None = None,
         margin: float | None = None,
     ) -> Run:
-        """Moves the arm from where it stands to a place, and waits for its end. **The arm moves.** Ctrl-C stops it on its path.
+        """Moves the arm from its present position to a target, and waits until it is there. **The arm moves.** Ctrl-C stops it on its path.
 
         Args:
             to: Joint positions (6,), rad, or the name of a pose of the arm.
-            flange: In its place x, y, z (m) and roll, pitch, yaw (rad) of the flange in the base frame.
-            line: Whether the flange keeps to a straight line; else the joints do.
-            speed: Percent of what the limits allow, 1 to 100; None: 10, and 25 where the controller is a simulator. `Run.notes` says which.
-            degrees: Whether angles are degrees.
-            record, overwrite, accept_device_limits, progress: As of `run`.
+            flange: Flange pose instead of `to`: x, y, z (m) and roll, pitch, yaw (rad) in the base frame.
+            line: Moves the flange along a straight line; otherwise the path is straight in joint space.
+            speed: Percent of the limits, 1 to 100; None: 10, or 25 on a simulator. `Run.notes` has the speed that was used.
+            degrees: True if angles are degrees.
+            record, overwrite, accept_device_limits, progress: See `run`.
             margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
 
         Raises:
-            UsageError: A margin out of range.
-            RefusedError: The place is outside the limits, cannot be reached, or no torque holds it; nothing was sent.
-            StoppedError: Somebody stopped it on its way; ``run`` of the error is what was seen until then.
+            UsageError: The margin is out of range.
+            RefusedError: The target is outside the limits, cannot be reached, or no torque holds it. No frame was sent.
+            StoppedError: The motion was stopped; ``run`` of the error has the samples until then.
         """
         if (to is None) == (flange is None):
             raise UsageError("give either a place or `flange`; nothing was sent", "target")
-        # Before anything that takes time: a Stop meanwhile counts.
+        # Read before anything that takes time, so that a Stop in the meantime cancels the motion.
         asked = self._link.asked()
         name = f"move to {to if isinstance(to, str) else 'a place'}"
         options = options_of(asked, name, False, speed, 1, record, overwrite, accept_device_limits)
@@ -251,22 +254,27 @@ class Robot(Connected):
         return followed(self, begin, progress)
 
     def pause(self) -> None:
-        """Pauses on the path. Where several motions wait for their turn, and the first one ends by then, the next one is paused as it begins."""
+        """Pauses the motion on its path.
+
+        If the motion ends before the pause acts and another motion waits, that motion is paused when it begins.
+        """
         self._link.pause()
 
     def resume(self) -> None:
-        """Goes on after a pause, also one that another program or the controller has made. **The arm moves.** A motion that nobody waits for here
-        any more is stopped by the end of the connection."""
+        """Resumes after a pause, also after a pause by another program or by the controller. **The arm moves.**
+
+        The end of the connection stops a motion that no thread of this program waits for any more.
+        """
         self._link.resume()
 
     def stop(self) -> None:
-        """Stops the arm on its path, whoever moves it, and waits until it stands; what was asked for before, in whatever thread, is not done any
-        more. Teaching that was switched on here ends.
+        """Stops the arm on its path and waits until it is at rest, also if another program moves it.
 
-        The Stop is sent before anything else, whatever the connection is busy with. That nothing moves is no error.
+        Earlier requests of all threads of this program are discarded. Teaching that was switched on here ends. The Stop is sent before
+        all other frames. Stopping an arm that is already at rest is not an error.
 
         Raises:
-            NoLinkError: Nothing confirms it; the message says whether the arm may be moving.
+            NoLinkError: No status confirms the Stop; the message says whether the arm may be moving.
         """
         try:
             self._link.stop()
@@ -275,9 +283,9 @@ class Robot(Connected):
 
     @property
     def speed(self) -> float:
-        """Speed on the path, 0.05 to 1 of the motion's own; may be set while the arm moves.
+        """Speed on the path, 0.05 to 1 of the motion's own speed; may be set while the arm moves.
 
-        The controller keeps it, also for later motions and connections; `Run.notes` says where a motion ran at another one than 1.
+        The controller keeps this speed for later motions and connections. `Run.notes` reports a motion that ran at a speed other than 1.
         """
         return self._link.speed()
 
@@ -286,19 +294,19 @@ class Robot(Connected):
         self._link.set_speed(speed)
 
     def jog(self, velocity: ArrayLike, seconds: float, *, joint: int | None = None, degrees: bool = False) -> Array:
-        """Jogs for some time, then waits until the arm rests. **The arm moves.**
+        """Jogs for a time, then waits until the arm is at rest. **The arm moves.**
 
         Args:
-            velocity: rad/s of all joints (6,), or of `joint` alone.
-            seconds: For how long, up to 600.
+            velocity: Velocities of all joints (6,), rad/s, or of `joint` alone.
+            seconds: Duration, s, up to 600.
             joint: The joint, counted from 1.
-            degrees: Whether velocities are degrees/s.
+            degrees: True if velocities are degrees/s.
 
         Returns:
-            Where the arm rests (6,), rad.
+            Joint positions at rest (6,), rad.
 
         Raises:
-            StoppedError: Somebody stopped the arm meanwhile; it rests.
+            StoppedError: The arm was stopped during the jog; it is at rest.
         """
         rate = np.asarray(velocity, dtype=float)
         if joint is not None:
@@ -311,7 +319,7 @@ class Robot(Connected):
 
     @contextlib.contextmanager
     def teach(self) -> Iterator[Teaching]:
-        """The arm can be led by hand while the context lasts, and is held again at its end, or as soon as somebody stops it here."""
+        """Lets the arm be led by hand inside the context. The arm is held again when the context ends or after a Stop of this program."""
         try:
             self._link.teach(True)
             yield Teaching(self._link)
@@ -320,5 +328,5 @@ class Robot(Connected):
                 self._link.teach(False)
 
     def gripper(self, on: bool) -> None:
-        """Pump on or off."""
+        """Switches the gripper's pump on or off."""
         self._link.gripper(on)

@@ -1,6 +1,6 @@
-"""The simulated arm: with the real controller (:class:`Simulator`), or for a controller of your own (:class:`Plant`).
+"""The simulated arm, with the real controller (:class:`Simulator`) or for your own controller (:class:`Plant`).
 
-Time is virtual: it passes with ``step`` only, many times faster than the clock. The same arguments and calls give the same numbers,
+Time is virtual: only ``step`` advances it, many times faster than real time. The same arguments and calls give the same numbers,
 bit for bit. Arrays are (6,), base to wrist; positions are rad, velocities rad/s, torques N·m, times s.
 
     >>> from openjtc.sim import Plant
@@ -34,13 +34,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModelError:
-    """How far the true arm is from the one that its file describes.
+    """Difference between the true arm and the arm file.
 
     Attributes:
-        mass: Each link's mass, and its inertia with it, times 1 ± up to this, 0 to 1, drawn from the seed.
-        friction: Each joint's friction times 1 ± up to this, 0 to 1, drawn from the seed.
-        mass_factors: Factors (7,) of the base's and the six links' masses in place of drawn ones, 0 to 10.
-        friction_factors: Factors (6,) of the six joints' frictions in place of drawn ones, 0 to 10.
+        mass: Largest relative error of each link's mass and inertia, 0 to 1; the errors are drawn from the seed.
+        friction: Largest relative error of each joint's friction, 0 to 1; the errors are drawn from the seed.
+        mass_factors: Factors (7,) of the masses of the base and the six links, 0 to 10, instead of random ones.
+        friction_factors: Factors (6,) of the friction of the six joints, 0 to 10, instead of random ones.
     """
 
     mass: float = 0.10
@@ -50,7 +50,7 @@ class ModelError:
 
 
 def _natural(value: SupportsIndex, what: str) -> int:
-    """A whole number that is not below 0, and fits into 64 bits."""
+    """Returns a whole number within 0 to 2^64-1, else raises `UsageError`."""
     number = operator.index(value)
     if not 0 <= number < 1 << 64:
         raise UsageError(f"{what}: {number} is not within 0..2^64-1", "usage")
@@ -58,7 +58,7 @@ def _natural(value: SupportsIndex, what: str) -> int:
 
 
 def _floats(value: ArrayLike, count: int, what: str) -> list[float]:
-    """So many numbers."""
+    """Returns `count` numbers as floats, else raises `UsageError`."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape != (count,):
         raise UsageError(f"{what}: has the shape {array.shape}, not ({count},)", "usage")
@@ -66,7 +66,7 @@ def _floats(value: ArrayLike, count: int, what: str) -> list[float]:
 
 
 def _plain(value: object) -> object:
-    """A number of numpy as one of Python."""
+    """Converts a numpy value to a Python value."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
@@ -75,7 +75,7 @@ def _plain(value: object) -> object:
 
 
 def _of_joints(value: ArrayLike | None, what: str) -> list[float] | None:
-    """A number for all joints, or one for each."""
+    """Returns six numbers, from one number for all joints or one for each."""
     if value is None:
         return None
     return _floats(np.full(6, value) if np.ndim(value) == 0 else value, 6, what)
@@ -113,25 +113,27 @@ def _arm(
 
 
 class Simulator:
-    """Host line, the real controller, joint bus, drives and arm. All power was just switched on.
+    """Simulated system of host line, real controller, joint bus, drives and arm, starting at power-on.
 
     Args:
-        arm: The arm, which the controller has stored, where its file gives all of it. None: the built-in one, and a controller as new.
-        seed: Of all that is drawn by chance.
-        payload: What the arm really carries. The controller does not know of it until it is given (:func:`openjtc.control.encode.payload`).
-        model_error: How far the true arm is from its file; None: not at all.
-        start: Positions at the start; 0 where the joint gets there.
-        friction: Joints have the friction of the arm's file.
-        gear_stiffness: Of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the motor.
+        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a controller as new.
+        seed: Seed of all random numbers.
+        payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload` sends it.
+        model_error: Difference between the true arm and its file; None: no difference.
+        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
+        friction: Gives the joints the friction of the arm's file.
+        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
+            motor.
         over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
-        support: What holds the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they first are, or ``"none"``.
+        support: Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or
+            ``"none"``.
         baud: Rate of the serial line, bit/s; None: bytes take no time.
-        answer_jitter_ms: Answers of the drives are late by up to so many milliseconds.
-        faults: What goes wrong and when, as the text of a fault file (``jtc help faults``).
-        watch: Keep what goes into the controller and comes out of it, for :attr:`inputs` and :attr:`outputs`.
+        answer_jitter_ms: Largest random delay of the drives' answers, ms.
+        faults: Faults and their times, as the text of a fault file (``jtc help faults``).
+        watch: Keeps the inputs and outputs of the controller for :attr:`inputs` and :attr:`outputs`.
 
     Raises:
-        UsageError: An argument that there cannot be.
+        UsageError: An argument is not valid.
     """
 
     def __init__(
@@ -159,10 +161,10 @@ class Simulator:
         self._status: Status | None = None
 
     def step(self, ms: int = 1) -> None:
-        """Milliseconds pass; Ctrl-C ends it after each second of them.
+        """Advances the simulation by ``ms`` milliseconds. Ctrl-C is checked after each simulated second.
 
         Raises:
-            UsageError: Less than none.
+            UsageError: ``ms`` is negative.
         """
         self._native.step(_natural(ms, "ms"))
 
@@ -173,42 +175,42 @@ class Simulator:
 
     @property
     def position(self) -> Floats:
-        """Where the arm really is, rad."""
+        """True positions of the joints, rad."""
         return self._native.truth("position")
 
     @property
     def velocity(self) -> Floats:
-        """How fast it really is, rad/s."""
+        """True velocities of the joints, rad/s."""
         return self._native.truth("velocity")
 
     @property
     def torque(self) -> Floats:
-        """What the drives really give, N·m."""
+        """True torques of the drives, N·m."""
         return self._native.truth("torque")
 
     @property
     def outside_torque(self) -> Floats:
-        """What pushes, hands and walls do to the joints, N·m."""
+        """External torques of pushes, hands and walls at the joints, N·m."""
         return self._native.truth("outside")
 
     @property
     def temperature(self) -> Floats:
-        """Of the bearings, °C."""
+        """Temperatures of the bearings, °C."""
         return self._native.truth("temperature")
 
     @property
     def telemetry(self) -> Telemetry:
-        """What the controller's last tick computed."""
+        """Values that the controller computed in its last tick."""
         return self._native.telemetry
 
     @property
     def inputs(self) -> Inputs:
-        """What the controller was given in the last millisecond: :meth:`openjtc.control.Controller.tick` takes it. Needs ``watch=True``."""
+        """Inputs of the controller in the last millisecond, for :meth:`openjtc.control.Controller.tick`. Needs ``watch=True``."""
         return Inputs(*self._exchange()[0])
 
     @property
     def outputs(self) -> Outputs:
-        """What came out of it; where the tick did not come, nothing but the level of the safety output. Needs ``watch=True``."""
+        """Outputs of the controller in the last millisecond; for a missing tick only the safety output. Needs ``watch=True``."""
         return Outputs(*self._exchange()[1], self._native.telemetry)
 
     def _exchange(
@@ -220,16 +222,16 @@ class Simulator:
         return exchange
 
     def write(self, data: bytes) -> None:
-        """The host sends bytes; they reach the controller at the rate of the line."""
+        """Sends bytes from the host; they reach the controller at the rate of the line."""
         self._native.write(data)
 
     def read(self) -> bytes:
-        """Bytes that have reached the host since the last call. :meth:`command` takes them, too."""
+        """Returns the bytes that have reached the host since the last call. :meth:`command` consumes them, too."""
         return self._native.read()
 
     @property
     def status(self) -> Status | None:
-        """The newest status that reached the host; it takes what :meth:`read` would return."""
+        """Newest status that reached the host. Reading it consumes the bytes that :meth:`read` would return."""
         self._responses()
         return self._status
 
@@ -240,15 +242,15 @@ class Simulator:
         return [status for status in statuses if status.response is not None]
 
     def command(self, *frames: bytes, limit: float = 10.0) -> None:
-        """Sends frames one after the other, and steps until the controller has answered each.
+        """Sends frames one after the other, and steps until the controller has answered each frame.
 
         Args:
-            frames: As :mod:`openjtc.control.encode` makes them.
+            frames: Frames of :mod:`openjtc.control.encode`.
             limit: Longest time for a frame, s.
 
         Raises:
-            DeviceError: The controller did not accept one.
-            NoLinkError: It did not answer one within the limit.
+            DeviceError: The controller did not accept a frame.
+            NoLinkError: The controller did not answer a frame within the limit.
         """
         for frame in frames:
             self.write(frame)
@@ -267,7 +269,7 @@ class Simulator:
         """Steps until the controller is in a state, such as ``"HoldPos"``.
 
         Raises:
-            FaultError: It was not within the limit (s).
+            FaultError: The controller did not reach the state within ``limit`` (s).
         """
         until = self.time + limit
         while self.telemetry.state != state:
@@ -280,14 +282,14 @@ class Simulator:
             self.step()
 
     def bring_up(self, arm: Arm | None = None) -> None:
-        """Gives the controller its parameters, and steps until it holds the arm with every drive enabled.
+        """Sends the parameters to the controller, and steps until it holds the arm with every drive enabled.
 
         Args:
-            arm: With the parameters of this arm; None: with those that it has stored or built in.
+            arm: Arm with the parameters; None: the stored or built-in parameters of the controller.
 
         Raises:
-            DeviceError: The controller did not accept them.
-            FaultError: It does not hold the arm after 20 s.
+            DeviceError: The controller did not accept the parameters.
+            FaultError: The controller does not hold the arm after 20 s.
         """
         self.command(*(encode.use_defaults() if arm is None else encode.parameters(arm)))
         self.wait("HoldPos")
@@ -299,63 +301,63 @@ class Simulator:
             self.step()
 
     def inject(self, fault: Mapping[str, object]) -> None:
-        """One more fault, with the keys of a fault file (``jtc help faults``): ``{"kind": "encoder-jump", "joint": 3, "rad": 0.1}``.
+        """Adds a fault, with the keys of a fault file (``jtc help faults``): ``{"kind": "encoder-jump", "joint": 3, "rad": 0.1}``.
 
-        Without ``at_s``, ``in_state`` or ``at_point`` it begins now; ``at_s`` counts from the start.
+        Without ``at_s``, ``in_state`` or ``at_point`` the fault begins now; ``at_s`` counts from the start.
 
         Raises:
-            UsageError: There is no such fault.
+            UsageError: The fault is not valid.
         """
         entry = dict(fault)
         if not {"at_s", "in_state", "at_point"} & entry.keys():
             entry["at_s"] = self.time
-        # Keys and values of TOML: strings and numbers are those of JSON.
+        # Strings and numbers are written alike in TOML and JSON.
         lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False, default=_plain)}" for key, value in entry.items())
         self._native.inject(f"format = 2\n[[fault]]\n{lines}\n")
 
     def push(self, joint: int, torque: float, seconds: float) -> None:
-        """Someone pushes a joint (from 1) with a torque (N·m), from now on."""
+        """Pushes a joint (from 1) with a torque (N·m) for ``seconds`` (s), from now on."""
         self.inject({"kind": "push", "joint": joint, "torque_nm": float(torque), "for_s": float(seconds)})
 
     def lead(self, path: ArrayLike, step: float = 0.01) -> None:
-        """A hand leads the arm along a path (N, 6), rad, ``step`` seconds from row to row, as soon as it is taught."""
+        """Leads the arm by hand along a path (N, 6), rad, with ``step`` seconds from row to row, as soon as teaching begins."""
         self._native.lead(path, step)
 
     def set_safety_input(self, level: bool) -> None:
-        """Level of the controller's safety input; True is no error."""
+        """Sets the level of the controller's safety input; True means no error."""
         self._native.set_safety_input(level)
 
     @property
     def safety_output(self) -> bool:
-        """Level of the controller's safety output; True is no error."""
+        """Level of the controller's safety output; True means no error."""
         return self._native.safety_output
 
     @property
     def bus_frames(self) -> list[Frame]:
-        """All frames on the joint bus in the last millisecond, in their order."""
+        """All frames on the joint bus in the last millisecond, in order."""
         return self._native.bus_frames()
 
     @property
     def events(self) -> list[tuple[float, str]]:
-        """What happened, oldest first: time in s, and words."""
+        """Events, oldest first: time (s) and text."""
         return self._native.events()
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Counted since the start: bytes, frames, resets, and the load of the joint bus."""
+        """Counts since the start: bytes, frames, resets, and the load of the joint bus."""
         return self._native.statistics()
 
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """What a controller has to go by. Arrays are (6,).
+    """Measurements for a controller. Arrays are (6,).
 
     Attributes:
-        time: s since the start.
-        position: rad, as the drives read it 2 ms before a torque that is computed from it acts: in steps of 0.1 mrad.
-        velocity: rad/s, a mean over 10 ms.
-        temperature: Of the bearings, °C.
-        enabled: The drive carries its joint. One that has tripped lets its brake hold it.
+        time: Time since the start, s.
+        position: Positions read by the drives, rad, in steps of 0.1 mrad; a torque computed from them acts 2 ms after the reading.
+        velocity: Velocities, rad/s, a mean over 10 ms.
+        temperature: Temperatures of the bearings, °C.
+        enabled: True if the drive carries its joint. After a trip the brake holds the joint.
         errors: Error bits of the drives.
     """
 
@@ -368,29 +370,30 @@ class PlantState:
 
     @property
     def faulted(self) -> bool:
-        """A drive has tripped: the arm stands until :meth:`Plant.reset`."""
+        """True if a drive has tripped; the arm then stays at rest until :meth:`Plant.reset`."""
         return not all(self.enabled)
 
 
 class Plant:
-    """Arm and drives without a controller: each millisecond a torque goes in and a measurement comes out.
+    """Arm and drives without a controller: each millisecond takes a torque and returns a measurement.
 
-    It is the plant of :class:`Simulator`: the same bodies, friction and stops, the same drives with their encoders, over-speed trip,
+    This is the plant of :class:`Simulator`: the same bodies, friction and stops, the same drives with their encoders, over-speed trip,
     working area and torque limit, and the same delay over the joint bus. The drives are enabled; brakes hold an arm whose drives trip.
 
     Args:
         arm: The arm; None: the built-in one.
-        seed: Of all that is drawn by chance: with the same ``model_error`` the true arm is that of a :class:`Simulator` of this seed.
-        payload: What it carries.
-        model_error: How far the true arm is from its file; None: not at all.
-        start: Positions at the start; 0 where the joint gets there.
-        friction: Joints have the friction of the arm's file; False: none.
-        gear_stiffness: Of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the motor.
+        seed: Seed of all random numbers. With the same ``model_error`` and seed, the true arm is the same as in a :class:`Simulator`.
+        payload: Payload of the arm.
+        model_error: Difference between the true arm and its file; None: no difference.
+        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
+        friction: Gives the joints the friction of the arm's file; False: no friction.
+        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
+            motor.
         over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
-        drives: False: the arm alone. Torques act at once, states are exact, and nothing trips.
+        drives: False: the arm alone. Torques act at once, states are exact, and no drive trips.
 
     Raises:
-        UsageError: An argument that there cannot be.
+        UsageError: An argument is not valid.
     """
 
     def __init__(
@@ -410,26 +413,26 @@ class Plant:
         self._native = _native.Plant(simulated, drives=drives)
 
     def step(self, torque: ArrayLike, ms: int = 1) -> PlantState:
-        """Milliseconds under torques (6,), N·m. The drives round them to 0.011 N·m and reach :attr:`torque_max` at most.
+        """Applies torques (6,), N·m, for ``ms`` milliseconds. The drives round them to 0.011 N·m and limit them to :attr:`torque_max`.
 
         Raises:
-            UsageError: Not six finite numbers, or less than no milliseconds.
+            UsageError: The torques are not six finite numbers, or ``ms`` is negative.
         """
         self._native.step(torque, _natural(ms, "ms"))
         return self.state
 
     def reset(self, position: ArrayLike) -> PlantState:
-        """The same arm, cold and at rest at these positions (6,), its drives enabled, at time 0.
+        """Restarts the arm at time 0: cold and at rest at these positions (6,), rad, with its drives enabled.
 
         Raises:
-            UsageError: A position beyond an end stop.
+            UsageError: A position is beyond an end stop.
         """
         self._native.reset(position)
         return self.state
 
     @property
     def state(self) -> PlantState:
-        """What was measured last."""
+        """Last measurement."""
         native = self._native
         return PlantState(
             native.time_ms / 1000, native.position, native.velocity, native.temperature, native.enabled, native.errors
@@ -442,20 +445,20 @@ class Plant:
 
     @property
     def true_position(self) -> Floats:
-        """Where the arm really is, rad."""
+        """True positions of the joints, rad."""
         return self._native.truth("position")
 
     @property
     def true_velocity(self) -> Floats:
-        """How fast it really is, rad/s."""
+        """True velocities of the joints, rad/s."""
         return self._native.truth("velocity")
 
     @property
     def true_torque(self) -> Floats:
-        """What the drives really give, N·m."""
+        """True torques of the drives, N·m."""
         return self._native.truth("torque")
 
     @property
     def torque_max(self) -> Floats:
-        """What the drives reach, N·m."""
+        """Largest torques of the drives, N·m."""
         return self._native.torque_max

@@ -1,4 +1,4 @@
-"""What a controller reports, and what a look at it finds."""
+"""Status of a controller, and findings of its diagnosis."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HeldStop:
-    """Why the controller holds the arm.
+    """Cause of a held stop.
 
     Attributes:
         kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …
-        number: Number of the kind, as Modbus has it.
+        number: Number of the kind, as in Modbus.
         code: Name of its page: ``jtc explain CODE``.
-        joint: Joint from 1 that the cause was found at first; None: at none in particular.
-        value: Value that was found; None where the kind has none.
-        limit: Limit of the value; None where there is none.
-        unit: Unit of value and limit; empty where they have none.
+        joint: Joint (from 1) at which the cause was found first; None: at no particular joint.
+        value: Value that was found; None if the kind has no value.
+        limit: Limit of the value; None if the kind has no limit.
+        unit: Unit of value and limit; empty if they have no unit.
         text: Cause in words.
-        remedy: What removes the cause.
+        remedy: Step that removes the cause.
         ago_s: Time since the held stop began, s.
     """
 
@@ -43,22 +43,22 @@ class HeldStop:
 
 @dataclass(frozen=True)
 class Status:
-    """What the controller reports of itself and the arm. A joint that is silent, or not ready yet, has NaN for what it does not measure.
+    """Status of the controller and the arm. A joint that is silent or not ready has NaN for values that it does not measure.
 
     Attributes:
         state: State of the controller: ``Init``, ``HoldPos``, ``Operate``, ``Teaching``, ``Error`` …
-        trajectory: What becomes of its trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
+        trajectory: State of its trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
         point: Millisecond of the path.
         position: Measured positions (6,), rad.
         velocity: Measured velocities (6,), rad/s.
         torque: Torques that the drives report (6,), N·m.
         temperature: Bearing temperatures (6,), °C.
         joint_states: State of each drive.
-        errors: What is wrong now, in words.
-        warnings: What the drives warn of.
-        waiting_for: What the controller does or waits for, in a line.
-        next: What helps, or comes next.
-        held_stop: The held stop that the arm is in, with its cause; None: it is in none, or the controller does not tell.
+        errors: Present errors, in words.
+        warnings: Warnings of the drives.
+        waiting_for: Present action or wait of the controller, in one line.
+        next: Next step that helps.
+        held_stop: Present held stop with its cause; None: the arm is not in a held stop, or the controller does not report it.
     """
 
     state: str
@@ -78,13 +78,13 @@ class Status:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a look at link, bus and set-up found.
+    """Finding about link, bus or set-up.
 
     Attributes:
         severity: ``problem``, ``warning`` or ``good``.
-        what: What was found.
-        why: The likely cause.
-        next: What helps.
+        what: The finding.
+        why: Likely cause.
+        next: Next step that helps.
     """
 
     severity: str

@@ -1,4 +1,4 @@
-//! What moves the arm without a trajectory, and what brings it to rest.
+//! Motion without a trajectory (jogging, teaching), and stopping the arm.
 
 use std::time::Duration;
 
@@ -14,12 +14,12 @@ use super::shared::Asked;
 use super::worker::lock;
 use crate::error::Failure;
 
-/// Longest from a Stop until the arm stands: half a second, or a second where the full torque brakes (J-33).
+/// Longest wait from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
 const STANDSTILL: Duration = Duration::from_secs(5);
-/// From the last sample of a recording of teaching until no teaching is found to go on.
+/// Time after the last sample of a teaching recording at which teaching counts as ended.
 const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
 
-/// Somebody stopped the arm, and whoever waits for what it did learns that.
+/// Returns the error for a caller whose action was ended by a Stop.
 pub fn stopped(what: &str) -> Failure {
     Failure::fault(
         "stopped",
@@ -29,13 +29,13 @@ pub fn stopped(what: &str) -> Failure {
 }
 
 impl Machine {
-    /// Stops whatever moves and waits until it stands; that nothing does is no error. Who stops an arm wants it held: teaching ends, whoever has
-    /// switched it on.
+    /// Stops the arm and waits for standstill; an arm at rest is not an error. Teaching ends, also if another program switched it on,
+    /// because the caller wants the arm to be held.
     pub fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // Before anything is asked: a line that returns nothing may still carry it.
+        // The Stop goes out before any query: a line that returns no bytes may still carry it.
         let stopped = match self.session.stop() {
-            // There is nothing to stop.
+            // The arm has no motion to stop.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
             done => done,
         };
@@ -58,12 +58,12 @@ impl Machine {
         held
     }
 
-    /// The same of what moves here, and of nothing else.
+    /// Like [`Self::stop`], but only for motion and teaching of this connection.
     pub fn rest(&mut self) -> Result<(), Failure> {
         if self.shared.moves() { self.stop() } else { self.hold() }
     }
 
-    /// Ends the teaching that was switched on here.
+    /// Ends the teaching of this connection.
     pub fn hold(&mut self) -> Result<(), Failure> {
         if self.teaching {
             self.session.teach(false)?;
@@ -72,18 +72,18 @@ impl Machine {
         Ok(())
     }
 
-    /// Something here broke: a last Stop, for which nothing is waited.
+    /// Sends a last Stop after a panic, without waiting for an answer.
     pub fn abandon(&mut self) {
         let port = self.session.port_mut();
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // What cannot be sent is not sent: there is nobody to report it to.
+            // A frame that cannot be sent is dropped: no caller is left to report to.
             let _ = port.write_all(frame);
         }
     }
 
-    /// What was begun here has ended, as far as statuses show it.
+    /// Checks in the statuses if the motion of this connection has ended.
     pub fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;
@@ -94,7 +94,7 @@ impl Machine {
         }
     }
 
-    /// Jogs at these velocities (rad/s) for this time, then waits until the arm rests; where (rad).
+    /// Jogs at these velocities (rad/s) for this time, then waits for rest. Returns the position at rest (rad).
     pub fn jog(
         &mut self,
         velocity: &[f64; JOINTS],
@@ -106,7 +106,7 @@ impl Machine {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
+        // Brings the arm to rest at once in any case, without waiting for the controller's jog timeout.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);
@@ -116,7 +116,7 @@ impl Machine {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
-            // A held stop is the reason for which a jog was refused.
+            // A held stop is the reason why a jog was refused.
             Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }
@@ -124,12 +124,12 @@ impl Machine {
         Ok(rested?.ok_or_else(still)?.positions())
     }
 
-    /// The arm can be led by hand from now on.
+    /// Starts teaching: the arm can be led by hand.
     pub fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.same_arm()?;
         self.session.ask_to_move()?;
         let before = self.teaching;
-        // Whatever comes of it, the end of the connection ends it, too.
+        // Set before the attempt, so that the end of the connection ends teaching in any case.
         self.teaching = true;
         let begun = self.session.teach_until(|| asked.is_halted());
         if let Err(Error::Link(
@@ -141,7 +141,7 @@ impl Machine {
         Ok(begun?)
     }
 
-    /// Records where the arm is led by hand, for this time, or until somebody stops it.
+    /// Records the positions of the hand-led arm for this time, or until a Stop.
     pub fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
         let start = self.session.now();
         let mut last = start;

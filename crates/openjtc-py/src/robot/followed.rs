@@ -1,4 +1,4 @@
-//! A motion on its way, as Python's threads wait for it.
+//! Running motion, as a handle that Python's threads wait for.
 
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
@@ -14,16 +14,16 @@ use crate::error::Failure;
 use crate::number;
 use crate::run::Samples;
 
-/// How often, and how many times, is looked whether another thread has got the result.
+/// Interval and number of the checks if another thread has received the result.
 const LOOK: Duration = Duration::from_millis(2);
 const LOOKS: u32 = 50;
 
 /// Samples, and the error that ended the run.
 type Came = (Py<Samples>, Option<Py<PyAny>>);
-/// The same, or the error that it did not begin for.
+/// Samples and error, or the error that kept the motion from starting.
 type Over = Result<Came, Py<PyAny>>;
 
-/// A motion that was begun.
+/// A motion that was started.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Motion {
     link: Py<Link>,
@@ -33,14 +33,14 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Hands it over to the connection's thread. `asked`: how many halts there had been when it was asked for.
+    /// Hands the motion over to the connection's thread. `asked`: number of halts at the time of the request.
     pub fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
         let worker = &link.get().worker;
         let progress = Arc::clone(&order.progress);
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };
         let pending = Pending::begin(&worker.shared);
         let of_run = Arc::clone(&progress);
-        // Nobody waits for it in vain where it is not begun at all: the guard goes with the job.
+        // The guard moves with the job, so that a job that never starts is not counted as pending.
         let came = worker.ask(asked, move |machine, asked| {
             let _pending = pending;
             let ran = machine.run(&order, asked);
@@ -66,7 +66,8 @@ fn raised(py: Python<'_>, failure: Failure) -> Py<PyAny> {
 
 #[pymethods]
 impl Motion {
-    /// What came of it: the samples, and the error that ended it; `None` when it is not over within this time (s). Each thread that waits gets it.
+    /// Returns the samples and the error that ended the motion; `None` if the motion is not over within this time (s). Every waiting thread
+    /// gets the result.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Came>> {
         let longest = timeout.map(|seconds| number::timeout(seconds, "timeout")).transpose()?;
@@ -86,7 +87,7 @@ impl Motion {
                     Ok((Py::new(py, Samples::of_run(ran))?, error))
                 }
                 Waited::Came(Err(failure)) => Err(raised(py, failure)),
-                // Another thread may have it, and keeps it in a moment.
+                // Another thread has received the result and stores it within a moment.
                 Waited::Gone if looks < LOOKS => {
                     looks += 1;
                     worker.pass(py, LOOK)?;
@@ -99,7 +100,7 @@ impl Motion {
         }
     }
 
-    /// Phase, how far, of how much.
+    /// Returns phase, progress and total.
     fn progress(&self) -> (&'static str, f64, f64) {
         let progress = *lock(&self.progress);
         (progress.phase, progress.done, progress.total)

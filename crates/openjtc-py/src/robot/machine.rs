@@ -1,4 +1,4 @@
-//! What the worker has: the port, the session over it, and the arm that motions are checked against.
+//! State of the worker: the port, the session over it, and the arm that motions are checked against.
 
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -20,22 +20,22 @@ use super::shared::{Asked, Shared};
 use super::tape::Tape;
 use crate::error::Failure;
 
-/// How long a status is waited for while nothing else is to do.
+/// Longest wait for a status while no job waits.
 const IDLE: Duration = Duration::from_millis(10);
-/// A simulator that is behind the clock by more than this goes on from there: nothing is made up for.
+/// Largest lag of a simulator to the clock. A simulator with a larger lag continues from there and does not catch up.
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// A simulated controller with its arm.
 pub struct Simulated {
     pub seed: u64,
-    /// Times real time; `None`: as fast as the computer is, and only while somebody waits for something.
+    /// Speed, times real time; `None`: as fast as possible, and only while a caller waits.
     pub speed: Option<f64>,
     pub faults: FaultPlan,
-    /// On the simulated arm; the controller is not given it.
+    /// Payload of the simulated arm; the controller does not know it.
     pub payload: Payload,
 }
 
-/// What is connected to.
+/// Kind of connection.
 pub enum Way {
     Simulated(Box<Simulated>),
     /// A serial port and its rate, or the agent that owns it.
@@ -49,34 +49,34 @@ pub enum Way {
     },
 }
 
-/// What is connected to, and as whom.
+/// Target and credentials of a connection.
 pub struct Target {
     pub way: Way,
-    /// The arm that was named.
+    /// Arm that the caller gave.
     pub arm: Option<Arc<Arm>>,
-    /// As agents show it to others.
+    /// Name that agents show to other clients.
     pub name: String,
     pub token: Option<String>,
     pub certificates: Option<PathBuf>,
 }
 
-/// What the worker has.
+/// State of the worker.
 pub struct Machine {
     pub session: Session<AnyPort>,
-    /// The arm that was named, else the built-in one; a controller with extensions has its own.
+    /// Arm that the caller gave, else the built-in one; a controller with extensions has its own.
     pub arm: Arc<Arm>,
-    /// It was named.
+    /// `true` if the caller gave an arm.
     pub named: bool,
     pub shared: Arc<Shared>,
     pub tape: Rc<Tape>,
-    /// Real time goes on without us.
+    /// `true` if time passes by itself, as on a real controller.
     time_passes: bool,
-    /// Teaching was switched on here, or may have been.
+    /// `true` if this connection switched teaching on, or may have done so.
     pub teaching: bool,
 }
 
 impl Machine {
-    /// Connects; a simulator is given its parameters and holds its arm.
+    /// Connects. A simulator receives its parameters and holds its arm.
     pub fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
         let arm = target.arm.clone().unwrap_or_else(|| Arc::new(Arm::avena()));
         let (tape, pace) = (Rc::<Tape>::default(), Rc::<Cell<Option<f64>>>::default());
@@ -98,13 +98,13 @@ impl Machine {
             machine.bring_up(stored, asked)?;
             pace.set(speed);
         } else {
-            // Who does not answer is an error here, and not at the first motion.
+            // Reports a silent controller here, not at the first motion.
             machine.session.fresh_status()?;
         }
         Ok(machine)
     }
 
-    /// A simulated controller that holds its arm, as fast as the computer is.
+    /// Brings a simulated controller to a held arm, as fast as possible.
     fn bring_up(&mut self, stored: bool, asked: &Asked) -> Result<(), Failure> {
         let status = self.session.fresh_status()?;
         if status.jtc_init != 0 && stored {
@@ -117,13 +117,12 @@ impl Machine {
         Ok(())
     }
 
-    /// Where the port leads.
+    /// Returns the name of the port.
     pub fn port_name(&self) -> String {
         self.session.port().name()
     }
 
-    /// Something that was asked for begins: frames that move the arm pass as long as nobody stops it. What comes back of a Stop before it is no
-    /// answer to it.
+    /// Begins a job. Frames that move the arm pass until the next Stop. Late answers to an earlier Stop are not taken for this job.
     pub fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.session.port_mut().begin(asked.at());
         if let Some(time) = self.session.port().unsettled() {
@@ -132,12 +131,12 @@ impl Machine {
         Ok(())
     }
 
-    /// Real time goes on without us: statuses come, and are taken.
+    /// Returns `true` if time passes by itself, so that statuses arrive without a job.
     pub fn time_passes(&self) -> bool {
         self.time_passes
     }
 
-    /// Takes what comes while nothing is asked for. A line that is lost is reported by the next thing that is.
+    /// Reads statuses while no job waits. The next job reports a lost line.
     pub fn idle(&mut self) {
         match self.session.poll(IDLE) {
             Ok(_) => {}
@@ -145,19 +144,19 @@ impl Machine {
         }
     }
 
-    /// The arm in the controller, where it can be asked; else the one that was named, or the built-in one.
+    /// Returns the controller's arm. If the controller cannot report it: the arm of the caller, or the built-in one.
     pub fn device_arm(&mut self) -> Result<Arm, Failure> {
         let mut arm = match self.session.info()? {
             None => return Ok((*self.arm).clone()),
             Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
             Some(_) => self.session.device_arm()?,
         };
-        // No controller has poses.
+        // Controllers store no poses.
         arm.poses = self.arm.poses.clone();
         Ok(arm)
     }
 
-    /// The same for what moves the arm: an error where another one was named than the controller has.
+    /// Like [`Self::device_arm`], for motions: returns an error if the caller's arm differs from the controller's.
     pub fn arm_to_move(&mut self) -> Result<Arm, Failure> {
         let arm = self.device_arm()?;
         let differences = if self.named { self.arm.differences(&arm) } else { Vec::new() };
@@ -173,13 +172,13 @@ impl Machine {
         ))
     }
 
-    /// An error where another arm was named than the controller has.
+    /// Returns an error if the caller's arm differs from the controller's.
     pub fn same_arm(&mut self) -> Result<(), Failure> {
         if self.named { self.arm_to_move().map(drop) } else { Ok(()) }
     }
 }
 
-/// A port to a simulated controller, and whether that has the arm in its memory.
+/// Opens a port to a simulated controller. The flag is `true` if the controller has the arm in its memory.
 fn simulator(
     simulated: Simulated,
     arm: &Arm,
@@ -192,7 +191,7 @@ fn simulator(
     let stored = image.is_some();
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored {
-        // What the controller knows of the arm it has as a board has it: from its memory.
+        // As on a board, the controller reads the arm from its memory.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), image);
     }
     let Simulated { seed, faults, payload, .. } = simulated;
@@ -217,7 +216,7 @@ fn simulator(
     Ok((port, stored))
 }
 
-/// An agent's line.
+/// Opens a line through an agent.
 fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     let own = registered().into_iter().find(|agent| agent.url == url.trim_end_matches('/'));
     let token = match (&target.token, &own) {
@@ -227,12 +226,12 @@ fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     };
     let certificates =
         target.certificates.clone().or_else(|| own.as_ref().and_then(|own| own.certificate.clone()));
-    // What this program started is not to go on without it.
+    // A motion must not continue after this program has disconnected.
     let options = Options { name: target.name.clone(), token, policy: Some("stop"), certificates };
     Ok(Box::new(AgentPort::open(url, &options)?))
 }
 
-/// The operator's token in the file of an agent of this user; an agent that does not let one in says so itself.
+/// Reads the operator's token from the file of this user's agent. Without a token the agent itself reports the refusal.
 fn operator(file: &std::path::Path) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Tokens {
@@ -242,7 +241,7 @@ fn operator(file: &std::path::Path) -> Option<String> {
     Some(tokens.operator)
 }
 
-/// A serial port, or the line of the agent that owns it.
+/// Opens a serial port, or the line of the agent that owns the port.
 fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failure> {
     match owner_of(path) {
         Some(owner) => agent(&owner.url, target),
@@ -250,7 +249,7 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
     }
 }
 
-/// Publishes every status from now on, whatever the session does.
+/// Publishes every status from now on, in all procedures of the session.
 pub fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
     let shared = Arc::clone(shared);
     session.observe(move |_, status| shared.publish(status));

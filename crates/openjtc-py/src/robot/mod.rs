@@ -1,4 +1,4 @@
-//! A connection to a controller: one thread has the conversation, Python's threads ask it.
+//! Connection to a controller: one thread runs the session, Python's threads send it jobs.
 
 mod acts;
 mod followed;
@@ -34,20 +34,20 @@ pub use questions::samples as samples_of;
 use shared::{Asked, Wish};
 use worker::{Waited, Worker, lock};
 
-/// How often is looked for the next status of a motion.
+/// Interval of the checks for the next status of a motion.
 const LOOK: Duration = Duration::from_millis(2);
 /// Longest jog, s.
 const JOG_MAX: f64 = 600.0;
 /// Longest recording of teaching, s.
 const TEACH_MAX: f64 = 3600.0;
 
-/// The connection; `openjtc.Robot` is what people use.
+/// Connection of `openjtc.Robot`.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct Link {
     worker: Worker,
 }
 
-/// What a motion is run with.
+/// Options of a motion.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Options {
@@ -84,12 +84,12 @@ impl Link {
         self.worker.call(py, job)
     }
 
-    /// A run was asked for and is not over: the connection's thread has no time for questions.
+    /// Returns `true` while a requested run is not over; the connection's thread then answers no queries.
     fn is_running(&self) -> bool {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Of the run that is on its way or waits for its turn, once its arm moves; or else of what the controller does.
+    /// Sends a request to the current or next run, which acts on it when its arm moves. Without a run the request goes to the controller.
     fn wish(
         &self,
         py: Python<'_>,
@@ -116,7 +116,7 @@ impl Link {
 
 #[pymethods]
 impl Link {
-    /// A simulated controller.
+    /// Connects to a simulated controller.
     #[staticmethod]
     #[pyo3(signature = (arm, seed, speed, faults, payload_of_arm))]
     fn simulated(
@@ -140,7 +140,7 @@ impl Link {
         Ok(Self { worker: Worker::begin(py, target)? })
     }
 
-    /// A serial port, or an agent.
+    /// Connects through a serial port or an agent.
     #[staticmethod]
     #[pyo3(signature = (target, arm, baud, name, token, certificates))]
     fn open(
@@ -166,22 +166,22 @@ impl Link {
         self.worker.is_closed()
     }
 
-    /// How many Stops there were: what was asked for before the next one is not done after it.
+    /// Returns the number of Stops. The next Stop discards every earlier request.
     fn asked(&self) -> u64 {
         self.worker.shared.halts()
     }
 
-    /// What was asked for so far is over, and what moves here is stopped; nothing is waited for.
+    /// Discards all earlier requests and stops the motion of this connection, without waiting.
     fn halt(&self) {
         self.worker.shared.halt();
     }
 
-    /// The same, and what moves here stands by then.
+    /// Like `halt`, and waits until the motion of this connection is at rest.
     fn rest(&self, py: Python<'_>) {
         self.worker.rest(py);
     }
 
-    /// Stops what moves here, switches off the teaching that was switched on here, and ends the connection.
+    /// Stops the motion and teaching of this connection, and closes it.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         if self.worker.is_closed() {
             return Ok(());
@@ -208,7 +208,7 @@ impl Link {
         options.begin(slf, Course::To { target, line, margin_pct })
     }
 
-    /// `flange`: x y z (m), roll pitch yaw (rad) in the base frame.
+    /// Moves to a pose. `flange`: x y z (m), roll pitch yaw (rad) in the base frame.
     #[pyo3(signature = (flange, line, margin, options))]
     fn move_to_flange(
         slf: &Bound<'_, Self>,
@@ -235,7 +235,7 @@ impl Link {
         })
     }
 
-    /// Stops the arm on its path, whoever moves it, and waits until it stands; whatever was asked for before is not done any more.
+    /// Stops the arm on its path, also if another program moves it, and waits for standstill. Discards all earlier requests.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.worker.shared.stop();
         self.worker.call_always(py, Machine::stop)
@@ -243,7 +243,7 @@ impl Link {
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
         let shared = &self.worker.shared;
-        // A run has no time for questions, and knows it.
+        // A run answers no queries, but shares the speed.
         while self.is_running() {
             if let Some(speed) = *lock(&shared.speed) {
                 return Ok(speed);
@@ -266,7 +266,7 @@ impl Link {
         })
     }
 
-    /// Jogs at these velocities (rad/s) for this time; returns where the arm rests (rad).
+    /// Jogs at these velocities (rad/s) for this time; returns the position at rest (rad).
     fn jog(&self, py: Python<'_>, velocity: &Bound<'_, PyAny>, seconds: f64) -> PyResult<[f64; JOINTS]> {
         let velocity = array::joints(velocity, "velocity")?;
         let time = number::seconds(seconds, JOG_MAX, "seconds")?;
@@ -280,24 +280,24 @@ impl Link {
         self.worker.call_always(py, Machine::hold)
     }
 
-    /// Records where the arm is led by hand, for this time (s); `take_taught` has it, also of one that was broken off.
+    /// Records the positions of the hand-led arm for this time (s). `take_taught` returns them, also after an interrupted recording.
     fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
         self.call(py, move |machine, asked| machine.record_teaching(time, asked))
     }
 
-    /// Times (s) and positions (rad) of what was recorded since the last call.
+    /// Returns times (s) and positions (rad) that were recorded since the last call.
     fn take_taught<'py>(&self, py: Python<'py>) -> (Vec<f64>, Bound<'py, numpy::PyArray2<f64>>) {
         let taught = std::mem::take(&mut *lock(&self.worker.shared.taught));
         let (times, rows): (Vec<f64>, Vec<[f64; JOINTS]>) = taught.into_iter().unzip();
         (times, array::matrix(py, &rows))
     }
 
-    /// A status that came after this call.
+    /// Returns a status that arrived after the start of this call.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
         let before = shared.seen();
-        // A run shows each status, and has no time for questions.
+        // A run publishes each status, and answers no queries.
         while self.is_running() {
             if shared.seen() != before
                 && let Some(status) = *lock(&shared.status)
@@ -315,7 +315,7 @@ impl Link {
         questions::status(py, &status, stop)
     }
 
-    /// Waits until the arm is held with all drives enabled, s at most.
+    /// Waits until the arm is held with all drives enabled, at most `seconds` (s).
     fn wait_ready(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let longest = number::timeout(seconds, "timeout")?;
         self.call(py, move |machine, asked| {
@@ -323,14 +323,14 @@ impl Link {
         })
     }
 
-    /// Where the port leads.
+    /// Name of the port.
     #[getter]
     fn port(&self) -> &str {
         &self.worker.port
     }
 }
 
-/// The classes.
+/// Registers the classes.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Link>()?;
     module.add_class::<Motion>()

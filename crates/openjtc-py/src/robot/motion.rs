@@ -1,4 +1,4 @@
-//! A run of Python: its progress, its samples, and what its thread is asked meanwhile.
+//! A run of Python: its progress, its samples, and requests during the run.
 
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -27,36 +27,36 @@ use super::tape::Tape;
 use super::worker::lock;
 use crate::error::Failure;
 
-/// What is run, and how.
+/// Order for a run: the course and its options.
 pub struct Order {
     pub course: Course,
-    /// As recordings name it.
+    /// Name in recordings.
     pub name: String,
-    /// Where the arm stands elsewhere it is moved to the first point.
+    /// Moves the arm to the first point if it is elsewhere.
     pub approach: bool,
-    /// % of the trajectory's own speed, or of what the limits allow. `None`: the trajectory's own speed, and the default one for a move or
-    /// an approach.
+    /// Speed, % of the trajectory's own speed, or of the limits for a move or an approach. `None`: the trajectory's own speed, or the
+    /// default speed of a move or an approach.
     pub speed: Option<f64>,
-    /// How often.
+    /// Number of executions.
     pub repeat: u32,
     /// The controller's limits, gravity and rotor inertia differ from the arm's, and are safe for it.
     pub accept_device_limits: bool,
-    /// A recording, and whether one that is there is written over.
+    /// Path of a recording, and `true` if an existing file is overwritten.
     pub record: Option<(PathBuf, bool)>,
-    /// How far it is, for whoever looks.
+    /// Progress of the run, for other threads.
     pub progress: Arc<Mutex<Progress>>,
 }
 
-/// What came of it.
+/// Result of a run.
 pub struct Ran {
-    /// The controller was sent Execute.
+    /// `true` if Execute was sent to the controller.
     moved: bool,
-    /// "finished" or "stopped"; "fault" where there is a failure.
+    /// "finished" or "stopped"; "fault" if there is a failure.
     pub outcome: &'static str,
     pub failure: Option<Failure>,
     pub broken: Option<RunFailure>,
     pub info: RecordingInfo,
-    /// Of the motion, without an approach to it.
+    /// Samples of the motion, without the approach.
     pub samples: Vec<Sample>,
     pub upload: Option<UploadReport>,
     pub link: LinkStatistics,
@@ -71,7 +71,7 @@ impl Order {
 }
 
 impl Machine {
-    /// Runs what was ordered. An error before the arm moves is the caller's own; one in motion, or behind it, is part of what came of it.
+    /// Executes an order. An error before the arm moves is returned as an error; an error in or after the motion is part of the result.
     pub fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
         let recording = order.record.as_ref();
         let mut recording =
@@ -155,7 +155,7 @@ impl Machine {
         self.tape.pause();
         match ended {
             Err(failure) if !ran.moved => return Err(failure),
-            // Between two motions: a Stop is no failure of the run.
+            // A Stop between two motions is not a failure of the run.
             Err(_) if asked.is_halted() && ran.outcome == "finished" => ran.outcome = "stopped",
             Err(failure) => (ran.outcome, ran.failure) = ("fault", Some(failure)),
             Ok(Ended { cut: true, .. }) => ran.outcome = "stopped",
@@ -172,7 +172,7 @@ impl Machine {
     }
 }
 
-/// A run of Python on its way.
+/// Follower of a running run of Python.
 struct Follower<'a> {
     order: &'a Order,
     asked: &'a Asked,
@@ -182,11 +182,11 @@ struct Follower<'a> {
     move_speed: MoveSpeed,
     shared: Arc<Shared>,
     tape: Rc<Tape>,
-    /// Of the motion, s.
+    /// Duration of the motion, s.
     duration_s: f64,
-    /// Of the motion.
+    /// Upload report of the motion.
     upload: Option<UploadReport>,
-    /// The thread that waits for what comes of its request.
+    /// Channel to the thread that waits for the result of its request.
     waits: Option<Sender<Result<(), Failure>>>,
 }
 
@@ -198,7 +198,7 @@ impl Observer<AnyPort> for Follower<'_> {
     }
 
     fn failed(&mut self, error: Error) -> Failure {
-        // A Stop explains every other error.
+        // After a Stop, every other error is a consequence of the Stop.
         if self.asked.is_halted() { Error::Cancelled.into() } else { error.into() }
     }
 
@@ -234,7 +234,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         let (simulated, tape) = (session.port().is_simulated(), Rc::clone(&self.tape));
         Ok(Box::new(move |sample| {
-            // The simulator takes one each millisecond by itself.
+            // The simulator itself pushes one sample each millisecond.
             if !simulated {
                 tape.push(sample);
             }
@@ -260,7 +260,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         if let Some(waits) = self.waits.take() {
             let came = result.as_ref().copied().map_err(Failure::of);
-            // The thread may have gone.
+            // The thread may have stopped waiting.
             let _ = waits.send(came);
         }
     }
@@ -271,7 +271,7 @@ impl Observer<AnyPort> for Follower<'_> {
         // A request of the last status is not applied: its thread learns that the motion has ended.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
-            // Stopped before it began.
+            // The motion was stopped before it began.
             self.shared.set_moves(false);
             return Err(Error::Cancelled.into());
         }
@@ -282,7 +282,7 @@ impl Observer<AnyPort> for Follower<'_> {
             Ok(Outcome::Stopped(_)) => {
                 self.ran.outcome = "stopped";
                 if !self.asked.is_halted() {
-                    // Another program did: what waits here was requested before that, too.
+                    // Another program stopped the arm. Waiting requests here are older than that Stop, so they are discarded, too.
                     self.shared.halt();
                 }
             }
@@ -293,7 +293,7 @@ impl Observer<AnyPort> for Follower<'_> {
 }
 
 impl Follower<'_> {
-    /// The motion ended in an error.
+    /// Notes that the motion ended in an error.
     fn broke(&mut self, error: &Error) {
         self.ran.outcome = "fault";
         let samples = self.tape.take();
@@ -305,14 +305,14 @@ impl Follower<'_> {
     }
 }
 
-/// A motion has ended in this error, and the arm may move all the same: on its way, or paused and resumed by another program.
+/// Returns `true` if the arm may still move after this error: on its path, or paused and resumed by another program.
 fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
     let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
     matches!(error, Error::Motion(MotionError::LinkLost { .. }))
         || session.last().is_some_and(|status| status.trajectory.is_in(&goes_on))
 }
 
-/// Why nothing of the run was begun.
+/// Returns the failure of a run that did not start.
 fn not_begun(error: &StartError) -> Failure {
     let failure = Failure::of(error);
     match error {
@@ -339,7 +339,7 @@ fn trajectory(
     Ok((planned.trajectory, planned.notes))
 }
 
-/// A default speed in words.
+/// Returns a default speed in words.
 fn of_speed(what: &str, speed: MoveSpeed) -> Option<String> {
     speed.note("`speed=`").map(|words| format!("{what} {words}"))
 }

@@ -1,7 +1,7 @@
-//! The line to the controller, with the gate before it: what a Stop has overtaken is not sent, and the Stop itself waits for nothing.
+//! Line to the controller with a gate: frames that are older than a Stop are not sent, and the Stop itself is sent at once.
 //!
-//! Every frame of every job passes here, and everything that waits for the controller reads here. So this is the one place that decides whether a
-//! frame may still move the arm, and that writes a Stop as soon as one is asked for, whatever the thread of the connection is busy with.
+//! Every frame of every job is written here, and every wait for the controller reads here. So this module alone decides if a frame may
+//! still move the arm. A Stop is written as soon as a caller requests it, in the middle of any job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,18 +14,18 @@ use jtc_wire::{FrameType, fixed};
 use super::shared::Shared;
 use super::worker::lock;
 
-/// Longest that a read waits before it looks whether a Stop is asked for.
+/// Longest wait of a read until it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);
-/// A frame of which no further piece came for so long is not completed any more.
+/// Longest pause between two pieces of a frame; after it the rest of the frame is not expected any more.
 const PIECE: Duration = Duration::from_millis(50);
-/// A record of a Stop arrives within this time: it waits for nothing but the status that is just being sent.
+/// Time within which the record of a Stop arrives. The record only waits for the status that is just being sent.
 const RECORD: Duration = Duration::from_millis(200);
-/// A motion that was begun is in the statuses after this time, and after so many of them.
+/// Time, and number of statuses, after which a started motion shows in the statuses.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
-/// What the bytes go through.
+/// Underlying line.
 pub enum Line {
-    /// A simulator remains one: it is touched whatever the session does.
+    /// A simulator, kept as its own type so that disturbances of its arm reach it during any job.
     Simulated(Box<SimPort>),
     /// A serial port or an agent.
     Other(Box<dyn Port>),
@@ -46,26 +46,26 @@ macro_rules! each_line {
     };
 }
 
-/// A line behind its gate.
+/// Line with its gate.
 pub struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
-    /// How many halts there had been when what is being done was asked for.
+    /// Number of halts at the time when the current job was requested.
     at: u64,
-    /// Halts and Stops that were acted upon.
+    /// Numbers of halts and Stops that were handled.
     done: (u64, u64),
-    /// Stops and Pauses of other programs that are known here.
+    /// Known Stops and Pauses of other programs.
     foreign: Halts,
-    /// Bytes of the frame being written that are still to come, and when its last piece was written.
+    /// Missing bytes of the frame being written, and time of its last piece.
     rest: (usize, Duration),
-    /// When the last Stop was written.
+    /// Time of the last written Stop.
     stopped: Option<Duration>,
-    /// When the last frame that moves the arm was written, and how many statuses had come by then.
+    /// Time of the last written frame that moves the arm, and number of statuses until then.
     begun: (Duration, u64),
 }
 
 impl AnyPort {
-    /// A line whose gate follows what is asked for in `shared`.
+    /// Makes a line whose gate follows the requests in `shared`.
     pub fn new(line: Line, shared: Arc<Shared>) -> Self {
         Self {
             line,
@@ -79,35 +79,36 @@ impl AnyPort {
         }
     }
 
-    /// There is no real arm.
+    /// Returns `true` if the arm is simulated.
     pub fn is_simulated(&self) -> bool {
         matches!(self.line, Line::Simulated(_))
     }
 
-    /// From now on something is done that was asked for after so many halts.
+    /// Begins a job that was requested after `at` halts.
     pub fn begin(&mut self, at: u64) {
         self.at = at;
     }
 
-    /// The caller writes the Stop that is due.
+    /// Marks all halts as handled, because the caller writes the Stop.
     pub fn take_over(&mut self) {
         self.done = (self.shared.halts(), self.shared.stops());
     }
 
-    /// Time that is left until the record of a Stop must have come, which is no answer to anything that is sent after it.
+    /// Returns the time until the record of the last Stop must have arrived. The record must not be taken as an answer to a later frame.
     pub fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
         (!left.is_zero()).then_some(left)
     }
 
-    /// What was begun here last is in the statuses by now.
+    /// Returns `true` if the statuses already show the last started motion.
     pub fn is_shown(&self) -> bool {
         let (time, statuses) = BEGUN;
         self.now() >= self.begun.0 + time && self.shared.seen() >= self.begun.1 + statuses
     }
 
-    /// Another program's Stop voids what was requested here before it, also what still waits for its turn. A Pause of a motion leaves the
-    /// rest: it follows only after the motion is resumed. Where nothing moves, a Pause voids as a Stop does.
+    /// Reads Stops and Pauses of other programs. A Stop voids all earlier requests of this connection, including waiting ones. A Pause
+    /// during a motion keeps waiting requests, because they follow only after the motion is resumed. At rest, a Pause voids requests like
+    /// a Stop.
     fn take_foreign_halts(&mut self) {
         let now = each_line!(port, self => port.halts());
         if now == self.foreign {
@@ -120,8 +121,8 @@ impl AnyPort {
         }
     }
 
-    /// The line withheld a frame because of another program's Stop or Pause: what waits here was requested before that, too. A motion that
-    /// stays paused, because its Execute came too early, is no reason.
+    /// Handles a frame that the line withheld because of another program's Stop or Pause: waiting requests are older than that, so they are
+    /// voided. An Execute that is withheld while a motion stays paused does not void them.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
@@ -130,7 +131,7 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop where one is asked for, or where what moves here was overtaken by a halt.
+    /// Writes a Stop if one is requested, or if a halt came while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = (self.shared.halts(), self.shared.stops());
@@ -139,7 +140,7 @@ impl AnyPort {
         }
         let due = now.1 != self.done.1 || self.shared.moves();
         if due && self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
-            // An existing device would take it for a part of the frame.
+            // Existing devices would take the Stop for a part of the frame.
             return Ok(());
         }
         self.done = now;
@@ -151,13 +152,13 @@ impl AnyPort {
         Ok(())
     }
 
-    /// A frame that moves the arm, or lets go of it, passes only where nobody has stopped the arm since it was asked for.
+    /// Lets a frame that moves the arm, or starts teaching, pass only without a halt since its request.
     fn pass(&mut self, frame: &[u8]) -> Result<(), PortError> {
         let moves = frame == fixed::EXECUTE || is_jog(frame);
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // In this order: a halt that comes between the two finds something to stop.
+        // Sets `moves` before the check, so that a halt between the two sees a motion to stop.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
@@ -179,7 +180,7 @@ impl AnyPort {
     }
 }
 
-/// A jog with a velocity; one without brings the joints to rest.
+/// Returns `true` for a jog with a velocity above 0; a jog with velocity 0 brings the joints to rest.
 fn is_jog(frame: &[u8]) -> bool {
     match frame {
         [_, kind, _, _, velocities @ .., _, _] => {
@@ -189,7 +190,7 @@ fn is_jog(frame: &[u8]) -> bool {
     }
 }
 
-/// Length of the frame that begins with these bytes.
+/// Returns the length of the frame that begins with these bytes.
 fn length(frame: &[u8]) -> usize {
     frame.get(2..4).map_or(0, |n| usize::from(n[0]) << 8 | usize::from(n[1]))
 }
@@ -218,7 +219,7 @@ impl Port for AnyPort {
         let whole = if self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
             self.rest.0
         } else {
-            // Pieces are longer than a header.
+            // The first piece always contains the whole header.
             length(bytes)
         };
         let written = each_line!(mut port, self => port.write_all(bytes));
@@ -246,7 +247,7 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// The request counts from when it was made, and not from when its turn comes.
+    /// Asks for permission to move. The time of the request counts, not the start of the job.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.halts() != self.at {

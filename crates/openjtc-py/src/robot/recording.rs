@@ -1,4 +1,4 @@
-//! The recording of a run: a file that is opened before anything moves and written while the arm does.
+//! Recording of a run: the file is opened before the arm moves and written during the motion.
 
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
@@ -9,17 +9,17 @@ use jtc_host::recording::{Format, LiveRecorder, RecordingInfo, SampleSink};
 use super::motion::Ran;
 use crate::error::Failure;
 
-/// A recording, from the file to its end.
+/// Recording of one run.
 pub struct Recording {
     path: PathBuf,
-    /// What is written, where it takes the place of `path` at the end only: what was there stays until the new one is whole.
+    /// Temporary file that replaces `path` only at the end, so that an existing file stays until the new one is complete.
     aside: Option<PathBuf>,
     file: Option<File>,
     live: Option<LiveRecorder>,
 }
 
 impl Recording {
-    /// Opened before anything moves. `overwrite`: a file that is there is replaced.
+    /// Opens the file before the arm moves. `overwrite`: replaces an existing file.
     pub fn open(path: &PathBuf, overwrite: bool) -> Result<Self, Failure> {
         Format::of(path).map_err(|error| Failure::of(&error))?;
         let mut options = OpenOptions::new();
@@ -47,7 +47,7 @@ impl Recording {
         Ok(Self { path: path.clone(), aside, file: Some(file), live: None })
     }
 
-    /// Where the samples of a motion go.
+    /// Returns the sink for the samples of a motion.
     pub fn sink(&mut self, info: &RecordingInfo) -> Result<Option<SampleSink>, Failure> {
         if let Some(file) = self.file.take() {
             let live = LiveRecorder::begin(file, &self.path, info, |_| {});
@@ -56,8 +56,8 @@ impl Recording {
         Ok(self.live.as_ref().map(LiveRecorder::sink))
     }
 
-    /// Completes the file of a run that moved the arm along its trajectory; of another one no file is left. What goes wrong with the file becomes a
-    /// note of the run, which is over all the same.
+    /// Completes the file if the run moved the arm along its trajectory; otherwise removes the file. A file error becomes a note of the
+    /// finished run.
     pub fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
         let Self { path, aside, file, live } = self;
         let written = aside.as_ref().unwrap_or(&path);
@@ -75,7 +75,7 @@ impl Recording {
                 Ok(ran)
             }
             (ran, live) => {
-                // Nothing moved: an empty file is no recording.
+                // The arm did not move, so the empty file is removed.
                 live.into_iter().for_each(LiveRecorder::abandon);
                 drop(file);
                 let _ = std::fs::remove_file(written);

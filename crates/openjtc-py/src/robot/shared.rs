@@ -1,4 +1,4 @@
-//! What the thread of a connection and those who wait for it share.
+//! State that the thread of a connection shares with the waiting callers.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -13,59 +13,59 @@ use jtc_wire::Status;
 use super::worker::lock;
 use crate::error::Failure;
 
-/// What happens to a simulated arm.
+/// Disturbance of a simulated arm.
 pub type Touch = Box<dyn FnOnce(&mut World) + Send>;
 
-/// Something that a motion on its way is to do, and who waits for what came of it.
+/// Request to a running motion, with the channel for its result.
 pub struct Wish {
     pub flow: Flow,
     pub done: Sender<Result<(), Failure>>,
 }
 
-/// How far a motion is.
+/// Progress of a motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Progress {
-    /// "waiting", "approach", "upload", "motion"; empty when it is over.
+    /// Phase: "waiting", "approach", "upload", "motion"; empty after the end.
     pub phase: &'static str,
-    /// s of its path, or segments.
+    /// Finished part of the path, s, or of the segments.
     pub done: f64,
-    /// Of so many.
+    /// Total of `done`.
     pub total: f64,
 }
 
-/// What the thread of a connection and those who wait for it share.
+/// State that the thread of a connection shares with the waiting callers.
 #[derive(Default)]
 pub struct Shared {
-    /// Counts what ends all that was asked for before it.
+    /// Number of halts; each halt cancels all earlier requests.
     halts: AtomicU64,
-    /// Counts those of them that stop the arm whoever moves it.
+    /// Number of halts that also stop the arm if another program moves it.
     stops: AtomicU64,
-    /// Runs that were asked for and are not over.
+    /// Number of requested runs that are not over.
     pending: AtomicUsize,
-    /// The controller was sent something that moves the arm, and did not report its end yet.
+    /// `true` if this connection has started a motion whose end the controller has not reported yet.
     moves: AtomicBool,
-    /// The thread has ended by itself.
+    /// `true` if the thread has ended by itself.
     gone: AtomicBool,
-    /// Counts the statuses.
+    /// Number of statuses.
     seen: AtomicU64,
-    /// What is wished of the run that is on its way, or of the next one; looked at while its arm moves.
+    /// Requests to the current run or the next one; read while its arm moves.
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
-    /// What is to happen to a simulated arm, in whatever its controller is doing.
+    /// Disturbances of a simulated arm, applied during any job.
     pub touches: Mutex<Vec<Touch>>,
-    /// The speed override as it was read or set last.
+    /// Speed override that was last read or set.
     pub speed: Mutex<Option<f64>>,
-    /// Where the arm was led by hand, with the times (s).
+    /// Times (s) and positions (rad) of the hand-led arm.
     pub taught: Mutex<Vec<(f64, [f64; JOINTS])>>,
 }
 
 impl Shared {
-    /// Everything that was asked for so far is over; what moves here is stopped.
+    /// Cancels all earlier requests and stops the motion of this connection.
     pub fn halt(&self) {
         self.halts.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// The same, and the arm is stopped whoever moves it.
+    /// Like [`Self::halt`], and also stops the arm if another program moves it.
     pub fn stop(&self) {
         self.stops.fetch_add(1, Ordering::SeqCst);
         self.halt();
@@ -87,7 +87,7 @@ impl Shared {
         self.moves.store(moves, Ordering::SeqCst);
     }
 
-    /// A run was asked for and is not over: the thread has no time for questions.
+    /// Returns `true` while a requested run is not over; the thread then answers no queries.
     pub fn is_running(&self) -> bool {
         self.pending.load(Ordering::SeqCst) > 0
     }
@@ -104,13 +104,13 @@ impl Shared {
         self.seen.load(Ordering::SeqCst)
     }
 
-    /// A status that came.
+    /// Publishes a new status.
     pub fn publish(&self, status: &Status) {
         *lock(&self.status) = Some(*status);
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Something that the run on its way is to do. Where there is none any more, the sender is dropped.
+    /// Passes a request to the current run. If no run is left, the sender is dropped.
     pub fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
@@ -119,11 +119,11 @@ impl Shared {
     }
 }
 
-/// A run that was asked for, until it is over or given up.
+/// Guard of a requested run, until the run is over or abandoned.
 pub struct Pending(Arc<Shared>);
 
 impl Pending {
-    /// From now on it is.
+    /// Counts the run as pending.
     pub fn begin(shared: &Arc<Shared>) -> Self {
         shared.pending.fetch_add(1, Ordering::SeqCst);
         Self(Arc::clone(shared))
@@ -133,7 +133,7 @@ impl Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if self.0.pending.fetch_sub(1, Ordering::SeqCst) == 1 {
-            // Who wished something of a run that is over learns that: the other end of the channel is gone.
+            // Dropping the senders tells the waiting threads that the run is over.
             lock(&self.0.wishes).clear();
         }
     }
@@ -147,27 +147,27 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Of what is asked for now.
+    /// Makes the view of a request that is made now.
     pub fn now(shared: &Arc<Shared>) -> Self {
         Self::after(shared, shared.halts())
     }
 
-    /// Of what was asked for after so many halts.
+    /// Makes the view of a request that was made after `at` halts.
     pub fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }
 
-    /// How many halts there had been.
+    /// Returns the number of halts at the time of the request.
     pub fn at(&self) -> u64 {
         self.at
     }
 
-    /// Somebody stopped the arm since this was asked for.
+    /// Returns `true` if there was a halt since the request.
     pub fn is_halted(&self) -> bool {
         self.shared.halts() != self.at
     }
 
-    /// An error where somebody did.
+    /// Returns an error if there was a halt since the request.
     pub fn check(&self) -> Result<(), Failure> {
         if self.is_halted() { Err(jtc_host::Error::Cancelled.into()) } else { Ok(()) }
     }

@@ -1,11 +1,11 @@
-//! What is recorded of a motion while it is executed.
+//! Samples of a motion, recorded during its execution.
 
 use std::cell::{Cell, RefCell};
 
 use jtc_host::Sample;
 use jtc_host::recording::SampleSink;
 
-/// What is recorded of a motion.
+/// Recorded samples of a motion.
 #[derive(Default)]
 pub struct Tape {
     on: Cell<bool>,
@@ -15,14 +15,14 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// From now on samples are kept, and written where there is a file; those before stay.
+    /// Starts recording, also to a sink if there is one. Earlier samples are kept.
     pub fn record(&self, sink: Option<SampleSink>) {
         self.on.set(true);
         self.zero.set(None);
         *self.sink.borrow_mut() = sink;
     }
 
-    /// Takes a sample on a clock of its own; the recording's begins at 0, and a further motion behind the last one.
+    /// Records a sample and shifts its time: the recording begins at 0, and a further motion continues 1 ms after the last sample.
     pub fn push(&self, sample: &Sample) {
         if !self.on.get() {
             return;
@@ -40,18 +40,18 @@ impl Tape {
         self.samples.borrow_mut().push(sample);
     }
 
-    /// A sample that was kept before stays.
+    /// Appends a sample without changing its time and without passing it to the sink.
     pub fn keep(&self, sample: &Sample) {
         self.samples.borrow_mut().push(*sample);
     }
 
-    /// Nothing more is kept.
+    /// Stops recording.
     pub fn pause(&self) {
         self.on.set(false);
         self.sink.borrow_mut().take();
     }
 
-    /// What was kept.
+    /// Stops recording and returns the samples.
     pub fn take(&self) -> Vec<Sample> {
         self.pause();
         self.samples.take()

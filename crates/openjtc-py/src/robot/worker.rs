@@ -1,7 +1,7 @@
-//! The thread that has the conversation with a controller, and how Python's threads ask it for something.
+//! Thread that runs the session with a controller, and the calls of Python's threads into it.
 //!
-//! A session is one conversation, so one thread has it. Python's threads hand jobs over and wait without the interpreter's lock; while they
-//! wait they look for Ctrl-C, which stops the arm before it becomes an exception.
+//! The thread owns the session. Python's threads hand over jobs and wait without the interpreter's lock. During the wait they check for
+//! Ctrl-C, which stops the arm before the exception is raised.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -17,47 +17,47 @@ use super::machine::{Machine, Target, Way};
 use super::shared::{Asked, Shared};
 use crate::error::Failure;
 
-/// How often a waiting thread looks for Ctrl-C.
+/// Interval at which a waiting thread checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest wait until an arm that is stopped stands; a second Ctrl-C ends it sooner.
+/// Longest wait for standstill after a Stop; a second Ctrl-C ends the wait.
 const STANDSTILL: Duration = Duration::from_secs(15);
 
 type Job = Box<dyn FnOnce(&mut Machine) + Send>;
 
-/// What it protects is whole between two statements of any thread.
+/// Locks a mutex, also after a panic: the protected data is consistent between any two statements.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What came of waiting.
+/// Result of a wait.
 pub enum Waited<T> {
     Came(T),
-    /// Nothing will come any more.
+    /// No result can arrive any more.
     Gone,
-    /// Nothing came in this time.
+    /// No result arrived in this time.
     NotYet,
 }
 
 /// The connection's thread.
 pub struct Worker {
     simulated: bool,
-    /// The process that opened it: a child of it has no such thread.
+    /// Process that opened the connection; a forked child does not have the thread.
     process: u32,
-    /// Where the port leads.
+    /// Name of the port.
     pub port: String,
     jobs: Mutex<Option<Sender<Job>>>,
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
 }
 
-/// Nothing can be asked any more.
+/// Returns the error for a closed connection.
 pub fn closed() -> Failure {
     Failure::new(ErrorKind::NoLink, "closed", "the connection is closed")
         .next("connect again: `openjtc.connect(…)`")
 }
 
 impl Worker {
-    /// Connects, in its thread.
+    /// Starts the thread and connects in it.
     pub fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
         let simulated = matches!(target.way, Way::Simulated(_));
@@ -85,8 +85,8 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Hands a job over that was asked for after so many halts; what comes of it is received. It is not done where somebody has stopped the
-    /// arm by the time it is its turn.
+    /// Hands over a job that was requested after `at` halts, and returns the channel for its result. A halt before the job's turn discards
+    /// the job.
     pub fn ask<T: Send + 'static>(
         &self,
         at: u64,
@@ -100,7 +100,7 @@ impl Worker {
         })
     }
 
-    /// The same of what a Stop does not end: what brings the arm to rest, and what looks at it.
+    /// Like [`Self::ask`], for jobs that a Stop does not cancel: jobs that bring the arm to rest or only read.
     pub fn ask_always<T: Send + 'static>(
         &self,
         job: impl FnOnce(&mut Machine) -> Result<T, Failure> + Send + 'static,
@@ -115,7 +115,7 @@ impl Worker {
         let (done, came) = channel();
         let job: Job = Box::new(move |machine| {
             let result = job(machine);
-            // Whoever asked may have gone.
+            // The caller may have stopped waiting.
             let _ = done.send(result);
         });
         if self.is_foreign() {
@@ -136,7 +136,7 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// The same of what a Stop does not end.
+    /// Like [`Self::call`], for jobs that a Stop does not cancel.
     pub fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -146,11 +146,11 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Waits without the interpreter's lock. At Ctrl-C the arm is stopped, and stands before the exception is raised.
+    /// Waits without the interpreter's lock. Ctrl-C stops the arm, and the exception is raised after standstill.
     pub fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
-                // One that came with the result is not left to Python, which does not know that it stops the arm.
+                // Handles a Ctrl-C that came together with the result: Python itself would not stop the arm.
                 self.look_for_signals(py)?;
                 Ok(result)
             }
@@ -158,7 +158,7 @@ impl Worker {
         }
     }
 
-    /// The same for at most this time. Several threads may wait for one thing, which one of them gets.
+    /// Like [`Self::wait`], for at most this time. Several threads may wait for the same result; exactly one receives it.
     pub fn wait_for<T: Send>(
         &self,
         py: Python<'_>,
@@ -190,18 +190,18 @@ impl Worker {
         }
     }
 
-    /// Waits for a moment, for what another thread does.
+    /// Waits for `time` while another thread works.
     pub fn pass(&self, py: Python<'_>, time: Duration) -> PyResult<()> {
         py.detach(|| std::thread::sleep(time));
         self.look_for_signals(py)
     }
 
-    /// At Ctrl-C, and at any other signal whose handler raises something: the arm is stopped, and stands before that is raised.
+    /// Checks for Ctrl-C and other signals whose handlers raise an exception. The arm is at rest before the exception is raised.
     pub fn look_for_signals(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals().inspect_err(|_| self.rest(py))
     }
 
-    /// Stops what moves here, and waits until it stands; a signal ends the wait. Nothing that was asked for before is done any more.
+    /// Stops the motion of this connection and waits for standstill; a signal ends the wait. Cancels all earlier requests.
     pub fn rest(&self, py: Python<'_>) {
         self.shared.halt();
         let Ok(came) = self.ask_always(Machine::rest).map(Mutex::new) else { return };
@@ -214,7 +214,7 @@ impl Worker {
         }
     }
 
-    /// Does something to the simulated arm, whatever its controller is doing.
+    /// Applies a disturbance to the simulated arm, during any job.
     pub fn touch(&self, touch: impl FnOnce(&mut World) + Send + 'static) -> Result<(), Failure> {
         if self.is_closed() {
             return Err(closed());
@@ -227,7 +227,7 @@ impl Worker {
         Ok(())
     }
 
-    /// No further jobs; the thread ends with the connection. A signal ends the wait for that.
+    /// Takes no further jobs and waits until the thread has ended the connection. A signal ends the wait.
     pub fn end(&self, py: Python<'_>) -> PyResult<()> {
         lock(&self.jobs).take();
         let thread = lock(&self.thread).take();
@@ -236,17 +236,17 @@ impl Worker {
             py.detach(|| std::thread::sleep(Duration::from_millis(2)));
             py.check_signals()?;
         }
-        // What it panicked of was reported where it did.
+        // A panic of the thread was already reported in the thread.
         let _ = thread.join();
         Ok(())
     }
 
-    /// This process is not the one that has the connection.
+    /// Returns `true` if another process owns the connection.
     pub fn is_foreign(&self) -> bool {
         self.process != std::process::id()
     }
 
-    /// Nothing can be asked any more.
+    /// Returns `true` if the connection takes no more jobs.
     pub fn is_closed(&self) -> bool {
         self.is_foreign() || self.shared.is_gone() || lock(&self.jobs).is_none()
     }
@@ -254,13 +254,12 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // A motion that nobody follows any more is stopped: the thread ends behind it.
+        // Stops a motion that no caller follows any more; the thread ends after it.
         self.shared.halt();
     }
 }
 
-/// Does what is asked for, one thing after the other; in between statuses are taken, so that none of them is old. What moves at the end is
-/// stopped.
+/// Runs jobs one after the other. Reads statuses between jobs, so that no status is old. At the end stops a motion of this connection.
 fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
     loop {
         let job = if machine.time_passes() {
@@ -283,13 +282,13 @@ fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
             machine.look();
         }));
         if done.is_err() {
-            // What broke is not known, so nothing but a Stop is sent any more.
+            // After a panic the state is unknown, so only a Stop is sent.
             machine.shared.set_gone();
             drop(waiting);
             let _ = catch_unwind(AssertUnwindSafe(|| machine.abandon()));
             return;
         }
     }
-    // Nobody is left to report to; the controller was sent what could be sent.
+    // Ignores the error: no caller is left to report to.
     let _ = machine.rest();
 }

@@ -1,4 +1,4 @@
-//! What has happened to boards that run, and is raised as an error, once.
+//! Alarms about running boards; each alarm is raised as an error, once.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use ucom_host::session::{Change, SessionError};
 use super::shared::lock;
 use crate::error::Failure;
 
-/// Boards that were lost or have left their loops, and what else was not reported as an error yet.
+/// Alarms that are not reported yet: boards that were lost or have left their loops, and other failures.
 #[derive(Default)]
 pub struct Alarms(Mutex<Waiting>);
 
@@ -19,12 +19,12 @@ struct Waiting {
     lost: Vec<u8>,
     rebooted: Vec<u8>,
     left: Vec<u8>,
-    /// What is reported as it is.
+    /// Failures that are reported unchanged.
     others: VecDeque<Failure>,
 }
 
 impl Alarms {
-    /// A board changed. `runs`: this session has started its control loop; `master`: that or another board's application.
+    /// Notes a change of a board. `runs`: this session has started its control loop; `master`: this session has started an application.
     pub fn changed(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
         let mut waiting = lock(&self.0);
         match change {
@@ -35,21 +35,21 @@ impl Alarms {
         }
     }
 
-    /// Another board has the number of one that runs: what is commanded to one moves both.
+    /// Notes that another board has the number of a running board, so that a command moves both.
     pub fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
-        // What was found while it runs is no refusal.
+        // A conflict that is found while the board runs is a fault, not a refusal.
         own.kind = ErrorKind::Fault;
         self.add(own);
     }
 
-    /// Something that is reported as it is.
+    /// Adds a failure that is reported unchanged.
     pub fn add(&self, failure: Failure) {
         lock(&self.0).others.push_back(failure);
     }
 
-    /// Reports, once, that boards were lost or have left their loops, then what else there is, one after the other.
+    /// Reports lost boards and boards that have left their loops, once, then the other failures one after the other.
     pub fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);

@@ -1,4 +1,4 @@
-//! A chain of boards as Python has it: thin calls into the thread that owns its session.
+//! Chain of boards for Python: thin calls into the thread that owns its session.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use crate::error::Failure;
 use crate::json;
 
 type Object<'py> = PyResult<Bound<'py, PyAny>>;
-/// A board, a name and a value, all as Python gives them.
+/// Board, name and value from Python.
 type Given = (Option<u8>, String, String);
 
 /// Year, month and day.
@@ -54,7 +54,7 @@ fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, Failure> {
 }
 
 impl Chain {
-    /// Reads a parameter file here, as the thread of the session waits for no disk.
+    /// Reads a parameter file in the calling thread, because the session's thread must not wait for a disk.
     fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, Failure> {
         let inventory = self.inventory_file.clone().unwrap_or_default();
         Ok(py.detach(|| ParameterFile::read(path, &inventory, |_| true)).map_err(SessionError::from)?)
@@ -117,7 +117,7 @@ impl Chain {
         &self.url
     }
 
-    /// Load, frames and time of the bus.
+    /// Returns load, frame counts and time of the bus.
     fn bus<'py>(&self, py: Python<'py>) -> Object<'py> {
         plain(py, self.owner.shared.bus())
     }
@@ -140,7 +140,7 @@ impl Chain {
 
     fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
         let file = self.inventory_file.as_deref();
-        // Here, as the thread of the session waits for no disk.
+        // Read here, because the session's thread must not wait for a disk.
         let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
         let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
         let init = move |hands: &mut _| procedures::init(hands, listed, (renew, force, check));
@@ -279,7 +279,7 @@ impl Chain {
         self.owner.call(py, move |hands| values::apply_parameters(hands, &file, dry_run, force))
     }
 
-    /// Samples of boards from now on.
+    /// Returns a reader of samples of boards from now on.
     fn samples(this: PyRef<'_, Self>, py: Python<'_>, boards: Option<&str>) -> PyResult<ChainSamples> {
         let boards = boards.map(self::boards).transpose()?;
         let listener = this.owner.call(py, move |hands| {
@@ -318,7 +318,7 @@ impl Chain {
         let (second, profile) = (source(second), &self.profile);
         let any_date = date.0.is_none();
         let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };
-        // Here, as the thread of the session waits for no disk.
+        // Read here, because the session's thread must not wait for a disk.
         let (image, second, date) = py.detach(|| read.read(&first, second.as_ref(), profile))?;
         let update = Update {
             boards: self::boards(boards)?,

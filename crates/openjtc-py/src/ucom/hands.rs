@@ -1,4 +1,4 @@
-//! The session in its thread, and what Python asks of it.
+//! Session in its thread, with the requests of Python.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -15,39 +15,39 @@ use super::operator::Hand;
 use super::shared::Shared;
 use super::simulated::Simulated;
 
-/// Longest wait of a turn; the bus itself is waited for less long.
+/// Longest wait of a turn; a wait for the bus itself is shorter.
 const TURN: Duration = Duration::from_millis(25);
 
-/// Outputs come every few milliseconds: the first ones are waited for so long, µs.
+/// Longest wait for the first outputs of a board, which come every few milliseconds, µs.
 const FIRST_US: u64 = 500_000;
 
-/// What is known beforehand.
+/// Configuration of a session.
 pub struct Config {
-    /// How boards read the protocol.
+    /// Profile of how boards read the protocol.
     pub profile: Profile,
-    /// What their words mean.
+    /// Meaning of their words.
     pub signals: SignalTable,
-    /// Where names are remembered.
+    /// Cache of signal names.
     pub cache: Cache,
-    /// Who stands where, and the file that it is kept in.
+    /// Inventory of the chain, and its file.
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// With no call for so long what the session has started is stopped; `None`: it runs on.
+    /// Time without a call after which the session stops boards that it has started; `None`: they run on.
     pub deadline: Option<Duration>,
-    /// The simulated chain that ends with the session.
+    /// Simulated chain that ends with the session.
     pub simulated: Option<Arc<Simulated>>,
 }
 
-/// The session, and what belongs to it.
+/// Session with its inventory and records.
 pub struct Hands {
     pub session: Session,
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// What updates wrote to boards.
+    /// Records of images that updates wrote to boards.
     pub records: FlashRecords,
     pub shared: Arc<Shared>,
     deadline: Option<Duration>,
-    /// Behind the session: it goes when the bus is closed.
+    /// Declared after the session, so that the simulated chain is dropped after the bus is closed.
     _simulated: Option<Arc<Simulated>>,
 }
 
@@ -66,19 +66,19 @@ impl DerefMut for Hands {
 }
 
 impl Hands {
-    /// Those of a session on this link.
+    /// Opens a session on this link.
     pub fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
         let Config { profile, signals, cache, inventory, inventory_file, deadline, simulated } = config;
         let held: Rc<RefCell<Held>> = Rc::default();
         let hand = Hand::new(shared.clone(), Rc::clone(&held));
         let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
-        // Heartbeats and stops of this thread wait for no disk.
+        // The cache is kept in memory, so that heartbeats and stops of this thread never wait for a disk.
         let session = Session { driver, cache: cache.in_memory(), signals, held };
         let records = FlashRecords::new(inventory_file.clone());
         Self { session, inventory, inventory_file, records, shared, deadline, _simulated: simulated }
     }
 
-    /// Does what is asked for until the bus is gone or the session ends.
+    /// Runs requests until the bus is lost or the session ends.
     pub fn serve(&mut self) -> Result<(), SessionError> {
         let shared = self.shared.clone();
         while !shared.has_ended() {
@@ -93,8 +93,8 @@ impl Hands {
         Ok(())
     }
 
-    /// Heartbeats show that this computer lives, not that the program does which commands the boards: where that asks for nothing any
-    /// more its boards are stopped.
+    /// Stops the boards if the program makes no call within the deadline. Heartbeats only show that this computer works, not that the
+    /// commanding program does.
     fn keep_deadline(&mut self) {
         if let Some(deadline) = self.deadline
             && self.shared.silence() >= deadline
@@ -107,7 +107,7 @@ impl Hands {
         }
     }
 
-    /// Lets the bus go on for a moment.
+    /// Runs the bus for one turn.
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
         if self.shared.stop_waits() {
@@ -119,13 +119,13 @@ impl Hands {
         Ok(())
     }
 
-    /// What was asked for is on the bus before who asked knows that it is done.
+    /// Sends all frames of a request before the caller receives the result.
     pub fn settle(&mut self) {
-        // A bus that is gone is seen in the next turn.
+        // The next turn reports a lost bus.
         let _ = self.driver.turn(Duration::ZERO);
     }
 
-    /// Waits for the first outputs of boards that run now, so that they have values; no longer than a moment.
+    /// Waits for the first outputs of boards that run now, so that they have values; at most 0.5 s.
     pub fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let end_us = self.driver.now_us() + FIRST_US;
         let missing =

@@ -1,8 +1,8 @@
-//! Chains of UCoM boards: a session on a bus that a thread of its own keeps, and calls of Python into it.
+//! Chains of UCoM boards: a session on a bus in a separate thread, and calls of Python into it.
 //!
-//! - [`owner`], [`shared`], [`alarms`]: the thread, what is asked of it, how Python waits for it, and what it raises.
+//! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python, and the errors it raises.
 //! - [`hands`], [`operator`]: the session in that thread.
-//! - [`procedures`], [`running`], [`values`], [`update`]: what is done with it; results are JSON, which Python makes dataclasses of.
+//! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session; Python converts their JSON results to dataclasses.
 //! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.
 
 mod alarms;

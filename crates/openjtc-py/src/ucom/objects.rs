@@ -1,4 +1,4 @@
-//! Boards and what was found of them as JSON, by the names of the dataclasses of `openjtc.ucom`.
+//! Boards and findings as JSON, with the field names of the dataclasses of `openjtc.ucom`.
 
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Profile, Status};
@@ -8,7 +8,7 @@ use ucom_host::master::io::{Kind, ParValue, short};
 use ucom_host::master::{BoardSeen, Master, state_name};
 use ucom_host::session::{Known, name_of};
 
-/// A board with its answer to PC_INFO.
+/// Converts a board with its answer to PC_INFO.
 pub fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let application = info.has_application();
     let status: Vec<&str> =
@@ -25,24 +25,24 @@ pub fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&
     })
 }
 
-/// The same with its description.
+/// Like [`info`], with its description.
 pub fn board(seen: &BoardSeen, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let mut value = info(seen.number, &seen.info, profile, inventory);
     value["description"] = json!(seen.description.as_deref().unwrap_or_default());
     value
 }
 
-/// Several boards.
+/// Converts several boards.
 pub fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&Inventory>) -> Value {
     seen.iter().map(|one| board(one, profile, inventory)).collect()
 }
 
-/// Findings in words, commands as they are typed.
+/// Returns findings in words, with commands as they are typed.
 pub fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
 
-/// The signals of a board, all kinds.
+/// Converts the signals of a board, all kinds.
 pub fn signals(known: &Known) -> Value {
     let of = |kind: Kind| -> Value {
         let pairs = known.names.names(kind).iter().zip(known.signals.all(kind)).enumerate();
@@ -79,7 +79,7 @@ fn signal(index: usize, text: &str, signal: &Signal) -> Value {
     })
 }
 
-/// Words of a buffer as pairs of name and value, in the order of the buffer; null: not known.
+/// Converts words of a buffer to pairs of name and value, in the order of the buffer; null: not known.
 pub fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     let pair = |(index, key): (usize, String)| {
         let word = words.get(index).copied().flatten();
@@ -89,12 +89,12 @@ pub fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     known.keys(kind).into_iter().enumerate().map(pair).collect()
 }
 
-/// The same of words that are all there.
+/// Like [`named`], for outputs whose words are all known.
 pub fn outputs(known: &Known, words: &[u16]) -> Value {
     named(known, Kind::So, &words.iter().copied().map(Some).collect::<Vec<_>>())
 }
 
-/// Inputs as last set or as the board wants them first, and parameters as this session wrote them.
+/// Returns inputs as last set, else the initial inputs of the board, and parameters as this session wrote them.
 pub fn settings(known: &Known, master: &Master) -> (Value, Value) {
     let parameter = |value: &ParValue| match value {
         ParValue::Assumed(word) => Some(*word),

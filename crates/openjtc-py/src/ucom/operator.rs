@@ -1,4 +1,4 @@
-//! The operator of the session: what happens on the bus becomes events, samples and alarms, also in the middle of a procedure.
+//! Operator of the session: turns bus activity into events, samples and alarms, also in the middle of a procedure.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -10,15 +10,15 @@ use ucom_host::session::{Held, Link, Notice, Operator};
 
 use super::shared::{Halt, Shared};
 
-/// What the owner's thread remembers of its turns.
+/// State that the owner's thread keeps between turns.
 #[derive(Default)]
 struct Local {
-    /// The Stop at the session's end is on the bus.
+    /// `true` after the Stop at the session's end was sent.
     end_sent: bool,
     now_us: u64,
 }
 
-/// The operator of the session.
+/// Operator of the session.
 pub struct Hand {
     shared: Arc<Shared>,
     held: Rc<RefCell<Held>>,
@@ -26,12 +26,12 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// Of a session that holds this.
+    /// Makes the operator of a session.
     pub fn new(shared: Arc<Shared>, held: Rc<RefCell<Held>>) -> Self {
         Self { shared, held, local: RefCell::default() }
     }
 
-    /// A change of a board that runs: an event, and an alarm where it was lost or has left its loop by itself.
+    /// Reports a change of a running board: an event, and an alarm if the board was lost or left its loop by itself.
     pub fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
         let Notice { board, change, time_s, .. } = *notice;
         let text = notice.text().or_else(|| text.cloned());
@@ -65,7 +65,7 @@ impl Operator for Hand {
                 }
                 return;
             }
-            // Of boards that run it is an event already.
+            // Running boards already have an event for this.
             Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
             Event::Supervision { .. } => return,
             Event::BoardError { board, .. } => ("error", Some(*board)),
@@ -94,7 +94,7 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
+            // The running request must undo its changes, perhaps on boards that do not answer. No board runs on in that time.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

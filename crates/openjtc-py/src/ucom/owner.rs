@@ -1,4 +1,4 @@
-//! The thread that owns a session: what is asked of it is done one after the other, and a stop before all.
+//! Thread that owns a session: runs requests one after the other, and a stop before all others.
 
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::JoinHandle;
@@ -14,16 +14,16 @@ use super::shared::{Halt, Kind, Process, Shared, Work, failure, fault, lock};
 use crate::error::Failure;
 use crate::json;
 
-/// So often signals (Ctrl-C) are looked at while Python waits.
+/// Interval of the checks for signals (Ctrl-C) while Python waits.
 pub const LOOK: Duration = Duration::from_millis(50);
 
-/// What a call receives of what it asked for.
+/// Message to a waiting call.
 enum Message<T> {
     Progress(Value),
     Done(Result<T, Failure>),
 }
 
-/// The thread that owns a session.
+/// Handle of the thread that owns a session.
 pub struct Owner {
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
@@ -31,12 +31,12 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// Takes an open bus.
+    /// Starts the thread on an open bus.
     pub fn new(config: Config, link: Link) -> Self {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
-            // Where this thread has a fault nobody waits for it without end.
+            // After a fault of this thread no caller waits for it without end.
             let gone = Gone(&own);
             let mut hands = Hands::new(own.clone(), config, link);
             match hands.serve() {
@@ -54,7 +54,7 @@ impl Owner {
         Self { shared, thread: Mutex::new(Some(thread)), process: Process::this() }
     }
 
-    /// Has something done and waits for it without the GIL. Ctrl-C ends it, and stops what this session has started.
+    /// Sends a request and waits for its result without the GIL. Ctrl-C cancels it, and stops everything that this session has started.
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -63,7 +63,7 @@ impl Owner {
         self.call_with(py, Kind::Command, None, |hands, _| act(hands))
     }
 
-    /// The same; `progress` is called with what is reported on the way.
+    /// Like [`Self::call`]; `progress` is called with each progress report.
     pub fn call_with<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -82,7 +82,7 @@ impl Owner {
                 }),
                 Received::Nothing => Ok(()),
             };
-            // Also while one report comes after the other.
+            // Checked also while reports arrive without a gap.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.cancel(id);
@@ -93,15 +93,15 @@ impl Owner {
         }
     }
 
-    /// What an update has made of each board goes with the exception that has ended it: nobody else gets it.
+    /// Adds the result of each board to the exception that ended an update, because no report is returned.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
-            // Exceptions have notes since Python 3.11; the events have the same.
+            // Exceptions have notes since Python 3.11; the events have the same texts.
             let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 
-    /// Ctrl-C came: what this session has started is stopped, and waited for; another Ctrl-C ends only the waiting.
+    /// Stops everything that this session has started after a Ctrl-C, and waits for it. Another Ctrl-C only ends the wait.
     pub fn interrupted(&self, py: Python<'_>) {
         let (_, answers) = self.ask(Kind::Stop, |hands, _| {
             hands.leave();
@@ -115,7 +115,7 @@ impl Owner {
         }
     }
 
-    /// Stops boards at once, whatever goes on, and then what `act` does.
+    /// Stops boards at once, in the middle of any request, then runs `act`.
     pub fn stop<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -128,13 +128,13 @@ impl Owner {
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
-                // It is a stop already.
+                // A signal needs no further stop here.
                 _ => py.check_signals()?,
             }
         }
     }
 
-    /// The thread is one of this process, not of the one that it was forked from.
+    /// Checks that the thread belongs to this process, not to its parent before a fork.
     fn is_here(&self) -> Result<(), Failure> {
         match self.process.is_this() {
             true => Ok(()),
@@ -161,7 +161,7 @@ impl Owner {
                 hands.settle();
                 done
             });
-            // Who has given up needs no answer.
+            // A caller that stopped waiting needs no answer.
             let _ = sender.send(Message::Done(done));
         };
         self.shared.put(Work { id, kind, act: Box::new(act) });
@@ -181,10 +181,10 @@ impl Owner {
         })
     }
 
-    /// Stops what this session has started, and lets the bus go. Returns the boards whose end is not certain.
+    /// Stops everything that this session has started, and releases the bus. Returns the boards that are not certainly stopped.
     pub fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
-            // There is nobody to wait for, and what runs is not this process's.
+            // This process has no such thread, and the boards are not its own.
             return Ok(Vec::new());
         }
         self.shared.end();
@@ -208,12 +208,12 @@ impl Owner {
 
 impl Drop for Owner {
     fn drop(&mut self) {
-        // The thread stops what was started; nobody waits here, who may have the GIL.
+        // The thread stops the started boards. No wait here, because the caller may hold the GIL.
         self.shared.end();
     }
 }
 
-/// What came within a moment.
+/// Result of one short wait.
 enum Received<T> {
     Nothing,
     Progress(Value),

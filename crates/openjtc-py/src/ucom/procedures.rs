@@ -1,4 +1,4 @@
-//! What is done with a chain: the procedures of `ucom-host`, in the order in which `ucom` calls them.
+//! Procedures of a chain from `ucom-host`, called in the same order as in `ucom`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use super::hands::Hands;
 use super::objects;
 use crate::error::Failure;
 
-/// How long a doctor listens before it asks.
+/// Time for which the doctor listens before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// The profile of a file, or the defaults; what is done about a lost board may be another.
+/// Reads the profile of a file, or the defaults; `on_lost` replaces the reaction to a lost board.
 pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
@@ -48,12 +48,12 @@ pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Fa
     Ok(profile)
 }
 
-/// A failure that several findings are.
+/// Makes one failure from several findings.
 fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'static str) -> Failure {
     Failure::new(kind, code, texts.join("; ")).next(next)
 }
 
-/// Who is there; changes nothing.
+/// Queries all boards; changes nothing.
 pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
     let report = match hands.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
@@ -71,14 +71,14 @@ pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
     }))
 }
 
-/// Resets and numbers the whole chain. `listed` is what the inventory file has now. With what is found comes the inventory that is to be
-/// written: a disk may keep the heartbeats waiting.
+/// Resets and numbers the whole chain. `listed` is the present content of the inventory file. Returns the new inventory to the caller, who
+/// writes it, because a slow disk would delay the heartbeats here.
 pub fn init(
     hands: &mut Hands,
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), Failure> {
-    // What another program has written there since is compared with, as well.
+    // The comparison includes changes that another program has written to the file.
     hands.inventory = listed.or_else(|| hands.inventory.take().map(Inventory::without_records));
     let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
@@ -109,7 +109,7 @@ pub fn init(
     Ok((value, hands.inventory.clone().filter(|_| report.is_ok())))
 }
 
-/// What boards report about themselves.
+/// Reads the reports of boards about themselves.
 pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let mut all = Vec::new();
     for board in hands.driver.numbers(boards)? {
@@ -119,13 +119,13 @@ pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     Ok(objects::boards(&all, &profile, hands.inventory.as_ref()))
 }
 
-/// Boards by their status.
+/// Converts boards with their status.
 pub fn numbered(hands: &Hands, all: &[Numbered]) -> Value {
     let profile = hands.driver.master.profile();
     all.iter().map(|(n, info)| objects::info(*n, info, &profile, hands.inventory.as_ref())).collect()
 }
 
-/// Names of status bits as bits.
+/// Converts names of status bits to bits.
 fn bits(names: &[String]) -> Result<Status, Failure> {
     let bit = |name: &String| {
         Status::bit(name).ok_or_else(|| {
@@ -136,7 +136,7 @@ fn bits(names: &[String]) -> Result<Status, Failure> {
     names.iter().try_fold(Status(0), |all, name| Ok(all | bit(name)?))
 }
 
-/// Status bits, after setting and clearing some.
+/// Sets and clears status bits, then returns the status.
 pub fn status(
     hands: &mut Hands,
     boards: &Boards,
@@ -174,7 +174,7 @@ pub fn status(
     Ok(numbered(hands, &all))
 }
 
-/// PC_XRESET: exloader with programming enabled.
+/// Resets boards into the exloader with programming enabled (PC_XRESET).
 pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let all = hands.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
@@ -182,7 +182,7 @@ pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, 
     Ok(numbered(hands, &all))
 }
 
-/// PC_RESET, to all at once or one by one. Low bytes of the flash numbers of those that reported.
+/// Resets boards (PC_RESET), all at once or one by one. Returns low bytes of the flash numbers of boards that reported.
 pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
@@ -210,7 +210,7 @@ pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>,
     Ok(reports.ids.into_iter().collect())
 }
 
-/// Gives one board its number back.
+/// Restores the number of one board.
 pub fn repair(
     hands: &mut Hands,
     board: u8,
@@ -231,7 +231,7 @@ pub fn repair(
     }
 }
 
-/// Listens, asks where that cannot do harm, and reports what is wrong.
+/// Listens, sends queries if they cannot do harm, and reports the findings.
 pub fn doctor(hands: &mut Hands) -> Result<Value, Failure> {
     let seen = hands.driver.examine(LISTEN)?;
     let profile = hands.driver.master.profile();
@@ -242,7 +242,7 @@ pub fn doctor(hands: &mut Hands) -> Result<Value, Failure> {
     }))
 }
 
-/// An image that is on a board, as sent.
+/// Reads the image of a board's application, in the form in which it was sent.
 pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())
@@ -271,7 +271,7 @@ pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, Failure>
     }
 }
 
-/// Whether boards keep to the protocol.
+/// Tests boards against the protocol.
 pub fn conformance(
     hands: &mut Hands,
     boards: &Boards,

@@ -1,4 +1,4 @@
-//! What is on the bus to a file: frames are taken where the session has them, and written by a thread that may wait for a disk.
+//! Recording of the bus to a file: the session's bus passes frames to a separate thread that may wait for a disk.
 
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -15,13 +15,13 @@ use ucom_host::session::{Prompt, Recorder};
 use super::shared::Process;
 use crate::error::Failure;
 
-/// So often what was recorded reaches the file.
+/// Interval at which recorded frames are written to the file.
 const FLUSH: Duration = Duration::from_secs(1);
 
-/// A frame, µs of the session and ns since 1970.
+/// Time of the session in µs, time since 1970 in ns, and a frame.
 struct Taken(u64, u64, CanFrame);
 
-/// Where frames go while a recording is written.
+/// Destination of frames during a recording.
 #[derive(Clone, Default)]
 pub struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
 
@@ -35,17 +35,17 @@ impl Sink {
     }
 }
 
-/// A bus that is never waited for long, with an ear.
+/// Bus wrapper with short waits that copies frames to a recording.
 pub struct Tap {
     bus: Prompt,
     sink: Sink,
     start: Instant,
-    /// However the clock is set meanwhile, time does not run backwards in a file.
+    /// Wall-clock time of the start. Later times are computed from it, so that a clock change never reverses time in a file.
     began_at: Duration,
 }
 
 impl Tap {
-    /// On a bus that is open.
+    /// Wraps an open bus.
     pub fn new(bus: Box<dyn CanBus + Send>, sink: Sink) -> Self {
         Self { bus: Prompt(bus), sink, start: Instant::now(), began_at: host_kit::unix_time() }
     }
@@ -54,7 +54,7 @@ impl Tap {
         if let Some(sender) = &*self.sink.0.lock().unwrap_or_else(PoisonError::into_inner) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // Its writer has ended where the disk is full, which it reports itself.
+            // On a full disk the writer has ended and reports the error itself.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }
@@ -84,7 +84,7 @@ impl CanBus for Tap {
     }
 }
 
-/// What came of a recording: frames that were written, and those of other protocols that its form has no place for.
+/// Result of a recording: number of written frames, and of left-out frames of other protocols that its form cannot hold.
 type Written = Result<(u64, u64), RecordingError>;
 
 /// A recording that is being written.
@@ -96,7 +96,7 @@ pub struct ChainRecording {
 }
 
 impl ChainRecording {
-    /// Begins one; its form goes by the ending of the file.
+    /// Begins a recording; the file ending selects its form.
     pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -144,7 +144,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // Nobody is there to be told; what was written is whole.
+        // No caller is left to report to; the written part is complete.
         let _ = self.finish();
     }
 }
@@ -173,7 +173,7 @@ fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
 
 #[pymethods]
 impl ChainRecording {
-    /// Ends it: frames that were written, and those that its form has no place for; None when it has ended before.
+    /// Ends the recording. Returns the numbers of written and left-out frames; None if it has ended before.
     fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, Failure> {
         py.detach(|| self.finish())
     }

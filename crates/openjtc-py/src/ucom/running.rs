@@ -1,4 +1,4 @@
-//! Applications and control loops: started with their values, and stopped.
+//! Starts applications and control loops with their values, and stops them.
 
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
@@ -10,18 +10,18 @@ use super::hands::Hands;
 use super::procedures::numbered;
 use crate::error::Failure;
 
-/// Starts applications; nothing moves by that.
+/// Starts applications, without any movement.
 pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let all = hands.starting(&numbers, |hands| {
         hands.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
-    // Their names are there from now on; without them they are started all the same.
+    // Reads their signal names; a failure does not undo the start.
     numbers.iter().for_each(|board| drop(hands.known(*board)));
     Ok(numbered(hands, &all))
 }
 
-/// What is to run.
+/// Boards to run, with their values and options.
 pub struct Run {
     pub boards: Boards,
     pub active: bool,
@@ -37,17 +37,17 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
-    // Of all boards none may be missing that the file has something for.
+    // With `all`, every board in the file must be present.
     let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
     let file = run.file.take().map(|file| file.of_boards(meant));
-    // Who is there comes first: it needs no started application.
+    // Checks identities first, because this needs no started application.
     if let Some(file) = &file {
         file.identities(&mut hands.driver)?;
     }
     let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
         let started = begin(session, cache, &numbers, &run, file.as_ref(), &mut prepared);
-        // What the procedure began it has taken back itself.
+        // The procedure has undone its own steps.
         let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
@@ -58,7 +58,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     hands.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
-        // The boards run, perhaps with their outputs enabled: who receives a failure takes them for stopped.
+        // The boards already run, perhaps with enabled outputs. A failure would let the caller take them for stopped.
         if let Err(error) = hands.driver.run(Request::Admin { board: *board, change, force: true }) {
             hands.driver.note(format!("board {board} may send no texts: {error}"));
         }
@@ -72,7 +72,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     }))
 }
 
-/// Names, plans, and the start of all boards.
+/// Reads names, makes plans, and starts all boards.
 fn begin(
     session: &mut Session,
     cache: &Cache,
@@ -95,7 +95,7 @@ fn begin(
     }
 }
 
-/// Enables outputs of boards that run, or makes them safe. What makes them safe goes to each board, whatever another one does.
+/// Enables outputs of running boards, or makes them safe. The safe command goes to each board, even if another board fails.
 pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
         Boards::All => hands.held.borrow().running().iter().copied().collect(),
@@ -116,7 +116,7 @@ pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), F
     Ok(())
 }
 
-/// A failure that names all boards of which something is not certain.
+/// Returns a failure that names all uncertain boards.
 fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failure> {
     let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
     let Some((board, error)) = failed.into_iter().next() else { return Ok(()) };
@@ -126,7 +126,7 @@ fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failur
     Err(own)
 }
 
-/// Sees to each board after a stop: those that are meant, or all that answer and all that this session has started.
+/// Stops each selected board; `all` means boards that answer and boards that this session has started.
 pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
     let was_master = hands.driver.master.is_master();
     let wanted = match boards {
@@ -134,7 +134,7 @@ pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Valu
             let mut wanted = hands.started();
             match hands.driver.numbers_to_stop(&Boards::All) {
                 Ok(found) => wanted.extend(found),
-                // Without a number no board runs.
+                // A board without a number does not run.
                 Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
                 Err(error) => return Err(error.into()),
             }
@@ -152,7 +152,7 @@ pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Valu
         }
     }
     if !was_master && hands.started().is_empty() {
-        // A stop makes nobody the master.
+        // A stop must not make this session the master.
         hands.driver.master.end_session();
     }
     all_certain("not stopped for certain", failed)?;

@@ -1,4 +1,4 @@
-//! Outputs of boards as they come.
+//! Stream of outputs of boards.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,10 +14,10 @@ use super::shared::Listener;
 use crate::error::Failure;
 use crate::json;
 
-/// A bus on which no outputs come for so long has no control loop that runs.
+/// Time without outputs after which no control loop runs on the bus.
 const SILENCE: Duration = Duration::from_secs(3);
 
-/// The outputs of boards, one set after the other.
+/// Reader of the outputs of boards, one set after the other.
 #[pyclass(frozen, module = "openjtc._native")]
 pub struct ChainSamples {
     pub chain: Py<Chain>,
@@ -26,13 +26,13 @@ pub struct ChainSamples {
 
 #[pymethods]
 impl ChainSamples {
-    /// The next sample; None when none comes within `patience` seconds.
+    /// Returns the next sample; None if no sample comes within `patience` seconds.
     fn next<'py>(&self, py: Python<'py>, patience: Option<f64>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let chain = self.chain.get();
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
-            // Who waits has not gone.
+            // A waiting reader counts as a call, so it restarts the deadline.
             chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));

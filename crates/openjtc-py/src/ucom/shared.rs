@@ -1,4 +1,4 @@
-//! What the thread that owns a session and its callers share: what is asked of it, what has happened, who reads samples.
+//! State that the session's thread shares with its callers: requests, events and readers of samples.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -14,37 +14,37 @@ use super::alarms::Alarms;
 use super::hands::Hands;
 use crate::error::Failure;
 
-/// Events that are kept, newest last.
+/// Largest number of stored events, newest last.
 const EVENTS_MAX: usize = 4096;
-/// Samples that wait for their reader.
+/// Largest number of samples that wait for their reader.
 const SAMPLES_MAX: usize = 65_536;
 
-/// The kind of events with what an update has made of a board.
+/// Kind of events with the result of an update for a board.
 pub const UPDATED: &str = "updated";
 
-/// What kind of thing is asked.
+/// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A stop ends it.
+    /// A command; a stop cancels it.
     Command,
-    /// A stop does not end it: a board whose flash is half written could do nothing afterwards.
+    /// An update; a stop does not cancel it, because a board with half-written flash would not work.
     Update,
-    /// It ends what runs.
+    /// A stop; it cancels a running command.
     Stop,
 }
 
-/// Control loops that are to end before all else that is sent.
+/// Control loops that must end before any other frame is sent.
 pub enum Halt {
     All,
     Boards(Vec<u8>),
-    /// Those of the boards that this session has started.
+    /// Control loops of the boards that this session has started.
     Started,
 }
 
-/// Does something with the session, or takes the reason why it is not done.
+/// Function that works with the session, or receives the reason why it cannot run.
 pub type Act = Box<dyn FnOnce(Result<&mut Hands, Failure>) + Send>;
 
-/// A thing to do.
+/// A request in the queue.
 pub struct Work {
     pub id: u64,
     pub kind: Kind,
@@ -54,9 +54,9 @@ pub struct Work {
 #[derive(Default)]
 struct Queue {
     works: VecDeque<Work>,
-    /// What goes on, and whether it is to end.
+    /// Running request, and `true` if it is cancelled.
     current: Option<(u64, Kind, bool)>,
-    /// Nothing is taken any more, for this reason.
+    /// Reason why the queue is closed.
     closed: Option<Failure>,
 }
 
@@ -66,11 +66,11 @@ pub struct Sample {
     pub snapshot: Snapshot,
 }
 
-/// Who reads samples.
+/// Reader of samples.
 pub struct Listener {
-    /// Of these boards.
+    /// Boards whose samples are read.
     pub boards: BTreeSet<u8>,
-    /// What waits, and how many were dropped.
+    /// Waiting samples, and number of dropped samples.
     waiting: Mutex<(VecDeque<Sample>, u64)>,
     arrived: Condvar,
 }
@@ -80,20 +80,20 @@ impl Listener {
         Self { boards, waiting: Mutex::default(), arrived: Condvar::new() }
     }
 
-    /// The next sample; waits at most so long.
+    /// Returns the next sample; waits at most `patience`.
     pub fn next(&self, patience: Duration) -> Option<Sample> {
         let waiting = lock(&self.waiting);
         let waited = self.arrived.wait_timeout_while(waiting, patience, |(samples, _)| samples.is_empty());
         waited.unwrap_or_else(PoisonError::into_inner).0.0.pop_front()
     }
 
-    /// Samples that were dropped, as nobody took them in time.
+    /// Returns the number of samples that were dropped because the reader was too slow.
     pub fn dropped(&self) -> u64 {
         lock(&self.waiting).1
     }
 }
 
-/// What the thread and its callers share.
+/// State that the thread shares with its callers.
 #[derive(Default)]
 pub struct Shared {
     queue: Mutex<Queue>,
@@ -104,19 +104,19 @@ pub struct Shared {
     pub alarms: Alarms,
     listeners: Mutex<Vec<Weak<Listener>>>,
     asked_at: Mutex<Option<Instant>>,
-    /// Boards that the session has started, also for who comes when its thread is gone.
+    /// Boards that the session has started; readable also after its thread has ended.
     started: Mutex<Vec<u8>>,
-    /// Boards whose end is not certain.
+    /// Boards that are not certainly stopped.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
 }
 
-/// Also where a thread has panicked meanwhile: nothing is left half changed.
+/// Locks a mutex, also after a panic of a thread, because no data is left half changed.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A failure of the session itself.
+/// Makes a failure of the session itself.
 pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'static str) -> Failure {
     Failure::new(kind, code, message).next(next)
 }
@@ -125,83 +125,83 @@ fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "a stop came before its turn: it is not done", "")
 }
 
-/// The process in which something was begun: one that was forked from it has its memory, and none of its threads.
+/// Process that created an object; a forked child has the memory of its parent, but none of its threads.
 pub struct Process(u32);
 
 impl Process {
-    /// This one.
+    /// Returns the present process.
     pub fn this() -> Self {
         Self(std::process::id())
     }
 
-    /// It is this one.
+    /// Returns `true` in the process that created the object.
     pub fn is_this(&self) -> bool {
         self.0 == std::process::id()
     }
 }
 
-/// What should never happen has.
+/// Returns the failure for a fault of the chain's thread.
 pub fn fault() -> Failure {
     failure(ErrorKind::Fault, "fault", "the thread of the chain has a fault", "connect again")
 }
 
 impl Shared {
-    /// What goes on is to end.
+    /// Returns `true` if the running request is cancelled or the session ends.
     pub fn is_cancelled(&self) -> bool {
         self.has_ended() || lock(&self.queue).current.is_some_and(|(_, _, cancelled)| cancelled)
     }
 
-    /// A number for the next thing to do.
+    /// Returns a number for the next request.
     pub fn next_id(&self) -> u64 {
         self.next_id.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Has the session end.
+    /// Ends the session.
     pub fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Control loops are to end before all else that is sent.
+    /// Requests that control loops end before any other frame is sent.
     pub fn halt(&self, halt: Halt) {
         lock(&self.halts).push(halt);
     }
 
-    /// Boards that the session has started.
+    /// Sets the boards that the session has started.
     pub fn has_started(&self, boards: Vec<u8>) {
         *lock(&self.started) = boards;
     }
 
-    /// The thread has a fault: nobody has stopped what was started.
+    /// Reports all started boards as not stopped, after a fault of the thread.
     pub fn all_left(&self) {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
-    /// Boards whose end is not certain, at the end of the session.
+    /// Sets the boards that are not certainly stopped at the end of the session.
     pub fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
-    /// The same, once.
+    /// Takes the boards that are not certainly stopped.
     pub fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
 
-    /// The session is to end.
+    /// Returns `true` after [`Self::end`].
     pub fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }
 
-    /// Control loops that are to end now.
+    /// Takes the control loops that must end now.
     pub fn halts(&self) -> Vec<Halt> {
         std::mem::take(&mut *lock(&self.halts))
     }
 
-    /// A stop waits for its turn.
+    /// Returns `true` if the next request is a stop.
     pub fn stop_waits(&self) -> bool {
         lock(&self.queue).works.front().is_some_and(|work| work.kind == Kind::Stop)
     }
 
-    /// Something happened.
+    /// Adds an event.
     pub fn event(&self, time_s: f64, kind: &str, board: Option<u8>, text: String) {
         let mut events = lock(&self.events);
         events.0 += 1;
@@ -215,37 +215,38 @@ impl Shared {
         }
     }
 
-    /// The number of the last event.
+    /// Returns the number of the last event.
     pub fn last_event(&self) -> u64 {
         lock(&self.events).0
     }
 
-    /// Events with higher numbers, oldest first.
+    /// Returns events with higher numbers, oldest first.
     pub fn events(&self, after: u64) -> Value {
         self.asked();
         let events = lock(&self.events);
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
     }
 
-    /// What updates have made of boards since this event.
+    /// Returns the results of updates since this event.
     pub fn outcomes(&self, after: u64) -> Vec<String> {
         let events = self.events(after);
         let of_updates = events.as_array().into_iter().flatten().filter(|event| event["kind"] == UPDATED);
         of_updates.filter_map(|event| Some(event["text"].as_str()?.to_owned())).collect()
     }
 
-    /// The bus as it was last seen.
+    /// Stores the last known state of the bus.
     pub fn seen(&self, value: Value) {
         *lock(&self.seen) = value;
     }
 
-    /// Load and frames of the bus.
+    /// Returns load and frame counts of the bus.
     pub fn bus(&self) -> Value {
         self.asked();
         lock(&self.seen).clone()
     }
 
-    /// Nothing was asked for so long, while boards ran: they were stopped, but for those whose end is not certain.
+    /// Reports that running boards were stopped because no call came within the deadline; `not_stopped` lists boards whose stop is not
+    /// certain.
     pub fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text = format!(
             "nothing was asked of the chain for {} s: its boards are stopped",
@@ -260,23 +261,23 @@ impl Shared {
         self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 
-    /// Somebody has asked for something, or what was asked for is done.
+    /// Restarts the deadline, at a request or after its end.
     pub fn asked(&self) {
         *lock(&self.asked_at) = Some(Instant::now());
     }
 
-    /// How long nothing was asked for.
+    /// Returns the time since the last request.
     pub fn silence(&self) -> Duration {
         lock(&self.asked_at).map_or(Duration::ZERO, |at| at.elapsed())
     }
 
-    /// Reports what has to be an error, once.
+    /// Returns each waiting alarm as an error, once.
     pub fn check(&self) -> Result<(), Failure> {
         self.asked();
         self.alarms.check()
     }
 
-    /// A snapshot for those who read it.
+    /// Passes a snapshot to its readers.
     pub fn sampled(&self, known: &Arc<Known>, snapshot: &Snapshot) {
         lock(&self.listeners).retain(|listener| {
             let Some(listener) = listener.upgrade() else { return false };
@@ -293,12 +294,12 @@ impl Shared {
         });
     }
 
-    /// Somebody reads samples from now on.
+    /// Adds a reader of samples.
     pub fn listen(&self, listener: &Arc<Listener>) {
         lock(&self.listeners).push(Arc::downgrade(listener));
     }
 
-    /// The next thing to do.
+    /// Takes the next request and runs it.
     pub fn take(&self, hands: &mut Hands) -> bool {
         let work = {
             let mut queue = lock(&self.queue);
@@ -314,12 +315,12 @@ impl Shared {
         true
     }
 
-    /// Why nothing is done any more; `None`: it goes on.
+    /// Returns the reason why the queue is closed; `None`: it is open.
     pub fn gone(&self) -> Option<Failure> {
         lock(&self.queue).closed.clone()
     }
 
-    /// Nothing is taken any more.
+    /// Closes the queue.
     pub fn close(&self, why: Failure) {
         let works = {
             let mut queue = lock(&self.queue);
@@ -329,7 +330,7 @@ impl Shared {
         works.into_iter().for_each(|work| (work.act)(Err(why.clone())));
     }
 
-    /// Puts a thing to do in its place; a stop ends what goes on, what waits is not done.
+    /// Queues a request. A stop cancels a running command and discards all waiting requests except stops.
     pub fn put(&self, work: Work) {
         self.asked();
         let (refused, why) = {
@@ -355,7 +356,7 @@ impl Shared {
         refused.into_iter().for_each(|work: Work| (work.act)(Err(why.clone())));
     }
 
-    /// Ends one thing: what it has to undo on the boards is still done.
+    /// Cancels a request; changes that it must undo on the boards are still undone.
     pub fn cancel(&self, id: u64) {
         let waiting = {
             let mut queue = lock(&self.queue);

@@ -1,4 +1,4 @@
-//! A simulated chain in this process, behind a socketcand server on this computer, so that other programs can join its bus.
+//! Simulated chain in this process. A socketcand server on this computer lets other programs join its bus.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,10 +14,10 @@ use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
 use super::shared::Process;
 use crate::error::Failure;
 
-/// How long nothing that happens outside is waited for.
+/// Longest wait between two checks for outside requests.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// What is simulated.
+/// Options of a simulation.
 #[derive(Default)]
 pub struct Simulation {
     pub profile: Profile,
@@ -27,7 +27,7 @@ pub struct Simulation {
     pub seed: u64,
 }
 
-/// A chain that goes on in a thread until the last of its owners is gone.
+/// Simulated chain that runs in a thread until its last owner is dropped.
 pub struct Simulated {
     url: String,
     boards: usize,
@@ -38,7 +38,7 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// Starts it at a free port of this computer.
+    /// Starts the chain at a free port of this computer.
     pub fn start(simulation: Simulation) -> Result<Self, Failure> {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
@@ -72,7 +72,7 @@ impl Simulated {
                 Ok(server) => server,
                 Err(error) => return drop(ready.send(Err(error.to_string()))),
             };
-            // Who waits for it has not gone.
+            // The receiver still waits, so sending cannot fail.
             let _ = ready.send(Ok(server.url()));
             while !end.load(Ordering::Relaxed) {
                 lines.try_iter().for_each(|line| server.fault(&line));
@@ -85,12 +85,12 @@ impl Simulated {
         Ok(Self { url, boards, faults, ended, thread, process: Process::this() })
     }
 
-    /// The URL of its bus.
+    /// Returns the URL of its bus.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Ends it and waits for that.
+    /// Ends the chain and waits for its thread.
     fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();

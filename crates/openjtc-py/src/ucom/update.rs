@@ -1,4 +1,4 @@
-//! Firmware onto boards: checked, written, read back.
+//! Updates the firmware of boards: checks, writes and reads back.
 
 use std::path::PathBuf;
 
@@ -19,31 +19,31 @@ use super::hands::Hands;
 use super::shared::UPDATED;
 use crate::error::Failure;
 
-/// Where an image comes from.
+/// Source of an image.
 pub enum Source {
     File(PathBuf),
     Bytes(Vec<u8>),
 }
 
-/// How images are read.
+/// Options for reading images.
 pub struct Read {
     pub raw: bool,
     pub addresses: Option<String>,
     pub fill_gaps: bool,
     pub name_target: bool,
-    /// Year, month and day that were asked for; `None`: today.
+    /// Requested year, month and day; `None`: today.
     pub date: Option<(u16, u8, u8)>,
     pub today: (u16, u8, u8),
 }
 
-/// What is to be updated with what.
+/// Update job: boards, image and options.
 pub struct Update {
     pub boards: Boards,
     pub image: UpdateImage,
     pub second: Option<UpdateImage>,
-    /// The flash date in the profile's form.
+    /// Flash date in the profile's form.
     pub date: u16,
-    /// No date was asked for.
+    /// `true` if the caller gave no date.
     pub any_date: bool,
     pub flash_number: Option<u16>,
     pub expect_program_id: Option<u16>,
@@ -58,7 +58,7 @@ pub struct Update {
 }
 
 impl Read {
-    /// The images of both cycles, where there are two, and the flash date in the profile's form.
+    /// Reads the image, or the images of both cycles if there are two, and the flash date in the profile's form.
     pub fn read(
         &self,
         first: &Source,
@@ -84,7 +84,7 @@ impl Read {
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
-    /// The flash date in the profile's form; 0 where no header carries it.
+    /// Returns the flash date in the profile's form; 0 if no header has a date.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: it goes into the header, and the profile sends none";
@@ -110,14 +110,14 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, Failure
             Source::File(path) => path.display().to_string(),
             Source::Bytes(_) => "image".into(),
         };
-        // Some mistakes name the file themselves.
+        // Some error texts already contain the file name.
         Failure::usage(if text.contains(&name) { text.clone() } else { format!("{name}: {text}") })
             .next(advice(&e))
     })?;
     Ok(image.into())
 }
 
-/// What helps against a file that is no image. It never leads past a check of what the file holds.
+/// Returns the advice for an invalid image file. The advice never skips a check of the file's content.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -138,7 +138,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Which flash number each board must have: named, else as the inventory has it.
+/// Returns the flash number that each board must have: from the caller, else from the inventory.
 fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
@@ -149,7 +149,7 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
             }
         };
     }
-    // One board by its number alone is what the user asked for; a list needs to know who is who.
+    // A single board may be given by its number alone; several boards need an inventory.
     if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &hands.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
@@ -161,7 +161,7 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
     numbers.iter().map(target).collect()
 }
 
-/// Nobody knows which board stands there.
+/// Returns the failure for a board that the inventory does not list.
 fn not_listed(hands: &Hands, board: u8) -> Failure {
     let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
     let error = match hands.inventory {
@@ -173,7 +173,7 @@ fn not_listed(hands: &Hands, board: u8) -> Failure {
     own
 }
 
-/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
+/// Returns the selected boards. `all` means boards that answer and boards of the inventory, so that a missing board is reported.
 fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, Failure> {
     let mut numbers = hands.driver.numbers(boards)?;
     if let (Boards::All, Some(inventory)) = (boards, &hands.inventory) {
@@ -184,7 +184,7 @@ fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, Failure> {
     Ok(numbers)
 }
 
-/// Programs the boards that are meant; `report` gets the progress.
+/// Programs the selected boards; `report` receives the progress.
 pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Result<Value, Failure> {
     let profile = hands.driver.master.profile();
     let numbers = numbers(hands, &update.boards)?;
@@ -201,7 +201,7 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
         second: update.second,
         expect_program_id: update.expect_program_id,
         name_target: update.name_target,
-        // The other boards of an update session are none the worse for one that fails.
+        // A board that fails does not affect the other boards of the update.
         keep_going: several,
         ..UpdateOptions::new(targets, update.image, update.date)
     };
@@ -219,7 +219,7 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
     }
 }
 
-/// What became of each board, also where nobody takes the report any more.
+/// Adds an event with the result of each board, in case no caller receives the report.
 fn note_outcomes(hands: &Hands, report: &UpdateReport) {
     let time_s = hands.driver.now_us() as f64 * 1e-6;
     for one in report.boards.iter().filter(|_| !report.dry_run) {
@@ -241,7 +241,7 @@ fn step(progress: &Progress) -> Value {
     })
 }
 
-/// What an update that did not end well ended with.
+/// Returns the failure of an unsuccessful update.
 fn failed(report: &UpdateReport, kind: ErrorKind) -> Failure {
     let failures: Vec<_> =
         report.boards.iter().filter_map(|b| Some((b.board, b.failure.as_ref()?))).collect();

@@ -16,10 +16,10 @@ use super::hands::Hands;
 use super::objects;
 use crate::error::Failure;
 
-/// The last outputs of a board are old after so long, µs.
+/// Age after which the last outputs of a board are old, µs.
 const OLD_US: u64 = 500_000;
 
-/// The names of boards.
+/// Returns the signals of boards.
 pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let mut all = Vec::new();
@@ -29,7 +29,7 @@ pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     Ok(all.into())
 }
 
-/// Sets an input, or a parameter where no input has this name or `buffer` asks for it. What was sent, in the signal's unit.
+/// Sets an input, or a parameter if no input has this name or `buffer` selects it. Returns the sent value in the signal's unit.
 pub fn set(
     hands: &mut Hands,
     board: u8,
@@ -51,7 +51,7 @@ pub fn set(
     note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = hands.driver.now_us();
     let boards = hands.driver.master.boards();
-    // Of a board that runs inputs are repeated: one that is lost is followed by others. One without power does not run.
+    // The inputs of a running board are repeated, so a lost frame does not matter. A board without power does not run.
     let runs = hands.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -75,15 +75,15 @@ pub fn set(
     Ok(signal.map_or(Value::Null, |signal| signal.json(word.word)))
 }
 
-/// Outputs with their age, inputs and parameters of boards; those whose names are not known are asked.
+/// Returns outputs with their age, inputs and parameters of boards. Queries unknown signal names.
 pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(boards)?;
     let numbers = with_names(hands, &numbers, *boards == Boards::All)?;
     numbers.into_iter().map(|board| of_board(hands, board)).collect()
 }
 
-/// Those of the boards that have names, which are known from now on. Of `all` that are there those are passed over that cannot be asked,
-/// as their applications are not started, unless that is all of them.
+/// Returns the boards with signal names, which are cached. With `all`, skips boards whose applications are not started; returns an error
+/// if this leaves no board.
 pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
     let (mut named, mut idle) = (BTreeSet::new(), None);
     for board in boards {
@@ -101,7 +101,7 @@ pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSe
     }
 }
 
-/// The same of boards that run; outputs that are old are an error.
+/// Like [`values`], for running boards; old outputs are an error.
 pub fn running(hands: &mut Hands) -> Result<Value, Failure> {
     let numbers: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
     let all = values(hands, &Boards::Some(numbers))?;
@@ -111,7 +111,7 @@ pub fn running(hands: &mut Hands) -> Result<Value, Failure> {
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
-        // The reason, where it is known.
+        // Reports the reason first, if it is known.
         hands.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
@@ -126,7 +126,7 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     let followed = held.followed.outputs(&hands.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
-    // A board that somebody else runs.
+    // Another program runs this board.
     let other =
         || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
@@ -142,7 +142,7 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     }))
 }
 
-/// A value by its name: an output of a board that sends them, else an input, else a parameter. What is old is an error.
+/// Returns a value by its name: an output of a board that sends outputs, else an input, else a parameter. An old output is an error.
 pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
@@ -160,14 +160,14 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure>
         Buffer::Par => "parameters",
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
-        // The reason, where it is known.
+        // Reports the reason first, if it is known.
         hands.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }
     Ok(list[usize::from(index)][1].clone())
 }
 
-/// Nothing new of this board; `what` is one output, or all of them.
+/// Returns the failure for missing or old outputs of a board; `what` is one output, or all of them.
 fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
@@ -178,7 +178,7 @@ fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
         .with(Facts::default().at_board(board))
 }
 
-/// Writes a parameter file: what was written last as values, all other names as comments.
+/// Returns the text of a parameter file: the values written last, and all other names as comments.
 pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
     for board in hands.driver.numbers(boards)? {
@@ -208,7 +208,7 @@ pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Fai
     Ok(params_text(&saved))
 }
 
-/// Checks a whole parameter file against the boards, then writes its parameters. How many.
+/// Checks a whole parameter file against the boards, then writes its parameters. Returns their number.
 pub fn apply_parameters(
     hands: &mut Hands,
     file: &ParameterFile,
@@ -216,7 +216,7 @@ pub fn apply_parameters(
     force: bool,
 ) -> Result<usize, Failure> {
     file.identities(&mut hands.driver)?;
-    // What is written to must run. To check, what is known will do.
+    // Writing needs a running application; a dry run only needs known names.
     let session = &mut hands.session;
     let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =
@@ -233,7 +233,7 @@ pub fn apply_parameters(
     Ok(all.iter().map(|p| p.words.len()).sum())
 }
 
-/// What the boards want their inputs to be at first.
+/// Reads the initial inputs that a board requests.
 pub fn initial_inputs(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     match hands.driver.run(Request::InitialInputs { board })? {

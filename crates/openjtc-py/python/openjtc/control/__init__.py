@@ -1,6 +1,7 @@
-"""The real control code, one tick a call: what runs on the board, in the simulator, and here.
+"""The real control code, one tick per call. The same code runs on the board and in the simulator.
 
-A tick is a millisecond. What the controller receives goes in, what it sends comes out; there is no clock, and no thread::
+A tick is a millisecond. The call takes everything that the controller received and returns everything that it sends. The code has neither
+a clock nor a thread::
 
     controller = Controller()
     answers, host = [], b"".join(encode.use_defaults())
@@ -8,7 +9,7 @@ A tick is a millisecond. What the controller receives goes in, what it sends com
         out = controller.tick(Inputs(bus=answers, host=host))
         answers, host = drives(out.bus), b""          # your drives: see openjtc.control.bus
 
-:mod:`openjtc.control.encode` makes the frames of the host, :class:`StatusReader` reads what the controller reports, and
+:mod:`openjtc.control.encode` makes the frames of the host, :class:`StatusReader` reads the controller's statuses, and
 :mod:`openjtc.control.bus` has both ends of the joint bus. :class:`openjtc.sim.Simulator` is this controller with simulated drives.
 """
 
@@ -35,23 +36,23 @@ __all__ = [
     "encode",
 ]
 
-#: A frame of the joint bus: 11-bit identifier and payload of at most 24 bytes (CAN FD).
+#: Frame of the joint bus: 11-bit identifier and payload of at most 24 bytes (CAN FD).
 Frame = tuple[int, bytes]
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a tick is given.
+    """Inputs of a tick.
 
     Attributes:
         bus: Frames of the joint bus that were received since the last tick, oldest first.
-        host: Bytes that the host sent since the last tick, in any pieces.
-        acknowledged: The frame of the last tick was acknowledged on the bus.
-        bus_off: The CAN controller is bus-off.
-        safety_input: Level of the safety input; True is no error.
-        status_free: The serial transmitter can take a status.
-        ticked: The tick comes. False: the timer is late by a whole tick, and nothing is looked at but the bytes of the host; after ten in a
-            row the watchdog resets the controller.
+        host: Bytes that the host sent since the last tick; frames may be split anywhere.
+        acknowledged: True if the frame of the last tick was acknowledged on the bus.
+        bus_off: True if the CAN controller is bus-off.
+        safety_input: Level of the safety input; True means no error.
+        status_free: True if the serial transmitter can take a status.
+        ticked: True if the tick occurs. False: the timer is late by a whole tick, and only the bytes of the host are read. After ten
+            missing ticks in a row the watchdog resets the controller.
     """
 
     bus: Sequence[Frame] = ()
@@ -65,14 +66,14 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What a tick gives out; two of them are equal where every bit is.
+    """Outputs of a tick; two outputs are equal if every bit is equal.
 
     Attributes:
-        bus: The frame for the joint bus; None in the first tick, and where the tick did not come.
-        host: Bytes for the host: a status (25 times a second), an answer, or nothing.
-        safety_output: Level of the safety output; True is no error. Where the tick did not come it is as before; after a reset False.
-        telemetry: What the tick computed: set values, measured values, the torque in its parts.
-        reset: The watchdog has reset the controller.
+        bus: Frame for the joint bus; None in the first tick, and for a missing tick.
+        host: Bytes for the host: a status (25 times a second), an answer, or no bytes.
+        safety_output: Level of the safety output; True means no error. A missing tick keeps the level; after a reset it is False.
+        telemetry: Values that the tick computed: set values, measured values, the torque in its parts.
+        reset: True if the watchdog has reset the controller.
     """
 
     bus: Frame | None
@@ -83,21 +84,21 @@ class Outputs:
 
 
 class Controller:
-    """A controller on its board, with power just switched on.
+    """A controller on its board, immediately after power-on.
 
     Args:
-        arm: It has this arm stored, which :func:`openjtc.control.encode.use_defaults` then means; an arm whose file does not give all of
-            it only sets the limits. None: a controller as new, with the built-in arm.
+        arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. An arm with an incomplete file only
+            sets the limits. None: a controller as new, with the built-in arm.
     """
 
     def __init__(self, arm: Arm | None = None) -> None:
         self._native = _native.Controller(arm)
 
     def tick(self, inputs: Inputs = Inputs()) -> Outputs:
-        """One millisecond.
+        """Runs one tick, 1 ms.
 
         Raises:
-            UsageError: A frame that no joint bus carries.
+            UsageError: A frame is not possible on the joint bus.
         """
         frames = [(id, bytes(data)) for id, data in inputs.bus]
         sent, host, safety_output, reset = self._native.tick(
@@ -113,10 +114,10 @@ class Controller:
 
     @property
     def telemetry(self) -> Telemetry:
-        """What the last tick computed."""
+        """Values that the last tick computed."""
         return self._native.telemetry
 
     @property
     def time(self) -> float:
-        """Time since the start, s: a thousandth of the ticks."""
+        """Time since the start, s: number of ticks / 1000."""
         return self._native.time

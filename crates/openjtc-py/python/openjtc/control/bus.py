@@ -1,8 +1,8 @@
-"""The joint bus from the side of the drives: requests of the controller read, answers made.
+"""The joint bus from the side of the drives: reads requests of the controller and makes answers.
 
-This is a wire: its nodes count from 0. Node 2 is the drive of joint 3, and node 6 the gripper. A drive answers each
+On the bus, nodes are numbered from 0. Node 2 is the drive of joint 3, and node 6 is the gripper. A drive answers each
 :class:`Move` with :func:`joint_answer`, each :class:`ChangeState` with :func:`state_answer`, and each :class:`Configure` with
-:func:`configured_answer`; the gripper with :func:`gripper_answer` in place of the first. Resets are not answered.
+:func:`configured_answer`. The gripper answers a :class:`Move` with :func:`gripper_answer`. Resets are not answered.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ __all__ = [
 
 #: Node of the gripper.
 GRIPPER = 6
-#: State of a node: motor off, waits for its configuration.
+#: State of a node: motor off, waiting for its configuration.
 INIT = 1
 #: State of a node: configured, motor off.
 READY = 2
-#: State of a node: it follows its command.
+#: State of a node: follows its command.
 ENABLED = 3
 #: State of a node: fault.
 FAULT = 255
@@ -47,7 +47,7 @@ FAULT = 255
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """Torques (6,) at the joints, N·m, and the pump."""
+    """Request for torques (6,) at the joints, N·m, and for the pump."""
 
     torque: NDArray[np.float64]
     pump: bool
@@ -55,7 +55,7 @@ class Move:
 
 @dataclass(frozen=True)
 class ChangeState:
-    """The state that each of the seven nodes shall have; 0: stay as it is."""
+    """Request for a state of each of the seven nodes; 0: no change."""
 
     target: tuple[int, ...]
 
@@ -71,7 +71,7 @@ class Configure:
 
 @dataclass(frozen=True)
 class Reset:
-    """Restart of one node, or of all (None)."""
+    """Restart of one node, or of all nodes (None)."""
 
     node: int | None
 
@@ -80,10 +80,10 @@ Request = Move | ChangeState | Configure | Reset
 
 
 def parse(frame: tuple[int, bytes]) -> Request:
-    """What the controller asks for with a frame.
+    """Reads the controller's request from a frame.
 
     Raises:
-        UsageError: It is no request of this bus.
+        UsageError: The frame is not a request of this bus.
     """
     kind, numbers = _native.bus_request(*frame)
     values = cast(Any, numbers)
@@ -107,15 +107,15 @@ def joint_answer(
     errors: int = 0,
     warnings: int = 0,
 ) -> tuple[int, bytes]:
-    """A drive's answer to a :class:`Move`; numbers beyond the scale of the bus are at its end.
+    """Makes a drive's answer to a :class:`Move`. Numbers beyond the scale of the bus are limited to it.
 
     Args:
-        node: 0 to 5.
-        position: rad.
-        velocity: rad/s.
-        torque: That it gives, N·m.
+        node: Node, 0 to 5.
+        position: Position, rad.
+        velocity: Velocity, rad/s.
+        torque: Torque that the drive applies, N·m.
         state: :data:`INIT`, :data:`READY`, :data:`ENABLED` or :data:`FAULT`.
-        temperature: Of the bearing, °C.
+        temperature: Bearing temperature, °C.
         errors: Error bits.
         warnings: Warning bits.
     """
@@ -123,15 +123,15 @@ def joint_answer(
 
 
 def gripper_answer(*, pump: bool = False, part: bool = False, state: int = READY, errors: int = 0) -> tuple[int, bytes]:
-    """The gripper's answer to a :class:`Move`; ``part``: both vacuum levels are reached."""
+    """Makes the gripper's answer to a :class:`Move`; ``part`` is true if both vacuum levels are reached."""
     return _native.bus_gripper_answer(pump, part, state, errors)
 
 
 def state_answer(node: int, state: int) -> tuple[int, bytes]:
-    """A node's answer to a :class:`ChangeState`: the state that it has when it receives it."""
+    """Makes a node's answer to a :class:`ChangeState`: the state of the node when it receives the request."""
     return _native.bus_state_answer(node, state)
 
 
 def configured_answer(node: int, accepted: bool = True) -> tuple[int, bytes]:
-    """A node's answer to a :class:`Configure`."""
+    """Makes a node's answer to a :class:`Configure`."""
     return _native.bus_configured_answer(node, accepted)

@@ -1,6 +1,6 @@
 """Frames from the host to the controller, as bytes of the serial line.
 
-The controller answers each with a response in its next status (:class:`openjtc.control.StatusReader`).
+The controller answers each frame with a response in its next status (:class:`openjtc.control.StatusReader`).
 """
 
 from __future__ import annotations
@@ -29,85 +29,85 @@ __all__ = [
 
 
 def use_defaults() -> list[bytes]:
-    """Three frames: the controller takes the friction, model and gains of the arm that it has stored, else those of ``Arm.avena()``.
+    """Makes three frames that select the friction, model and gains of the controller's stored arm, else of ``Arm.avena()``.
 
-    Without parameters it does not power an arm.
+    Without parameters the controller does not power an arm.
     """
     return [_native.encode_command(f"default {what}") for what in ("friction", "model", "gains")]
 
 
 def parameters(arm: Arm) -> list[bytes]:
-    """The frames of an arm's friction, model and gains, as far as its file gives them.
+    """Makes the frames of an arm's friction, model and gains, as far as its file has them.
 
     Raises:
-        UsageError: A number that no frame carries.
+        UsageError: A number does not fit into a frame.
     """
     return _native.encode_parameters(arm)
 
 
 def trajectory(trajectory: Trajectory, *, number: int = 1, points_a_frame: int = 100) -> list[bytes]:
-    """The frames of a trajectory, in the order in which they have to be sent. Nothing is checked but what a frame carries.
+    """Makes the frames of a trajectory, in the order in which they must be sent. Only the number ranges of the frames are checked.
 
     Args:
         trajectory: The points.
-        number: A number of its own, 0 to 65535.
-        points_a_frame: 1 to 1500; a trajectory has at most 100 frames.
+        number: Number of the trajectory, 0 to 65535.
+        points_a_frame: Points per frame, 1 to 1500; a trajectory has at most 100 frames.
 
     Raises:
-        UsageError: A number that no frame carries, or too many frames.
+        UsageError: A number does not fit into a frame, or there are too many frames.
     """
     return _native.encode_trajectory(trajectory, number, points_a_frame)
 
 
 def execute() -> bytes:
-    """Begin, or resume after a pause."""
+    """Makes the frame that starts a trajectory, or resumes it after a pause."""
     return _native.encode_command("execute")
 
 
 def pause() -> bytes:
-    """Come to rest on the path."""
+    """Makes the frame that pauses on the path."""
     return _native.encode_command("pause")
 
 
 def stop() -> bytes:
-    """Come to rest on the path, and forget the place on it."""
+    """Makes the frame that stops on the path and discards the place on it."""
     return _native.encode_command("stop")
 
 
 def teach() -> bytes:
-    """Let the arm be led by hand; :func:`hold` ends it."""
+    """Makes the frame that lets the arm be led by hand; :func:`hold` ends teaching."""
     return _native.encode_command("teach")
 
 
 def hold() -> bytes:
-    """End of teaching: hold the position."""
+    """Makes the frame that ends teaching and holds the position."""
     return _native.encode_command("hold")
 
 
 def jog(velocity: ArrayLike) -> bytes:
-    """Move the joints with these velocities (6,), rad/s, for as long as such frames keep coming."""
+    """Makes the frame that moves the joints with these velocities (6,), rad/s, as long as such frames keep coming."""
     return _native.encode_jog(velocity)
 
 
 def pump(on: bool) -> bytes:
-    """The gripper's pump."""
+    """Makes the frame that switches the gripper's pump."""
     return _native.encode_command("pump on" if on else "pump off")
 
 
 def payload(payload: Payload) -> bytes:
-    """What the arm carries from now on.
+    """Makes the frame that sets the payload of the arm.
 
     Raises:
-        UsageError: There is no such body.
+        UsageError: The payload is not physically consistent.
     """
     return _native.encode_payload(payload._numbers())
 
 
 def clear_errors() -> bytes:
-    """Clear the errors of the controller and of all drives."""
+    """Makes the frame that clears the errors of the controller and of all drives."""
     return _native.encode_command("clear errors")
 
 
 def disable() -> bytes:
-    """Take the torque from the drives: an arm without brakes falls."""
+    """Makes the frame that switches the drive torque off: an arm without brakes falls."""
     return _native.encode_command("disable")

@@ -1,4 +1,4 @@
-"""What a controller reports to its hosts, 25 times a second."""
+"""Status that a controller reports to its hosts, 25 times a second."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ __all__ = ["Response", "Status", "StatusReader"]
 
 @dataclass(frozen=True)
 class Response:
-    """What became of a frame that the host sent.
+    """Response of the controller to a frame of the host.
 
     Attributes:
-        frame_type: Its type byte; 0 where it is not known.
-        accepted: It arrived well and was obeyed.
-        words: Both in words.
-        length: Bytes received.
+        frame_type: Type byte of the frame; 0 if it is not known.
+        accepted: True if the frame arrived without error and was executed.
+        words: Frame type and result in words.
+        length: Number of bytes received.
     """
 
     frame_type: int
@@ -31,21 +31,21 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """One status. Arrays are (6,), base to wrist.
+    """A status of the controller. Arrays are (6,), base to wrist.
 
     Attributes:
         state: ``Start``, ``Init``, ``HoldPos``, ``Operate``, ``Teaching`` or ``Error``.
         trajectory: ``Null``, ``Stop`` (complete, at its start), ``Pause``, ``Execute`` or ``Finish``.
         point: Place on the trajectory, ms.
-        errors: Error word; 0 is none.
-        occurred: Errors since they were cleared.
-        causes: The errors in words.
-        position: rad.
-        velocity: rad/s.
-        torque: N·m.
-        temperature: °C.
+        errors: Error word; 0 means no error.
+        occurred: Error word of all errors since they were last cleared.
+        causes: Errors in words.
+        position: Positions, rad.
+        velocity: Velocities, rad/s.
+        torque: Torques, N·m.
+        temperature: Temperatures, °C.
         drives: States of the drives, in words.
-        response: What became of a frame, where this status reports it.
+        response: Response to a frame, if this status has one.
     """
 
     state: str
@@ -63,13 +63,13 @@ class Status:
 
 
 class StatusReader:
-    """Finds the statuses in the bytes that a controller sends, however they are cut."""
+    """Finds the statuses in the bytes of a controller, in pieces of any size."""
 
     def __init__(self) -> None:
         self._native = _native.StatusReader()
 
     def feed(self, data: bytes) -> list[Status]:
-        """The statuses that are complete with these bytes, oldest first."""
+        """Returns the statuses that these bytes complete, oldest first."""
         found = []
         for values in self._native.feed(data):
             response = values.pop("response")

@@ -1,4 +1,4 @@
-"""Chains of UCoM boards on a CAN bus: numbered, looked at, driven by name under supervision, updated.
+"""Chains of UCoM boards on a CAN bus: number, examine, drive by name under supervision, and update them.
 
 >>> from openjtc import ucom
 >>> with ucom.connect("sim:") as chain:
@@ -6,8 +6,9 @@
 ...     chain.run(1, active=True, inputs={"set_position": 1500})
 ...     print(chain["1.position"])
 
-The procedures are those of the command ``ucom``. Left to it are decoding and replaying recordings, signal databases, conformance
-tests that program a board, and ``ucom serve``: an agent that owns a bus is reached by HTTP, for which this package has no client yet.
+The procedures are the same as in the command ``ucom``. Only ``ucom`` decodes and replays recordings, makes signal databases, runs
+conformance tests that program a board, and has ``ucom serve``. An agent that owns a bus is reached by HTTP; this package has no client for
+HTTP yet.
 """
 
 from __future__ import annotations
@@ -84,17 +85,17 @@ def sim(
     seed: int = 1,
     profile: _Path | None = None,
 ) -> SimulatedChain:
-    """A simulated chain in this process, in real time; the same as ``ucom sim``.
+    """Starts a simulated chain in this process, in real time, like ``ucom sim``.
 
-    Its ``.url`` is a socketcand bus on this computer, which other programs can join. ``.fault("silent board=3 for_s=1")``
-    injects a fault (``ucom help faults``), ``.end()`` ends it.
+    The ``.url`` of the chain is a socketcand bus on this computer, which other programs can join. ``.fault("silent board=3 for_s=1")``
+    injects a fault (``ucom help faults``), ``.end()`` ends the chain.
 
     Args:
-        chain: A chain file, TOML (``ucom help sim``); None: a head with ten boards.
-        boards: How many of its boards, 0 to 31.
-        faults: Faults to inject, TOML (``ucom help faults``).
-        seed: Of all that is drawn by chance.
-        profile: How its boards read the protocol, TOML (``ucom help profile``).
+        chain: Chain file, TOML (``ucom help sim``); None: a head with ten boards.
+        boards: Number of boards, 0 to 31.
+        faults: Fault file, TOML (``ucom help faults``).
+        seed: Seed of all random numbers.
+        profile: Profile of how the boards read the protocol, TOML (``ucom help profile``).
 
     Raises:
         UsageError: A file cannot be understood.
@@ -115,23 +116,23 @@ def connect(
     cache: _Path | bool | None = None,
     deadline_s: float | None = None,
 ) -> Chain:
-    """A chain of boards on a bus; nothing is sent by this.
+    """Opens a chain of boards on a bus, without sending a frame.
 
     Args:
         bus: ``"socketcan:can0"``, ``"slcan:/dev/ttyACM0@1000000"``, ``"socketcand:localhost:29536/can0"``, ``"multicast:…"``,
-            ``"sim:"`` or ``"sim:FILE"`` for a simulated chain that ends with it, or what `sim` gives.
-        names: Names of boards, beside those of the inventory: ``{"gripper": 2}``.
-        signals: A signal table, TOML: types, scales and units of signals (``ucom help edges``).
-        inventory: An inventory file, TOML: who stands where. `Chain.init` writes it, or compares with it.
-        profile: How the boards read the protocol, TOML (``ucom help profile``).
-        on_lost: What is done when a board is lost; None: by the profile, which stops all.
-        cache: A folder where the names of signals are remembered; True or None: the user's, False (and for a simulated chain
-            None): nowhere.
-        deadline_s: With no call for so many seconds while boards run, they are stopped, and the next `Chain.check` raises a
-            `FaultError` (``deadline``). None: they run on as long as this process lives, also where the program hangs.
+            ``"sim:"`` or ``"sim:FILE"`` for a simulated chain that ends with this one, or the result of `sim`.
+        names: Names of boards in addition to the inventory: ``{"gripper": 2}``.
+        signals: Signal table, TOML: types, scales and units of signals (``ucom help edges``).
+        inventory: Inventory file, TOML: the place of each board. `Chain.init` writes the file or compares with it.
+        profile: Profile of how the boards read the protocol, TOML (``ucom help profile``).
+        on_lost: Reaction to a lost board; None: the reaction of the profile, by default stopping all boards.
+        cache: Folder that keeps the names of signals; True or None: the user's folder; False (and None for a simulated chain):
+            no folder.
+        deadline_s: Boards that run are stopped after this many seconds without a call, and the next `Chain.check` raises a
+            `FaultError` (``deadline``). None: boards run as long as this process lives, even if the program hangs.
 
     Raises:
-        UsageError: The URL is none, or a file cannot be understood.
+        UsageError: The URL is not valid, or a file cannot be understood.
         NoLinkError: The bus cannot be opened (``bus``).
     """
     simulated = bus if isinstance(bus, SimulatedChain) else None

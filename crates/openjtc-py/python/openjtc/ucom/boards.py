@@ -1,4 +1,4 @@
-"""Boards of a chain: who each is, its signals, and their values."""
+"""Boards of a chain: their identities, signals and values."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ if TYPE_CHECKING:
 
 __all__ = ["Board", "BoardValues", "Signal", "Signals", "Value"]
 
-#: A value of a signal in its unit; a bool for a switch. None where it is not known.
+#: Value of a signal in its unit; a bool for a switch; None if the value is not known.
 Value = bool | int | float | None
 
 
 @dataclass(frozen=True)
 class Signal:
-    """An input, an output or a parameter of a board: what its word of 16 bits means.
+    """An input, an output or a parameter of a board: the meaning of its word of 16 bits.
 
     Attributes:
-        name: Its name, without the unit in brackets behind it.
-        text: Its name as the board sends it.
-        index: Its place in the buffer, from 0.
+        name: Name, without the unit in brackets.
+        text: Name as the board sends it.
+        index: Place in the buffer, from 0.
         type: ``int16``, ``uint16``, ``hex`` or ``bool``.
-        unit: As ``deg``; empty where no signal table has one.
+        unit: Unit, such as ``deg``; empty if no signal table has a unit.
         scale: Units for each step of the word.
-        offset: What the word 0 means, in units.
+        offset: Value of the word 0, in units.
         minimum: Smallest value that may be written, in units.
         maximum: Largest value that may be written, in units.
-        known: It comes from a signal table; otherwise values are bare words.
+        known: True if the signal comes from a signal table; otherwise values are bare words.
     """
 
     name: str
@@ -51,8 +51,8 @@ class Signals:
     """All signals of a board.
 
     Attributes:
-        board: The number of the board.
-        description: What its application reports about itself.
+        board: Number of the board.
+        description: Description that its application reports.
         inputs: Controller inputs, in the order of the buffer.
         outputs: Sensor outputs, in the order of the buffer.
         parameters: Parameters, in the order of the buffer.
@@ -77,17 +77,17 @@ class Signals:
 
 @dataclass(frozen=True)
 class BoardValues:
-    """The values of a board at a time, by the names of its signals, in their units where a signal table has them.
+    """Values of a board at one time, by the names of its signals, in units if a signal table has them.
 
     Attributes:
-        board: The number of the board.
-        time_s: When its outputs came, s since the chain was opened; None: none came.
-        age_s: How old its outputs are, s; None: none came.
-        stale: Its outputs are no more the present ones: none come, or its heartbeats are missing.
+        board: Number of the board.
+        time_s: Time at which its outputs came, s since the chain was opened; None: no outputs came.
+        age_s: Age of its outputs, s; None: no outputs came.
+        stale: True if its outputs are out of date: no outputs come, or its heartbeats are missing.
         outputs: Sensor outputs, in the order of the buffer.
-        inputs: Inputs as last set or as the board wants them first; None where neither is known.
-        parameters: Parameters as this chain wrote them. Boards have no way to read them back: None where nothing was written
-            since the application started.
+        inputs: Inputs as last set, else the initial inputs of the board; None if neither is known.
+        parameters: Parameters as this chain wrote them, because boards cannot send them back. None: not written since the application
+            started.
         units: Units by name, as far as a signal table has them.
     """
 
@@ -102,7 +102,7 @@ class BoardValues:
 
     @property
     def array(self) -> NDArray[np.float64]:
-        """The outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
+        """Outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
         return _array(self.outputs)
 
     @classmethod
@@ -118,17 +118,17 @@ def _array(values: dict[str, Value]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Board:
-    """A board as it answered to PC_INFO. The protocol has no version of the hardware: the flash number is who it is.
+    """A board as it answered to PC_INFO. The protocol has no hardware version; the flash number identifies the board.
 
     Attributes:
-        number: Its address, which is its place in the chain, 1 to 31.
-        name: What people call it, by the inventory; empty where that has no name.
-        flash_number: The number of its bootloader: its identity.
+        number: Address of the board, which is its place in the chain, 1 to 31.
+        name: Name of the board in the inventory; empty if the inventory has no name.
+        flash_number: Number of its bootloader: its identity.
         state: ``exloader``, ``programming``, ``started`` or ``running``.
-        status: The names of the status bits that are set.
-        program_id: The checksum of its application: the version of its software; None: it has no valid application.
-        flash_date: When that was written, ``YYYY-MM-DD``; None: it has no valid application.
-        description: What it reports about itself; empty where that was not asked for, or never came whole.
+        status: Names of the status bits that are set.
+        program_id: Checksum of its application, which is its software version; None: no valid application.
+        flash_date: Date at which the application was written, ``YYYY-MM-DD``; None: no valid application.
+        description: Description that the board reports; empty if it was not requested or never arrived complete.
     """
 
     number: int
@@ -143,16 +143,16 @@ class Board:
 
     @property
     def signals(self) -> Signals:
-        """Its inputs, outputs and parameters.
+        """Inputs, outputs and parameters of the board.
 
         Raises:
-            RefusedError: Its application is not started, and its names are not remembered from before (``no-application``).
-            NoLinkError: It does not answer.
+            RefusedError: The application is not started, and its signal names are not remembered from before (``no-application``).
+            NoLinkError: The board does not answer.
         """
         return self._of_chain().signals(self.number)
 
     def values(self) -> BoardValues:
-        """Its values now."""
+        """Returns the present values of the board."""
         return self._of_chain().board_values(self.number)[self.number]
 
     def _of_chain(self) -> ValuesByName:

@@ -38,62 +38,63 @@ def _image(image: _Path | bytes | None) -> tuple[str | None, bytes | None]:
 class Chain(ValuesByName):
     """A chain of UCoM boards, made by `connect`.
 
-    A thread of its own owns the session: it sends heartbeats for what this chain has started, supervises the boards, and takes one
-    call after the other. Calls may come from any thread; they let other Python threads run. A context manager: at its end
-    control loops, then applications that this chain has started are stopped, as ``ucom`` does. So does Ctrl-C while a call waits,
-    before `KeyboardInterrupt` is raised, and the end of a program that has not closed its chain. One that is killed sends no
-    heartbeats any more, and the boards make their outputs safe by themselves after 1.5 s.
+    A separate thread owns the session. The thread sends heartbeats for boards that this chain has started, supervises the boards, and
+    takes one call after the other. Calls may come from any thread and let other Python threads run.
 
-    Inputs and outputs have names ``BOARD.SIGNAL``, the board by its number or its name (``"2.position"``, ``"gripper.position"``),
-    or the signal's name alone where only one board has it.
+    The end of the context stops the control loops, then the applications that this chain has started, as ``ucom`` does. Ctrl-C during a
+    call does the same before `KeyboardInterrupt` is raised, and so does the end of a program that has not closed its chain. A killed
+    program sends no more heartbeats, and the boards make their outputs safe by themselves after 1.5 s.
+
+    Inputs and outputs have names ``BOARD.SIGNAL``, with the board's number or name (``"2.position"``, ``"gripper.position"``). The
+    signal's name alone is enough if only one board has it.
 
     Every method may raise:
-        NoLinkError: The bus is gone, or a board does not answer (``.board``).
-        RefusedError: Another PC is master of the bus (``foreign-master``), or a check refuses it; nothing was changed.
+        NoLinkError: The bus is lost, or a board does not answer (``.board``).
+        RefusedError: Another PC is master of the bus (``foreign-master``), or a check refused the call; no board was changed.
         DeviceError: A board reports an error.
-        FaultError: It went wrong on the way, or was cancelled.
+        FaultError: The call failed while it ran, or was cancelled.
     ``.next`` of an error names commands of ``ucom``; methods of the same name do the same here.
     """
 
-    # Who is there.
+    # Discovery and numbers.
 
     def init(self, *, renew: bool = False, force: bool = False, check: bool = True) -> ScanReport:
-        """Resets all boards and gives them numbers along the init wire; their outputs become safe by that.
+        """Resets all boards and numbers them along the init wire. The reset makes their outputs safe.
 
-        The result is the inventory that updates of several boards go by. With an inventory file in `connect` it is compared with
-        that file, and written to it where all is well.
+        Updates of several boards use the result as inventory. If `connect` was given an inventory file, the result is compared with that
+        file, and written to it if the result has no findings.
 
         Args:
-            renew: Write the inventory anew, whatever stood in it.
-            force: Also when another PC is on the bus.
-            check: Raise an error for findings; otherwise they are in the report.
+            renew: Replaces the inventory without comparing.
+            force: Continues even if another PC is on the bus.
+            check: Raises an error for findings; False: only the report has them.
 
         Raises:
             DeviceError: Boards are missing, in another order, or not reached (``init``).
             NoLinkError: No board reported (``init``).
         """
-        # However it ends: names must not stand for the boards that had these numbers before.
+        # Forgets the names in any case, because they belong to the boards that had these numbers before.
         self._forget_boards()
         value = self._native.init(renew, force, check)
         return ScanReport(self._keep(value["boards"]), tuple(value["reports"]), tuple(value["findings"]))
 
     def info(self, boards: Boards = "all") -> dict[int, Board]:
-        """What boards report about themselves now."""
+        """Reads the present reports of boards."""
         return self._seen(self._native.info(self._list(boards)), whole=True)
 
     def status(
         self, boards: Boards = "all", *, set: Sequence[str] = (), clear: Sequence[str] = (), force: bool = False
     ) -> dict[int, Board]:
-        """Status of boards, after setting and clearing bits of it by name (``ASTART``, ``OPINIT``, …), with read-back."""
+        """Sets and clears status bits of boards by name (``ASTART``, ``OPINIT``, …), and reads the status back."""
         return self._seen(self._native.status(self._list(boards), list(set), list(clear), force))
 
     def repair(self, board: int | str, *, flash_number: int | None = None, force: bool = False) -> Board:
-        """Gives one board its number back; the others keep theirs.
+        """Restores the number of one board; the other boards keep their numbers.
 
         Args:
             board: The number.
-            flash_number: Of the board that must stand there; None: as the inventory has it.
-            force: Also when another PC is on the bus.
+            flash_number: Flash number of the board that belongs there; None: the flash number in the inventory.
+            force: Continues even if another PC is on the bus.
         """
         value = self._native.repair(self._number(board), flash_number, force)
         return self._seen([value])[value["number"]]
@@ -101,7 +102,7 @@ class Chain(ValuesByName):
     # Applications and control loops.
 
     def start(self, boards: Boards = "all", *, force: bool = False) -> dict[int, Board]:
-        """Starts applications; nothing moves by that. They are stopped when the chain is closed."""
+        """Starts applications, without any movement. Closing the chain stops the applications again."""
         return self._seen(self._native.start(self._list(boards), force))
 
     def run(
@@ -118,17 +119,17 @@ class Chain(ValuesByName):
         """Starts applications, writes parameters and inputs, then starts control loops, and supervises them from now on.
 
         Args:
-            boards: Which.
-            active: Enable the outputs: **things move**.
-            inputs: Inputs to begin with, by ``BOARD.NAME``, or by name for all of them.
-            parameters: Parameters to begin with, likewise.
-            file: A parameter file, YAML, as ``ucom par --save`` and `save_parameters` write it.
-            texts: Have the boards send the texts of their applications: events of the kind ``text``.
-            force: Also when the bus would be too busy, or another PC is on it.
+            boards: Boards to run.
+            active: Enables the outputs: **things move**.
+            inputs: Initial inputs, by ``BOARD.NAME``, or by name for all boards.
+            parameters: Initial parameters, by ``BOARD.NAME``, or by name for all boards.
+            file: Parameter file, YAML, as ``ucom par --save`` and `save_parameters` write it.
+            texts: Lets the boards send the texts of their applications, as events of the kind ``text``.
+            force: Continues even if the bus would be too busy, or another PC is on the bus.
 
         Raises:
-            RefusedError: A value is out of range (``value``, with ``.value`` and ``.limit``), the load of the bus too high
-                (``load``), or another check refuses it. What was begun is taken back.
+            RefusedError: A value is out of range (``value``, with ``.value`` and ``.limit``), the bus load is too high
+                (``load``), or another check refused the call. Steps that were already done are undone.
         """
         path = None if file is None else os.fspath(file)
         first, wanted = self._given(inputs or {}), self._given(parameters or {})
@@ -138,29 +139,29 @@ class Chain(ValuesByName):
         )
 
     def outputs(self, active: bool, boards: Boards = "all") -> None:
-        """Enables the outputs of boards that run, or makes them safe; ``all`` are those that this chain runs."""
+        """Enables the outputs of boards that run, or makes them safe; ``all`` means the boards that this chain runs."""
         self._native.outputs(self._list(boards), active)
 
     def stop(self, boards: Boards = "all", *, application: bool = True) -> dict[int, Board]:
-        """Stops boards, whoever has started them: control loops at once, then what each confirms.
+        """Stops boards, also boards that another program has started: control loops at once, then with confirmation of each board.
 
-        It goes before whatever another thread does on this chain: that ends with the error ``cancelled``, but for an update, which
-        goes on. Stopping is always allowed, also with another PC on the bus.
+        The stop interrupts a call of another thread on this chain, which ends with the error ``cancelled``; an update continues.
+        Stopping is always allowed, also with another PC on the bus.
 
         Args:
-            boards: Which; ``all`` by broadcast.
-            application: End applications, too; otherwise only control loops.
+            boards: Boards to stop; ``all`` by broadcast.
+            application: Ends applications, too; False: only control loops.
 
         Raises:
-            FaultError, NoLinkError: Boards are not stopped for certain.
+            FaultError, NoLinkError: Some boards may not be stopped.
         """
         return self._seen(self._native.stop(self._list(boards), application))
 
     def reset(self, boards: Boards = "all", *, force: bool = False) -> tuple[int, ...]:
-        """Resets boards: outputs become safe, and their numbers are gone until `init` or `repair`.
+        """Resets boards. Their outputs become safe, and they have no number until `init` or `repair`.
 
         Returns:
-            Low bytes of the flash numbers of those that reported.
+            Low bytes of the flash numbers of the boards that reported.
         """
         reports = self._native.reset(self._list(boards), force)
         self._boards.clear()
@@ -170,10 +171,10 @@ class Chain(ValuesByName):
         """Resets boards into their exloaders, with programming enabled."""
         return self._seen(self._native.xreset(self._list(boards), force))
 
-    # What is wrong.
+    # Diagnosis.
 
     def doctor(self) -> Examination:
-        """Listens to the bus for 1.5 s, asks who is there unless another PC is its master, and reports what is wrong."""
+        """Listens to the bus for 1.5 s, queries all boards unless another PC is the master, and reports the findings."""
         value = self._native.doctor()
         findings = tuple(Finding(**finding) for finding in value["findings"])
         return Examination(value["healthy"], findings, tuple(Board._of(one, self) for one in value["boards"]))
@@ -181,21 +182,21 @@ class Chain(ValuesByName):
     def probe(
         self, *, init: bool = False, alive: bool = False, image: _Path | None = None, force: bool = False
     ) -> ProbeReport:
-        """Measures how the boards read what the published protocol leaves open, by harmless questions.
+        """Measures how the boards read the points that the published protocol leaves open, by harmless requests.
 
-        The chain goes on with the profile that it has: what was measured counts for those that are connected with it.
+        This chain keeps its profile. To use the measured profile, pass it to `connect`.
 
         Args:
-            init: Also what shows only while numbers are given: resets and numbers the chain.
-            alive: Start a control loop, outputs safe, to see which heartbeats count; it is stopped again.
-            image: An image that is on a board, to find the checksum of Program IDs.
-            force: Also when another PC is on the bus, or, with ``init`` or ``alive``, control loops run, which end by that.
+            init: Also measures points that show only while boards are numbered: resets and numbers the chain.
+            alive: Starts a control loop with safe outputs to see which heartbeats count, and stops it again.
+            image: Image of a board's present application, to find the checksum of Program IDs.
+            force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control loops.
 
         Raises:
-            RefusedError: With ``init`` or ``alive``: control loops run (``running``), which would end by that.
+            RefusedError: Control loops run (``running``), and ``init`` or ``alive`` would end them.
         """
         if init:
-            # However it ends: names must not stand for the boards that had these numbers before.
+            # Forgets the names in any case, because they belong to the boards that had these numbers before.
             self._forget_boards()
         value = self._native.probe(init, alive, None if image is None else os.fspath(image), force)
         rows = tuple(ProbeRow(**row) for row in value["rows"])
@@ -210,14 +211,14 @@ class Chain(ValuesByName):
         only: Sequence[str] = (),
         force: bool = False,
     ) -> ConformanceReport:
-        """Tests whether boards keep to the protocol; without ``init`` and ``run`` by harmless requests alone.
+        """Tests the boards against the protocol. Without ``init`` and ``run`` only by harmless requests.
 
         Args:
-            boards: Which.
-            init: Also tests that reset and number the chain anew.
-            run: Also tests that start control loops, outputs safe; more than a minute a board.
-            only: Only these tests, as ``D-T10``.
-            force: Also when another PC is on the bus.
+            boards: Boards to test.
+            init: Includes tests that reset and renumber the chain.
+            run: Includes tests that start control loops with safe outputs; more than a minute per board.
+            only: Runs only these tests, such as ``D-T10``.
+            force: Continues even if another PC is on the bus.
         """
         return ConformanceReport._of(self._native.conformance(self._list(boards), init, run, list(only), force))
 
@@ -245,37 +246,38 @@ class Chain(ValuesByName):
         check: bool = True,
         progress: Callable[[Progress], None] | bool = True,
     ) -> UpdateReport:
-        """Updates the firmware of boards: the image is checked, transferred twice, and read back by its Program ID and date.
+        """Updates the firmware of boards: checks the image, transfers it twice, and reads back its Program ID and date.
 
-        A board shows Program ID and date only. It is skipped as ``up-to-date`` if the inventory file (without one: this chain)
-        also has it that the same bytes were written to the same address. Without that it is ``program-up-to-date``: nothing is
-        sent, and an error is raised unless ``unverified``. After a failure the same call goes on where it ended. Ctrl-C and an
-        exception of ``progress`` cancel it; what became of each board is in the notes of the exception (Python 3.11), and in
-        `events` (``updated``).
+        A board reports only Program ID and date. The board is skipped as ``up-to-date`` if the inventory file (without a file: this chain)
+        also records that the same bytes were written to the same address. Without that record it is ``program-up-to-date``: no image
+        is sent, and an error is raised unless ``unverified`` is true. After a failure, the same call continues from the point of failure.
+
+        Ctrl-C and an exception of ``progress`` cancel the update. The notes of the exception (Python 3.11) and `events` (``updated``) have
+        the result of each board.
 
         Args:
             image: Intel HEX, S-record or raw bytes of a ``.bin``, as a file; or the content of such a file.
-            boards: One board by its number, several by an inventory (`init`, or a file in `connect`).
-            flash_number: The flash number that the one board must have.
-            second: What the other cycle carries, where the profile's ``prog.plan`` sends two images.
-            raw: Take a file of any name as raw bytes; never records, and text only from a ``.bin``.
-            addresses: What addresses of records count, where that cannot be seen.
-            fill_gaps: Fill gaps between records with FF.
-            date: Flash date; None: today, UTC, and a board that shows the program keeps its date.
+            boards: A single board by its number, several boards by an inventory (`init`, or a file in `connect`).
+            flash_number: Flash number that the single board must have.
+            second: Image of the other cycle, if the profile's ``prog.plan`` sends two images.
+            raw: Reads a file of any name as raw bytes; never records, and text only from a ``.bin``.
+            addresses: Unit of the addresses in records, if the file does not show it.
+            fill_gaps: Fills gaps between records with FF.
+            date: Flash date; None: today, UTC. A board that shows the program already keeps its date.
             expect_program_id: Program ID that the boards must show at the end.
-            name_target: The header names the board: another one refuses the image.
-            group: All boards with one transfer, by broadcast.
-            start: Start the application at the end; like what `start` has started it is stopped when the chain is closed.
-            dry_run: Only the checks; nothing is sent that changes a board.
-            unverified: What cannot be verified is as good as what was: also ``program-up-to-date``.
-            force: Also when boards run, another PC is on the bus, or the board shows the program already.
-            rewrite: Also when the board shows the program already; lifts no check.
-            check: Raise an error where a board was not updated; otherwise it is in the report.
-            progress: Called with each `Progress`; True: a line on a terminal's stderr.
+            name_target: Names the board in the header, so that any other board refuses the image.
+            group: Updates all boards with one transfer, by broadcast.
+            start: Starts the application at the end; closing the chain stops the application, as after `start`.
+            dry_run: Only runs the checks; no frame that changes a board is sent.
+            unverified: Accepts boards that cannot be verified, also ``program-up-to-date``.
+            force: Continues even if boards run, another PC is on the bus, or the board shows the program already.
+            rewrite: Updates a board that shows the program already; skips no check.
+            check: Raises an error if a board was not updated; False: only the report has the failure.
+            progress: Function that is called with each `Progress`; True: a line on a terminal's stderr.
 
         Raises:
-            RefusedError, NoLinkError, DeviceError: Nothing was erased.
-            FaultError: Something was erased: run it again.
+            RefusedError, NoLinkError, DeviceError: No board was erased.
+            FaultError: A board was erased: run the update again.
         """
         today = datetime.datetime.now(datetime.timezone.utc).date()
         asked = None if date is None else (date.year, date.month, date.day)
@@ -308,6 +310,6 @@ def _print_progress(value: dict[str, Any]) -> None:
     boards, what = ", ".join(map(str, step.boards)), "checking" if step.cycle == 1 else "writing"
     share, end = step.bytes / max(step.total_bytes, 1), "\n" if step.bytes >= step.total_bytes else ""
     text = f"\rboard {boards}: {what} {share:4.0%}, {step.rate / 1000:.1f} kB/s, {step.remaining_s:.0f} s left "
-    # A terminal that has gone, or a stderr that was closed, is no reason to cancel the update.
+    # A lost terminal or a closed stderr must not cancel the update.
     with contextlib.suppress(OSError, ValueError):
         print(text, end=end, file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""What procedures on a chain brought about."""
+"""Results of procedures on a chain."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ScanReport:
-    """Who is in the chain.
+    """Boards in the chain.
 
     Attributes:
         boards: Boards with a number, in the order of the chain.
-        reports: Low bytes of the flash numbers of all that reported, boards without a number among them.
-        findings: What is odd, in words; empty: nothing.
+        reports: Low bytes of the flash numbers of all boards that reported, including boards without a number.
+        findings: Irregularities, in words; empty for a chain in order.
     """
 
     boards: tuple[Board, ...]
@@ -41,13 +41,13 @@ class ScanReport:
 
 @dataclass(frozen=True)
 class RunReport:
-    """What runs now.
+    """Control loops that were started.
 
     Attributes:
-        boards: The numbers of the boards whose control loops were started.
-        active: Their outputs are enabled: things move.
-        load_percent: Forecast of the load of the bus, % of its bit rate.
-        load_limit_percent: What the profile allows, %.
+        boards: Numbers of the boards whose control loops were started.
+        active: True if their outputs are enabled: things move.
+        load_percent: Forecast of the bus load, % of its bit rate.
+        load_limit_percent: Bus load that the profile allows, %.
     """
 
     boards: tuple[int, ...]
@@ -58,13 +58,13 @@ class RunReport:
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a doctor found.
+    """Finding of `Chain.doctor`.
 
     Attributes:
         severity: ``problem``, ``warning`` or ``good``.
-        what: What was found.
-        why: The likely cause; may be empty.
-        next: The next command or act; empty where there is nothing to do.
+        what: The finding.
+        why: Likely cause; may be empty.
+        next: Next command or step; empty if no step is needed.
     """
 
     severity: str
@@ -75,11 +75,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Examination:
-    """What a doctor found.
+    """Result of `Chain.doctor`.
 
     Attributes:
-        healthy: No finding is a problem.
-        findings: The worst first.
+        healthy: True if no finding is a problem.
+        findings: Findings, the worst first.
         boards: Boards that answered.
     """
 
@@ -90,16 +90,16 @@ class Examination:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened on the bus.
+    """An event on the bus.
 
     Attributes:
-        number: Counts events, from 1.
-        time_s: When, s since the chain was opened.
+        number: Number of the event, from 1.
+        time_s: Time of the event, s since the chain was opened.
         kind: ``late``, ``lost``, ``back``, ``rebooted`` of heartbeats; ``left-loop``, ``stopped-by-policy``, ``in-loop`` of
             control loops; ``error`` and ``text`` of a board; ``competing-master``, ``foreign``, ``number-shared`` of the bus;
-            ``updated``, what an update has made of a board; ``note``.
-        board: The board's number; None where it is about none.
-        text: In words.
+            ``updated`` with the result of an update for a board; ``note``.
+        board: Number of the board; None if the event is about no board.
+        text: Event in words.
     """
 
     number: int
@@ -111,13 +111,13 @@ class Event:
 
 @dataclass(frozen=True)
 class BusState:
-    """The bus as it was last seen.
+    """Last known state of the bus.
 
     Attributes:
-        load_percent: Load, % of the bit rate, by what was received and sent.
-        received: Frames that were received since the chain was opened.
-        is_master: This chain sends heartbeats: it is the master of the bus.
-        time_s: When, s since the chain was opened.
+        load_percent: Load, % of the bit rate, from received and sent frames.
+        received: Number of frames received since the chain was opened.
+        is_master: True if this chain sends heartbeats, so that it is the master of the bus.
+        time_s: Time of this state, s since the chain was opened.
     """
 
     load_percent: float
@@ -128,13 +128,13 @@ class BusState:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an update is.
+    """Progress of an update.
 
     Attributes:
-        boards: The boards that get the image now.
-        attempt: From 1.
-        cycle: 1 (the board checks the image) or 2 (it is written).
-        bytes: Bytes of both cycles that were taken in this attempt.
+        boards: Boards that receive the image now.
+        attempt: Number of the attempt, from 1.
+        cycle: 1 (the board checks the image) or 2 (the board writes the image).
+        bytes: Bytes of both cycles that the boards accepted in this attempt.
         total_bytes: Bytes of both cycles.
         rate: Bytes per second so far.
         remaining_s: Remaining time at that rate, s.
@@ -155,21 +155,21 @@ class Progress:
 
 @dataclass(frozen=True)
 class UpdateResult:
-    """What became of one board.
+    """Result of an update for one board.
 
     Attributes:
-        board: Its number.
-        flash_number: Its flash number; None: it did not answer.
+        board: Number of the board.
+        flash_number: Flash number of the board; None: the board did not answer.
         outcome: ``not-started``, ``cancelled``, ``up-to-date``, ``program-up-to-date``, ``incomplete``, ``unknown``, ``written``,
             ``verified`` or ``running``.
-        note: What is to be said of a board that showed the program already; empty: of any other.
-        verified: The board shows the Program ID and date of the image, and exactly this image was written to this address:
-            now, or before by the inventory.
-        before: Program ID and flash date that it showed before; None each: no valid application, or no answer.
-        after: Program ID and flash date that it shows now.
-        attempts: Attempts that were made.
-        time_s: From the reset into the exloader to the last answer, s.
-        error: Why it failed; empty: it did not.
+        note: Remark about a board that showed the program already; empty for any other board.
+        verified: True if the board shows the Program ID and date of the image, and exactly this image was written to this address:
+            now, or earlier according to the inventory.
+        before: Program ID and flash date before the update; None each: no valid application, or no answer.
+        after: Program ID and flash date now.
+        attempts: Number of attempts.
+        time_s: Time from the reset into the exloader to the last answer, s.
+        error: Reason of the failure; empty after a success.
     """
 
     board: int
@@ -186,15 +186,15 @@ class UpdateResult:
 
 @dataclass(frozen=True)
 class UpdateReport:
-    """What became of an update.
+    """Result of an update.
 
     Attributes:
-        dry_run: Nothing was sent but questions.
-        program_id: The Program ID that the boards have to show; None: nobody knows it.
-        flash_date: The flash date of the image, ``YYYY-MM-DD``; None: no header carries it.
+        dry_run: True if only queries were sent.
+        program_id: Program ID that the boards must show; None: the Program ID is not known.
+        flash_date: Flash date of the image, ``YYYY-MM-DD``; None: no header has a date.
         bytes: Bytes of both cycles.
-        unverifiable: Why nothing can prove what was written; None: it is read back.
-        boards: In the order of their numbers.
+        unverifiable: Reason why the written image cannot be verified; None: it is read back.
+        boards: Results in the order of board numbers.
     """
 
     dry_run: bool
@@ -206,7 +206,7 @@ class UpdateReport:
 
     @property
     def verified(self) -> bool:
-        """Every board shows the image."""
+        """True if every board is verified."""
         return bool(self.boards) and all(one.verified for one in self.boards)
 
     @classmethod
@@ -220,15 +220,15 @@ class UpdateReport:
 
 @dataclass(frozen=True)
 class ProbeRow:
-    """One unknown of the protocol, and what was found out.
+    """Result for an open point of the protocol.
 
     Attributes:
         key: Key of the profile.
-        unknown: What is unknown.
-        published: What the published description has about it.
-        observed: What was observed.
-        decision: The value in the profile.
-        measured: The observation decides; else the value is the one from before.
+        unknown: The open point.
+        published: Statement of the published description about it.
+        observed: Observation.
+        decision: Value in the profile.
+        measured: True if the observation decides the value; otherwise the earlier value is kept.
     """
 
     key: str
@@ -241,12 +241,12 @@ class ProbeRow:
 
 @dataclass(frozen=True)
 class ProbeReport:
-    """How boards read the protocol.
+    """Measurement of how boards read the protocol.
 
     Attributes:
         boards: Numbers of the boards that answered.
-        rows: What was unknown, and is measured or kept.
-        profile: The profile with what was measured, TOML: for a file that `connect` takes.
+        rows: Open points, measured or kept.
+        profile: Profile with the measured values, TOML; as a file it can be passed to `connect`.
     """
 
     boards: tuple[int, ...]
@@ -256,16 +256,16 @@ class ProbeReport:
 
 @dataclass(frozen=True)
 class ConformanceTest:
-    """One test of one board, or of the chain.
+    """A conformance test of one board, or of the chain.
 
     Attributes:
-        id: Its name, as ``D-T10``.
-        board: The board; None: the chain as a whole.
-        expected: What was expected.
+        id: Name of the test, such as ``D-T10``.
+        board: Number of the board; None: the chain as a whole.
+        expected: Expected behaviour.
         verdict: ``pass``, ``fail`` or ``skipped``.
-        why: What came instead, or why it was not done.
-        sent: Frames that were sent, as candump writes them.
-        came: Frames that came, at most 64.
+        why: Behaviour that was seen instead, or reason for skipping the test.
+        sent: Sent frames, in the form of candump.
+        came: Received frames, at most 64.
     """
 
     id: str
@@ -279,11 +279,11 @@ class ConformanceTest:
 
 @dataclass(frozen=True)
 class ConformanceReport:
-    """Whether boards keep to the protocol.
+    """Results of conformance tests.
 
     Attributes:
-        tests: In the order in which they were done.
-        left: What is not as it was found; empty: nothing.
+        tests: Tests in the order in which they ran.
+        left: Changes of the boards that the tests could not restore; empty if all are restored.
     """
 
     tests: tuple[ConformanceTest, ...]

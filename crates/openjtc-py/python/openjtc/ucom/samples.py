@@ -1,4 +1,4 @@
-"""Outputs of boards as they come, and as tables."""
+"""Outputs of boards as a stream and as tables."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Sample:
     """All outputs of a board at one time.
 
     Attributes:
-        time_s: When the last of them came, s since the chain was opened.
-        board: The number of the board.
-        outputs: By name, in the order of the buffer, in units where a signal table has them.
-        missed: Sets of outputs with gaps since the sample before, which were dropped.
+        time_s: Time at which the last output came, s since the chain was opened.
+        board: Number of the board.
+        outputs: Outputs by name, in the order of the buffer, in units if a signal table has them.
+        missed: Number of incomplete sets of outputs that were dropped since the previous sample.
     """
 
     time_s: float
@@ -35,18 +35,18 @@ class Sample:
 
     @property
     def array(self) -> NDArray[np.float64]:
-        """The outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
+        """Outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
         return _array(self.outputs)
 
 
 @dataclass(frozen=True)
 class OutputTable:
-    """The outputs of one board over time.
+    """Outputs of one board over time.
 
     Attributes:
-        names: The names of the columns, M of them.
-        time_s: Shape (N,), s since the chain was opened.
-        values: Shape (N, M), in units where a signal table has them.
+        names: Names of the M columns.
+        time_s: Times of shape (N,), s since the chain was opened.
+        values: Values of shape (N, M), in units if a signal table has them.
     """
 
     names: tuple[str, ...]
@@ -55,11 +55,11 @@ class OutputTable:
 
 
 class Monitor(Iterator[Sample]):
-    """Samples as they come; ends after so many seconds or samples. Made by `Chain.monitor`.
+    """Iterator over samples as they come; ends after a time or a number of samples. Made by `Chain.monitor`.
 
     Raises:
-        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); once.
-        NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is gone.
+        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised once.
+        NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
     """
 
     def __init__(self, native: ChainSamples, seconds: float | None, count: int | None) -> None:
@@ -80,20 +80,20 @@ class Monitor(Iterator[Sample]):
 
     @property
     def dropped(self) -> int:
-        """Samples that were dropped because they were not read in time."""
+        """Number of samples that were dropped because they were not read in time."""
         return self._native.dropped
 
     def to_numpy(self) -> dict[int, OutputTable]:
-        """All samples that still come, until the end, as `to_numpy` gives them."""
+        """Reads all samples until the end, and returns the tables of `to_numpy`."""
         return to_numpy(self)
 
     def to_pandas(self) -> Any:
-        """All samples that still come, until the end, as `to_pandas` gives them."""
+        """Reads all samples until the end, and returns the table of `to_pandas`."""
         return to_pandas(self)
 
 
 def to_numpy(samples: Iterable[Sample]) -> dict[int, OutputTable]:
-    """Samples as one table a board, by its number."""
+    """Returns samples as one table per board, by board number."""
     by_board: dict[int, list[Sample]] = {}
     for sample in samples:
         by_board.setdefault(sample.board, []).append(sample)
@@ -106,9 +106,9 @@ def to_numpy(samples: Iterable[Sample]) -> dict[int, OutputTable]:
 
 
 def to_pandas(samples: Iterable[Sample]) -> Any:
-    """Samples as a ``pandas.DataFrame``: ``time_s``, ``board``, and a column for each output.
+    """Returns samples as a ``pandas.DataFrame``: ``time_s``, ``board``, and a column for each output.
 
-    Boards with different outputs have NaN in the columns of others.
+    Boards with different outputs have NaN in the columns of other boards.
 
     Raises:
         ImportError: pandas is not installed; the message says how to install it.

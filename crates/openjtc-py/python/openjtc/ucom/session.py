@@ -1,4 +1,4 @@
-"""The session of a chain: from its beginning to its end, the names of its boards, what has happened."""
+"""Session of a chain: opening and closing, names of boards, events."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from openjtc.ucom.reports import BusState, Event
 
 __all__ = ["Boards", "Recording", "Session"]
 
-#: Which boards: a number, several, names of an inventory, a list or range as text (``"1,4-6"``), or ``"all"``.
+#: Selection of boards: a number, several, names of an inventory, a list or range as text (``"1,4-6"``), or ``"all"``.
 Boards = int | str | Iterable[int | str]
 _Path = str | os.PathLike[str]
 _Self = TypeVar("_Self", bound="Session")
 
 
 def _close(native: _native.Chain) -> None:
-    """At the end of the program, or of the last reference to a chain that was not closed."""
+    """Closes a chain at the end of the program, or when the last reference to an open chain ends."""
     not_stopped = native.close()
     if not_stopped and sys.stderr is not None:
-        # Nobody takes an exception any more.
+        # No caller could catch an exception here.
         with contextlib.suppress(OSError, ValueError):
             print(f"openjtc: {_not_stopped(not_stopped)}", file=sys.stderr, flush=True)
 
@@ -40,7 +40,7 @@ def _not_stopped(boards: Iterable[int]) -> str:
 
 
 class Session:
-    """What every chain has; see `openjtc.ucom.Chain`."""
+    """Base class of every chain; see `openjtc.ucom.Chain`."""
 
     def __init__(self, native: _native.Chain, names: Mapping[str, int], simulated: SimulatedChain | None) -> None:
         self._native = native
@@ -51,12 +51,12 @@ class Session:
 
     @property
     def url(self) -> str:
-        """The URL of the bus; other programs can join the one of a simulated chain."""
+        """URL of the bus; other programs can join the bus of a simulated chain."""
         return self._native.url
 
     @property
     def simulated(self) -> SimulatedChain | None:
-        """The simulated chain, where `connect` was given one or has made one."""
+        """Simulated chain, if `connect` was given one or has made one."""
         return self._simulated
 
     def __enter__(self: _Self) -> _Self:
@@ -72,10 +72,10 @@ class Session:
             self.check()
 
     def close(self) -> None:
-        """Stops what this chain has started, and lets the bus go. The context manager does the same, then `check`.
+        """Stops everything that this chain has started, and releases the bus. The context manager does the same, then calls `check`.
 
         Raises:
-            FaultError: Boards are not stopped for certain (``not-stopped``); without heartbeats they become safe by themselves.
+            FaultError: Some boards may not be stopped (``not-stopped``). Without heartbeats they become safe by themselves.
         """
         not_stopped = self._end()
         if not_stopped:
@@ -86,7 +86,7 @@ class Session:
         try:
             return list(self._native.close())
         except BaseException:
-            # Ctrl-C while it was waited for: the thread goes on, and the end of the program waits for it.
+            # Ctrl-C interrupted the wait: the thread continues, and the end of the program waits for it.
             self._finalizer = weakref.finalize(self, _close, self._native)
             raise
 
@@ -101,12 +101,12 @@ class Session:
     def __repr__(self) -> str:
         return f"<openjtc.ucom.Chain {self.url}>"
 
-    # What has happened.
+    # Events and errors.
 
     def check(self) -> None:
-        """Raises an error if a board was lost, has left its control loop by itself, or shares its number with another; once for each.
+        """Raises an error, once for each event, if a board was lost, left its control loop by itself, or shares its number.
 
-        Iterating a `monitor`, `values`, reading an output that is old, and the end of the context do the same.
+        Iterating a `monitor`, calling `values`, reading an old output, and the end of the context do the same.
 
         Raises:
             FaultError: ``lost``, ``left-loop`` or ``number-shared``, with ``.board``.
@@ -114,23 +114,24 @@ class Session:
         self._native.check()
 
     def events(self, after: int = 0) -> list[Event]:
-        """What has happened on the bus, oldest first; the last 4096.
+        """Returns the last 4096 events on the bus, oldest first.
 
         Args:
-            after: Only events with higher numbers.
+            after: Returns only events with higher numbers.
         """
         return [Event(**event) for event in self._native.events(after)]
 
     def bus(self) -> BusState:
-        """Load and frames of the bus."""
+        """Returns load and frame counts of the bus."""
         return BusState(**self._native.bus())
 
     def record(self, path: _Path, *, overwrite: bool = False) -> Recording:
-        """Records every frame of the bus, those of this chain among them, until the end of the context or ``.end()``.
+        """Records every frame of the bus, including the frames of this chain, until the end of the context or ``.end()``.
 
         Args:
-            path: ``.log`` is candump's form, ``.fzi`` FZI-CAN, ``.mcap`` MCAP; the profile goes into or beside it.
-            overwrite: Write over a file that is there.
+            path: File: ``.log`` for candump's form, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written into the file or next
+                to it.
+            overwrite: Overwrites an existing file.
         """
         if not overwrite and Path(path).exists():
             raise UsageError(f"{os.fspath(path)}: is there already", "exists", next="overwrite=True writes over it")
@@ -166,7 +167,7 @@ class Recording:
 
     def __init__(self, native: ChainRecording) -> None:
         self._native = native
-        #: Frames that were written, and frames of other protocols that the form has no place for; when it has ended.
+        #: Number of written frames, and of left-out frames of other protocols that the form cannot hold; set at the end.
         self.frames = 0
         self.left_out = 0
 
@@ -180,7 +181,7 @@ class Recording:
         """Ends the recording.
 
         Raises:
-            FaultError: It could not be written whole (``recording``).
+            FaultError: The recording could not be written completely (``recording``).
         """
         counts = self._native.end()
         if counts is not None:

@@ -1,4 +1,4 @@
-"""Boards of a chain and their values by name."""
+"""Boards of a chain, and their values by name."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _Path = str | os.PathLike[str]
 
 
 def _text(value: Settable, unit: str = "") -> str:
-    """A value as `ucom` takes it."""
+    """Returns a value as text in the form of `ucom`."""
     if isinstance(value, str):
         return f"{value} {unit}".strip()
     if isinstance(value, bool):
@@ -38,16 +38,16 @@ def _value(value: Any) -> Value:
 
 
 class ValuesByName(Session):
-    """What a chain has of boards and values; see `openjtc.ucom.Chain`."""
+    """Boards and values of a chain; see `openjtc.ucom.Chain`."""
 
     def __init__(self, native: _native.Chain, names: Mapping[str, int], simulated: SimulatedChain | None) -> None:
         super().__init__(native, names, simulated)
         self._boards: dict[int, Board] = {}
-        #: Names of the inventory have been looked for.
+        #: True after the names of the inventory were read.
         self._looked = False
 
     def scan(self) -> ScanReport:
-        """Asks who is there; changes nothing.
+        """Queries all boards, without changing anything.
 
         Raises:
             NoLinkError: No board answers (``no-boards``).
@@ -58,22 +58,22 @@ class ValuesByName(Session):
 
     @property
     def boards(self) -> dict[int, Board]:
-        """The boards by number, as last seen; the first time it asks who is there."""
+        """Boards by number, as last seen; the first use queries all boards."""
         if not self._boards:
             self.scan()
         return dict(self._boards)
 
     def signals(self, board: int | str) -> Signals:
-        """The inputs, outputs and parameters of a board.
+        """Returns the inputs, outputs and parameters of a board.
 
         Raises:
-            RefusedError: Its application is not started, and its names are not remembered (``no-application``): `start` it.
+            RefusedError: The application is not started, and its signal names are not remembered (``no-application``): call `start`.
         """
         (value,) = self._native.signals(str(self._number(board)))
         return Signals._of(value)
 
     def initial_inputs(self, board: int | str) -> dict[str, Value]:
-        """What a board wants its inputs to be at first; its application has to be started."""
+        """Reads the initial inputs that a board requests. The application must be started."""
         return dict(self._native.initial_inputs(self._number(board)))
 
     def set(
@@ -87,22 +87,22 @@ class ValuesByName(Session):
     ) -> Value:
         """Sets an input, or writes a parameter.
 
-        An input is sent at once, and again and again while its board runs. Boards have no way to read parameters back, and lose
-        them when their application ends.
+        An input is sent at once, and repeated while its board runs. Parameters cannot be read back from a board, and the board loses
+        them when its application ends.
 
         Args:
-            name: ``BOARD.NAME``, in any case, or the name alone where one board has it.
+            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has it.
             value: A number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch.
-            unit: Its unit, where the signal has one by the signal table: bare numbers are refused there.
-            kind: Which of the two, where an input and a parameter have the same name; otherwise the input is set.
-            force: Also when another PC is on the bus.
+            unit: Unit of the value. A signal with a unit in the signal table refuses bare numbers.
+            kind: Selects the input or the parameter if both have the same name; None: the input.
+            force: Continues even if another PC is on the bus.
 
         Returns:
-            What was sent, in the unit of the signal: between two words the nearer one is taken.
+            The value that was sent, in the unit of the signal, rounded to the nearest word.
 
         Raises:
-            UsageError: There is no such signal (``no-edge``).
-            RefusedError: Out of range, or without its unit (``value``, with ``.value`` and ``.limit``).
+            UsageError: No board has this signal (``no-edge``).
+            RefusedError: The value is out of range or lacks its unit (``value``, with ``.value`` and ``.limit``).
         """
         board, signal = self._find(name)
         return _value(self._native.set(board, kind, signal, _text(value, unit), force))
@@ -111,30 +111,30 @@ class ValuesByName(Session):
         self.set(name, value)
 
     def __getitem__(self, name: str) -> Value:
-        """An output by its name; else an input as last set, or a parameter as written (None: not known).
+        """Returns an output by its name; else an input as last set, or a parameter as written (None: not known).
 
         Raises:
-            NoLinkError: The board sends no outputs (``no-outputs``), or none for half a second (``stale``).
-            FaultError: It was lost, or has left its control loop by itself.
+            NoLinkError: The board sends no outputs (``no-outputs``), or none for 0.5 s (``stale``).
+            FaultError: The board was lost, or has left its control loop by itself.
         """
         board, signal = self._find(name)
         return _value(self._native.value(board, signal))
 
     def values(self) -> dict[str, Value]:
-        """The present outputs of all boards that this chain runs, by ``NUMBER.NAME``; `board_values` has old ones, too, and their age.
+        """Returns the present outputs of all boards that this chain runs, by ``NUMBER.NAME``. `board_values` also returns old outputs.
 
         Raises:
             FaultError: A board was lost, or has left its control loop by itself.
-            NoLinkError: One of them sends no outputs (``no-outputs``), or none for half a second (``stale``), with ``.board``.
+            NoLinkError: A board sends no outputs (``no-outputs``), or none for 0.5 s (``stale``), with ``.board``.
         """
         self.check()
         boards = [BoardValues._of(value) for value in self._native.running()]
         return {f"{one.board}.{name}": value for one in boards for name, value in one.outputs.items()}
 
     def board_values(self, boards: Boards = "all") -> dict[int, BoardValues]:
-        """Outputs with their age, inputs and parameters of boards, also of those that another program runs.
+        """Returns outputs with their age, inputs and parameters of boards, also of boards that another program runs.
 
-        Of ``all`` those are left out that have no names yet, as their applications are not started.
+        ``all`` leaves out boards without names, because their applications are not started.
         """
         all_values = (BoardValues._of(value) for value in self._native.values(self._list(boards)))
         return {one.board: one for one in all_values}
@@ -142,22 +142,22 @@ class ValuesByName(Session):
     def monitor(
         self, boards: Boards | None = None, *, seconds: float | None = None, count: int | None = None
     ) -> Monitor:
-        """Outputs of boards as they come, an iterator of `Sample`; ``.to_pandas()`` and ``.to_numpy()`` make tables of it.
+        """Returns an iterator of `Sample` with outputs as they come; ``.to_pandas()`` and ``.to_numpy()`` make tables of it.
 
         Args:
-            boards: Which, also such as another program runs; None: those that this chain runs, or all where it runs none; of
-                all those are left out that have no names yet, as their applications are not started.
-            seconds: End after so many seconds.
-            count: End after so many samples.
+            boards: Boards to read, also boards that another program runs. None: the boards that this chain runs, or all boards if it runs
+                none. ``all`` leaves out boards without names, because their applications are not started.
+            seconds: Time after which the iterator ends, s.
+            count: Number of samples after which the iterator ends.
         """
         return Monitor(self._native.samples(None if boards is None else self._list(boards)), seconds, count)
 
     def save_parameters(self, path: _Path, boards: Boards = "all") -> None:
-        """Writes a parameter file, YAML: what was written last as values, all other names as comments."""
+        """Writes a parameter file, YAML, with the values written last, and all other names as comments."""
         Path(path).write_text(self._native.parameters_text(self._list(boards)), encoding="utf-8")
 
     def apply_parameters(self, path: _Path, *, dry_run: bool = False, force: bool = False) -> int:
-        """Checks a whole parameter file against boards, programs, names and ranges, then writes it. How many parameters."""
+        """Checks a whole parameter file against boards, programs, names and ranges, then writes the parameters. Returns their number."""
         return self._native.apply_parameters(os.fspath(path), dry_run, force)
 
     def _keep(self, boards: list[dict[str, Any]]) -> tuple[Board, ...]:
@@ -168,12 +168,12 @@ class ValuesByName(Session):
         return all_boards
 
     def _forget_boards(self) -> None:
-        """Numbers and names are of other boards from now on, or of none."""
+        """Forgets numbers and names, because they may belong to other boards from now on."""
         self._boards, self._inventory_names, self._looked = {}, {}, False
 
     def _named(self, name: str) -> int | None:
         number = super()._named(name)
-        # Names of the inventory are known when it is known who is there; lists and ranges are no names.
+        # A scan reads the names of the inventory. Lists and ranges are not names.
         if number is None and not self._looked and any(letter.isalpha() for letter in name):
             self.scan()
             number = super()._named(name)
@@ -189,7 +189,7 @@ class ValuesByName(Session):
         return seen
 
     def _find(self, name: str) -> tuple[int, str]:
-        """Board and signal of a name."""
+        """Splits a name into board and signal."""
         first, dot, rest = name.partition(".")
         number = self._named(first) if dot else None
         if number is not None and rest:
